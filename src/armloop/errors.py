@@ -1,0 +1,32 @@
+"""The exceptions a user can meet.
+
+All of them mean that the input is at fault. Their message is one line that names the file, the column or the
+row, says what is wrong and what would be right; the command line prints it and ends with status 2.
+"""
+
+
+class InputError(ValueError):
+    """The input is at fault; `str(error)` is one line that says where, what is wrong and what would be right."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))
+
+
+class LogError(InputError):
+    """A motion log cannot be read, or what it holds is not a motion."""
+
+
+class ArmError(InputError):
+    """An arm's description is missing or broken, or it is not the arm that was asked for."""
+
+
+class ModelError(InputError):
+    """A model file is missing or broken, or it was made for another arm."""
+
+
+class ScenarioError(InputError):
+    """A scenario file is missing, or one of its fields is unknown, absent or out of range."""
+
+
+class ExcitationError(InputError):
+    """The data move too little to determine what was asked of them."""

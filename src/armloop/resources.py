@@ -1,0 +1,55 @@
+"""Where the arms and scenarios that come with armloop lie on the disk.
+
+In a source checkout they are the top-level folders `urdf/` and `scenarios/`; in a wheel the same folders are
+packed inside the package. Both are found by walking from this file, so no build step is needed to edit them.
+"""
+
+from pathlib import Path
+
+from armloop.errors import ArmError, InputError, ScenarioError
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def urdf_path(name: str) -> Path:
+    """Return the URDF file of the built-in arm `name` (`three_axis`, `scara`).
+
+    Raises `ArmError` when there is no such arm; the message lists those there are.
+    """
+    return _find("urdf", ".urdf", name, "arm", ArmError)
+
+
+def scenario_path(name: str) -> Path:
+    """Return the YAML file of the built-in scenario `name` (such as `three_axis_tracking`).
+
+    Raises `ScenarioError` when there is no such scenario; the message lists those there are.
+    """
+    return _find("scenarios", ".yaml", name, "scenario", ScenarioError)
+
+
+def urdf_names() -> list[str]:
+    """Return the names of the built-in arms, sorted."""
+    return _names("urdf", ".urdf")
+
+
+def scenario_names() -> list[str]:
+    """Return the names of the built-in scenarios, sorted."""
+    return _names("scenarios", ".yaml")
+
+
+def _folder(kind: str) -> Path:
+    """Return the folder `kind`: inside the package (wheel), else beside `src` (checkout)."""
+    packed = _PACKAGE / kind
+    return packed if packed.is_dir() else _PACKAGE.parents[1] / kind
+
+
+def _names(kind: str, suffix: str) -> list[str]:
+    return sorted(path.stem for path in _folder(kind).glob(f"*{suffix}"))
+
+
+def _find(kind: str, suffix: str, name: str, what: str, error: type[InputError]) -> Path:
+    names = _names(kind, suffix)
+    if name not in names:
+        known = ", ".join(names) or "none: this installation is incomplete"
+        raise error(f"{name!r}: no built-in {what} of this name; there are: {known}")
+    return _folder(kind) / f"{name}{suffix}"
