@@ -7,8 +7,8 @@ yields at a limit. One such element of width w obeys, sample by sample,
 
 so that it is sign(v) once the joint has moved by 2 w in one direction and a spring of stiffness 1/w until
 then. Several widths side by side, weighted by a regression, give the Prandtl-Ishlinskii (Maxwell-slip)
-model of presliding friction. It depends on the path and not on the rate: the motion must come at full rate,
-without gaps inside a run, and any decimation is done on the column, not on the motion.
+model of presliding friction. It depends on the path and not on the rate: samples may be thinned as long as
+the motion between two of them does not reverse by much of w, and a gap needs a new run.
 
 References: Prandtl 1928; Ishlinskii 1944; Al-Bender, Lampaert and Swevers, "The generalized Maxwell-slip
 model", IEEE Trans. Automatic Control 50(11), 2005; Krejci, Hysteresis, Convexity and Dissipation, 1996.
