@@ -60,6 +60,7 @@ class Samples:
     tau : (N, n) N*m (N for a prismatic joint)
     moving : (N, n) true where joint j slides, that is |v_j| is above the dead zone of its velocity noise
     period : the sample period in seconds
+    cutoff_hz : corner of the low-pass that tau and the motion have passed; 0 where there was none
 
     Raises `ValueError` when the shapes do not agree.
     """
@@ -68,6 +69,7 @@ class Samples:
     tau: NDArray[np.float64]
     moving: NDArray[np.bool_]
     period: float
+    cutoff_hz: float = 0.0
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -1,0 +1,153 @@
+"""The parts a model's rigid-body torque is made of; each predicts, prints its terms, and keeps itself as JSON."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.errors import ModelError
+from armloop.library.double_feature_set import Factors, product_name, products
+from armloop.library.rigid_body import BaseParameters, full_columns
+from armloop.motion import Motion
+
+Array = NDArray[np.float64]
+Term = tuple[int, float, str]
+
+
+class Component(Protocol):
+    """What every part of a model can do."""
+
+    kind: ClassVar[str]
+
+    def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
+        """(N, n) torque of what was found up to ``step``."""
+        ...
+
+    def terms(self, arm: Arm, joint: int) -> list[Term]:
+        """(step, coefficient, name) of every term of one joint (0-based)."""
+        ...
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        ...
+
+    @staticmethod
+    def from_dict(data: dict[str, Any], arm: Arm) -> Component:
+        """Rebuild from :meth:`to_dict`."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class SparseTerms:
+    """Terms of the double feature set found in one step.
+
+    Attributes:
+        step: 1, 2 or 3; 3 for one-shot SINDy.
+        index: (T, K) factor indices of the terms (see :class:`Factors`).
+        coefficients: (T, n), zero where a joint does not use a term.
+    """
+
+    step: int
+    index: NDArray[np.intp]
+    coefficients: Array
+    kind: ClassVar[str] = "terms"
+
+    @cached_property
+    def _names(self) -> list[str]:
+        factors = Factors(self.coefficients.shape[1])
+        return [product_name(row, factors.names) for row in self.index]
+
+    def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
+        if step < self.step or len(self.index) == 0:
+            return np.zeros_like(motion.q)
+        return products(Factors(arm.n).evaluate(motion), self.index) @ self.coefficients
+
+    def terms(self, arm: Arm, joint: int) -> list[Term]:
+        c = self.coefficients[:, joint]
+        return [(self.step, float(c[t]), self._names[t]) for t in np.flatnonzero(c)]
+
+    def to_dict(self) -> dict[str, Any]:
+        n = self.coefficients.shape[1]
+        joints = []
+        for j in range(n):
+            used = np.flatnonzero(self.coefficients[:, j])
+            joints.append({self._names[t]: float(self.coefficients[t, j]) for t in used})
+        return {"kind": self.kind, "step": self.step, "joints": joints}
+
+    @staticmethod
+    def from_dict(data: dict[str, Any], arm: Arm) -> SparseTerms:
+        joints = data["joints"]
+        if len(joints) != arm.n:
+            raise ModelError(f"terms of step {data['step']}: {len(joints)} joints, the arm has {arm.n}")
+        names = list(dict.fromkeys(name for joint in joints for name in joint))
+        rows = [_parse_product(name, arm.n) for name in names]
+        width = max([len(row) for row in rows], default=1)
+        index = np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
+        coefficients = np.array([[float(joint.get(name, 0.0)) for joint in joints] for name in names])
+        return SparseTerms(int(data["step"]), index, coefficients.reshape(-1, arm.n))
+
+
+def _parse_product(name: str, n: int) -> list[int]:
+    known = {factor: e for e, factor in enumerate(Factors(n).names)}
+    row: list[int] = []
+    for part in name.split("*"):
+        match = re.fullmatch(r"(.+?)(?:\^(\d))?", part)
+        if match is None or match[1] not in known:
+            raise ModelError(f"unknown term {name!r}: {part!r} is no function of {n} joints")
+        row += [known[match[1]]] * int(match[2] or 1)
+    return sorted(row)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """Inertial parameters of all links (and rotors), as far as the data reveal them.
+
+    Attributes:
+        parameters: (10 n,) or, with rotor inertias, (11 n,): full parameters nearest to the nominal ones
+            that have the identified base parameters.
+        names, values: the base parameters, readable.
+    """
+
+    parameters: Array
+    names: tuple[str, ...]
+    values: Array
+    kind: ClassVar[str] = "rigid_body"
+
+    def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
+        v = motion.v if step >= 2 else np.zeros_like(motion.v)
+        vdot = motion.vdot if step >= 3 else np.zeros_like(motion.vdot)
+        part = Motion(motion.time, motion.q, v, vdot, motion.starts)
+        return full_columns(arm, part, len(self.parameters) == 11 * arm.n) @ self.parameters
+
+    def terms(self, arm: Arm, joint: int) -> list[Term]:
+        """The base parameters whose columns reach the joint; the column is named after its parameter."""
+        reach = [max((int(x) for x in re.findall(r"[A-Za-z](\d+)", name)), default=0) for name in self.names]
+        return [
+            (3, float(value), f"Y[{joint + 1};{name}]")
+            for value, name, link in zip(self.values, self.names, reach, strict=True)
+            if link >= joint + 1
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "kind": self.kind,
+            "base_parameters": dict(zip(self.names, self.values.tolist(), strict=True)),
+            "parameters": self.parameters.tolist(),
+        }
+
+    @staticmethod
+    def from_dict(data: dict[str, Any], arm: Arm) -> RigidBody:
+        parameters = np.array(data["parameters"], dtype=float)
+        if parameters.shape not in ((10 * arm.n,), (11 * arm.n,)):
+            raise ModelError(f"rigid_body: {parameters.size} parameters, {arm.n} links need {10 * arm.n} or {11 * arm.n}")
+        base = data["base_parameters"]
+        return RigidBody(parameters, tuple(base), np.array(list(base.values()), dtype=float))
+
+
+COMPONENTS: dict[str, type[SparseTerms] | type[RigidBody]] = {kind.kind: kind for kind in (SparseTerms, RigidBody)}

@@ -1,0 +1,60 @@
+"""A base that does not stand level."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.kinematics import regressor
+
+
+def tilted_gravity(gravity: Array, roll: float, pitch: float) -> Array:
+    """Gravity in the frame of a base rolled about x, then pitched about y: (R_y R_x)ᵀ g."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    R_WB = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
+    return R_WB.T @ gravity
+
+
+class GravityTilt(Effect):
+    """Gravity acts along another direction than the model took for granted."""
+
+    name = "gravity_tilt"
+    joint_wise = False
+    complexity = 2
+    needs_inertial = True
+
+    #: Step for the derivative with respect to roll and pitch, rad.
+    step = 0.02
+
+    def _gravity_torque(self, context: Context, gravity: Array) -> Array:
+        assert context.inertial is not None
+        zero = np.zeros_like(context.motion.q)
+        return regressor(context.arm, context.motion.q, zero, zero, gravity) @ context.inertial
+
+    def columns(self, context: Context, shape: float) -> Array:
+        g, d = context.arm.gravity, self.step
+        sides = [
+            (self._gravity_torque(context, tilted_gravity(g, d, 0)), self._gravity_torque(context, tilted_gravity(g, -d, 0))),
+            (self._gravity_torque(context, tilted_gravity(g, 0, d)), self._gravity_torque(context, tilted_gravity(g, 0, -d))),
+        ]
+        return np.stack([(plus - minus) / (2 * d) for plus, minus in sides], axis=2)
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        g = context.arm.gravity
+        tilted = tilted_gravity(g, number(parameters["roll"]), number(parameters["pitch"]))
+        return self._gravity_torque(context, tilted) - self._gravity_torque(context, g)
+
+    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        errors = np.sqrt(np.diag(covariance))
+        return {
+            name: Estimate(float(b), float(e), "rad")
+            for name, b, e in zip(("roll", "pitch"), beta, errors, strict=True)
+        }
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return all(abs(number(e.value)) < 0.6 for e in parameters.values())
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        roll, pitch = (np.degrees(number(parameters[key].value)) for key in ("roll", "pitch"))
+        return f"the base is not level: rolled {roll:.2f}° about x and pitched {pitch:.2f}° about y"

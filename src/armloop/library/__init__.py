@@ -1,0 +1,1 @@
+"""Candidate functions of the joint torques, one kind a file."""

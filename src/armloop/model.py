@@ -1,0 +1,238 @@
+"""A reconstructed model: readable terms that predict joint torques, and its file.
+
+A model is the sum of components, each with the step that found it: sparse terms of the double feature set,
+a rigid body's inertial parameters, a friction law, and effects that a diagnosis added. Sensor effects change
+what a log shows (``predict``), never what a controller supplies (``feedforward``).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.components import COMPONENTS, Component
+from armloop.effects import Context, Effect, Estimate, effect
+from armloop.errors import ArmError, ModelError
+from armloop.files import write_text
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.friction import FrictionLaw
+from armloop.motion import Motion
+from armloop.signals import Conditioning
+
+Array = NDArray[np.float64]
+
+SCHEMA = "armloop/model/1"
+
+
+@dataclass(frozen=True)
+class AddedEffect:
+    """An effect that a diagnosis added, with its estimated parameters."""
+
+    effect: Effect
+    parameters: dict[str, Estimate]
+
+    def torque(self, context: Context) -> Array:
+        """(N, n) torque of the effect."""
+        return self.effect.torque(context, {key: e.value for key, e in self.parameters.items()})
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values, as in ``diagnosis.json``."""
+        return {
+            "effect": self.effect.name,
+            "joint": self.effect.joint,
+            "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+        }
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> AddedEffect:
+        """Rebuild from :meth:`to_dict`."""
+        return AddedEffect(
+            effect(data["effect"], data["joint"]),
+            {key: Estimate(e["value"], e["std_error"], str(e["unit"])) for key, e in data["parameters"].items()},
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ReconstructedModel:
+    """Sum of components with friction and effects, made for one arm.
+
+    Attributes:
+        arm: the arm it was made for.
+        components: rigid-body part, in the order of the steps.
+        friction: friction law of all joints.
+        conditioning: how the training logs were filtered; later logs are treated alike.
+        recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
+        baseline: what the model leaves on data of its own training runs that were not fitted:
+            ``rmse``, ``rms`` per joint, ``nrmse``.
+        effects: what a diagnosis added.
+        history: method, library, steps: how the model came about.
+    """
+
+    arm: Arm
+    components: tuple[Component, ...]
+    friction: FrictionLaw
+    conditioning: Conditioning = field(default_factory=Conditioning)
+    recorded: dict[str, Any] = field(default_factory=lambda: {"unit": "N*m", "drive_gains": None})
+    baseline: dict[str, Any] = field(default_factory=dict)
+    effects: tuple[AddedEffect, ...] = ()
+    history: dict[str, Any] = field(default_factory=dict)
+
+    def rigid_body(self, motion: Motion, step: int = 3) -> Array:
+        """(N, n) torque of the components without friction and effects."""
+        tau = np.zeros_like(motion.q)
+        for component in self.components:
+            tau += component.torque(self.arm, motion, step)
+        return tau
+
+    def predict(self, motion: Motion, step: int = 3, sensors: bool = True) -> Array:
+        """Joint torques for a motion, (N, n) in N·m (N for a prismatic joint).
+
+        Args:
+            step: 1 gravity and dry friction, 2 with velocity terms, 3 the whole model with its effects.
+            sensors: include what a faulty sensor adds to the record.
+        """
+        self._check(motion)
+        load = self.rigid_body(motion, step)
+        tau = load + self.friction.torque(motion, step, load)
+        if step >= 3 and self.effects:
+            context = self.context(motion)
+            for added in self.effects:
+                if sensors or not added.effect.sensor:
+                    tau += added.torque(context)
+        return tau
+
+    def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
+        """What effects may look at; inertial parameters only where an effect needs them."""
+        effects = [added.effect for added in self.effects] if needed is None else needed
+        inertial = self.inertial_parameters(motion) if any(e.needs_inertial for e in effects) else None
+        return Context(self.arm, motion, inertial, float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0)
+
+    def inertial_parameters(self, motion: Motion) -> Array:
+        """(10 n,) link parameters that reproduce the model's rigid-body torques on a motion.
+
+        Where the motion leaves a parameter undetermined, the arm's nominal value stands.
+        """
+        if "inertial" in self.history:
+            return np.asarray(self.history["inertial"], dtype=float)
+        rows = np.linspace(0, motion.samples - 1, min(motion.samples, 600)).astype(int)
+        q, v, vdot = motion.q[rows], motion.v[rows], motion.vdot[rows]
+        part = Motion(motion.time[rows], q, v, vdot, np.array([0]))
+        Y = regressor(self.arm, q, v, vdot).reshape(-1, 10 * self.arm.n)
+        nominal = nominal_parameters(self.arm)
+        rest = self.rigid_body(part).ravel() - Y @ nominal
+        return nominal + np.linalg.lstsq(Y, rest, rcond=1e-6)[0]
+
+    def feedforward(self, q: Array, v: Array, vdot: Array, step: int = 3) -> Array:
+        """(n,) torque a controller should supply for one sample; sensor effects excluded.
+
+        Friction with memory acts as if fully slid: a single sample has no history.
+        """
+        motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.array([0]))
+        return self.predict(motion, step, sensors=False)[0]
+
+    def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:
+        """The model with further effects."""
+        return replace(self, effects=(*self.effects, *added))
+
+    def formulas(self) -> list[str]:
+        """One readable formula per joint, with the step that found each term in brackets."""
+        lines = []
+        for j in range(self.arm.n):
+            terms: list[tuple[int, float, str]] = []
+            for component in self.components:
+                terms += component.terms(self.arm, j)
+            terms += [(t.step, t.coefficient, t.name(j + 1)) for t in self.friction.terms[j]]
+            terms.sort(key=lambda term: term[0])
+            body = " ".join(
+                f"{'-' if c < 0 else '+'} {abs(c):.4g}{'' if name == '1' else '*' + name}" for _, c, name in terms
+            )
+            lines.append(f"tau{j + 1} = {body.removeprefix('+ ') or '0'}")
+        return lines
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file (JSON), whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values with the schema version."""
+        return {
+            "schema": SCHEMA,
+            "formulas": self.formulas(),
+            "arm": self.arm.to_dict(),
+            "components": [component.to_dict() for component in self.components],
+            "friction": self.friction.to_dict(),
+            "effects": [added.to_dict() for added in self.effects],
+            "conditioning": self.conditioning.to_dict(),
+            "recorded": self.recorded,
+            "baseline": self.baseline,
+            "history": self.history,
+        }
+
+    def _check(self, motion: Motion) -> None:
+        if motion.joints != self.arm.n:
+            raise ModelError(f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}")
+
+
+def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
+    """Read a model file; with ``arm``, refuse a model that was made for another one.
+
+    Raises:
+        ModelError: unreadable, not JSON, another schema, or a field missing, misshapen or not finite.
+        ArmError: the model belongs to another arm.
+    """
+    path = Path(path)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ModelError(f"{path}: no such file; give a model written by `armloop reconstruct`") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path}: cannot be read ({error})") from error
+    except json.JSONDecodeError as error:
+        raise ModelError(f"{path}: not JSON (line {error.lineno}: {error.msg}); give a model file") from error
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        found = data.get("schema") if isinstance(data, dict) else None
+        raise ModelError(f"{path}: schema is {found!r}, it must be {SCHEMA!r}")
+    try:
+        model = _from_dict(data)
+    except KeyError as error:
+        raise ModelError(f"{path}: field {error} is missing") from error
+    except (ModelError, ArmError) as error:
+        raise type(error)(f"{path}: {error}") from error
+    except (TypeError, ValueError, AttributeError) as error:
+        raise ModelError(f"{path}: a field is misshapen: {error}") from error
+    if arm is not None:
+        model.arm.require_same(arm, str(path))
+    return model
+
+
+def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
+    arm = Arm.from_dict(data["arm"])
+    components = []
+    for item in data["components"]:
+        if item.get("kind") not in COMPONENTS:
+            raise ModelError(f"unknown component {item.get('kind')!r}; there are: {', '.join(COMPONENTS)}")
+        components.append(COMPONENTS[item["kind"]].from_dict(item, arm))
+    friction = FrictionLaw.from_dict(data["friction"])
+    if len(friction.terms) != arm.n:
+        raise ModelError(f"friction has {len(friction.terms)} joints, the arm has {arm.n}")
+    model = ReconstructedModel(
+        arm=arm,
+        components=tuple(components),
+        friction=friction,
+        conditioning=Conditioning(**data["conditioning"]),
+        recorded=dict(data["recorded"]),
+        baseline=dict(data["baseline"]),
+        effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
+        history=dict(data["history"]),
+    )
+    probe = Motion(np.zeros(1), *np.full((3, 1, arm.n), 0.5), np.array([0]))
+    if not np.isfinite(model.predict(probe)).all():
+        raise ModelError("a coefficient is not a finite number")
+    return model

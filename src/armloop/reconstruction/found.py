@@ -1,0 +1,43 @@
+"""What a method found, before it becomes a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.components import Component
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.motion import Motion
+from armloop.reconstruction.options import StepReport
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Found:
+    """Components, friction terms per joint, one report per step, and notes for the user.
+
+    ``history`` is kept in the model file.
+    """
+
+    arm: Arm
+    components: list[Component] = field(default_factory=list)
+    friction: list[list[FrictionTerm]] = field(default_factory=list)
+    reports: list[StepReport] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    history: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The friction found so far."""
+        return FrictionLaw(tuple(map(tuple, self.friction)))
+
+    def torque(self, motion: Motion) -> Array:
+        """(N, n) torque of everything found so far."""
+        parts = [component.torque(self.arm, motion, 3) for component in self.components]
+        rigid = np.sum(parts, axis=0) if parts else np.zeros_like(motion.q)
+        return rigid + self.law.torque(motion, load=rigid)

@@ -1,0 +1,57 @@
+"""What a user can choose about a reconstruction, and what it reports back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from armloop.regression.sparse import Sparse
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of a reconstruction.
+
+    Attributes:
+        sparse: how terms are selected.
+        max_order: largest N1 tried in each step.
+        max_candidates: N1 is not raised beyond this many independent candidates.
+        folds: the data are dealt into so many folds by blocks; one is held out from everything and scored
+            at the end, one more chooses the orders.
+        block_seconds: longest block.
+        seed: of k-means.
+    """
+
+    sparse: Sparse = field(default_factory=Sparse)
+    max_order: int = 4
+    max_candidates: int = 1400
+    folds: int = 5
+    block_seconds: float = 1.0
+    seed: int = 0
+
+
+@dataclass
+class StepReport:
+    """One step as ``armloop reconstruct --json`` shows it.
+
+    Attributes:
+        step: 1, 2, 3.
+        orders: [N1, N2]; None where a library has no orders.
+        candidates: size of the paper's library at these orders; ``independent`` of its full-rank basis.
+        terms: number of terms kept per joint.
+        samples: samples the step was fitted on, per joint.
+        trials: (orders, held-out error relative to the torque) of every order tried.
+    """
+
+    step: int
+    orders: list[int] | None
+    candidates: int
+    independent: int
+    terms: list[int]
+    samples: list[int]
+    trials: list[tuple[list[int], float]] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        trials = [{"orders": orders, "held_out": error} for orders, error in self.trials]
+        return {**self.__dict__, "trials": trials}

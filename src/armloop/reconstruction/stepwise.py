@@ -1,0 +1,115 @@
+"""The stepwise method: static, constant-velocity and varying-velocity data, each step inheriting the last."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.blocks import folds
+from armloop.conditions import Clusters, Condition, sort_samples
+from armloop.errors import ExcitationError
+from armloop.library.double_feature_set import DoubleFeatureSet
+from armloop.motion import Motion, Samples
+from armloop.progress import Progress
+from armloop.reconstruction.found import Found
+from armloop.reconstruction.options import Options
+from armloop.reconstruction.step import Part, StepPlan, regress_step
+
+# A condition counts as met if what should be absent in it is this much weaker than where it is present.
+_PURITY = 0.1
+
+
+def stepwise(arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress) -> Found:
+    """Reconstruct in three steps (Sect. 3.2, 3.3).
+
+    Args:
+        held_out: (N,) samples that must not be fitted.
+
+    Where the log has no clean static or constant-velocity data, hard clusters would feed a step with
+    what it must not see; then the three libraries are regressed together on all samples, their terms
+    still labelled by step, and a note says so.
+
+    Raises:
+        ExcitationError: a joint does not move, or a condition has too few samples.
+    """
+    _check_excitation(arm, samples)
+    clusters = sort_samples(samples.motion, seed=options.seed)
+    note = _impure(samples.motion, clusters)
+    validation = folds(samples.motion, options.folds, options.block_seconds) == 1
+    found = Found(arm, friction=[[] for _ in arm.joints], notes=[note] if note else [])
+    revolute = tuple(bool(r) for r in arm.revolute)
+    for plan in _together(revolute, options) if note else _steps(revolute, options):
+        condition = np.isin(clusters.condition, plan.conditions)
+        rows = condition[:, None] & samples.moving & ~held_out[:, None]
+        progress(f"step {'+'.join(str(p.step) for p in plan.parts)}: {int(condition.sum())} samples")
+        inherited = found.torque(samples.motion)
+        terms, friction, report = regress_step(samples, revolute, inherited, rows, validation, plan, options)
+        found.components += terms
+        for law, more in zip(found.friction, friction, strict=True):
+            law += more
+        found.reports += report
+    return found
+
+
+_PARTS = (Part(1, "none"), Part(2, "velocity"), Part(3, "acceleration"))
+
+
+def _steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+    first, second, third = _PARTS
+    return [
+        StepPlan((first,), _orders(revolute, (first,), (0,), options), ("sign",), (1,)),
+        StepPlan((second,), _orders(revolute, (second,), (1, 2), options), ("viscous", "stribeck"), (2,)),
+        StepPlan((third,), _orders(revolute, (third,), (1,), options), (), (3,)),
+    ]
+
+
+def _together(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+    orders = _orders(revolute, _PARTS, (2,), options)
+    return [StepPlan(_PARTS, orders, ("sign", "viscous", "stribeck"), (1, 2, 3))]
+
+
+def _orders(
+    revolute: tuple[bool, ...], parts: tuple[Part, ...], second: tuple[int, ...], options: Options
+) -> tuple[tuple[int, int], ...]:
+    """Orders worth trying, smallest library first."""
+
+    def size(order: tuple[int, int]) -> int:
+        return sum(DoubleFeatureSet(revolute, *order, part.second).size for part in parts)
+
+    tried = [(N1, N2) for N1 in range(1, options.max_order + 1) for N2 in second]
+    tried = [order for order in tried if size(order) <= options.max_candidates] or tried[:1]
+    return tuple(sorted(tried, key=size))
+
+
+def _check_excitation(arm: Arm, samples: Samples) -> None:
+    for j, joint in enumerate(arm.joints):
+        q = samples.motion.q[:, j]
+        if np.ptp(q) < 1e-3 or samples.moving[:, j].sum() < 30:
+            raise ExcitationError(
+                f"q{j + 1}: joint {joint.name!r} hardly moves (range {np.ptp(q):.3g} {joint.position_unit}); "
+                "its terms cannot be determined: log runs in which every joint moves"
+            )
+
+
+def _impure(motion: Motion, clusters: Clusters) -> str:
+    """Empty if the three conditions are really there, else what is wrong with them."""
+    speed, pull = np.abs(motion.v).sum(axis=1), np.abs(motion.vdot).sum(axis=1)
+    counts = clusters.counts()
+    members = {kind: clusters.condition == kind for kind in Condition}
+    if min(counts.values()) < 100:
+        return f"conditions {counts}: too few samples in one, so all three steps are regressed together"
+    fast = float(np.median(speed[members[Condition.CONSTANT_VELOCITY]]))
+    slow = float(np.median(speed[members[Condition.STATIC]]))
+    steady = float(np.median(pull[members[Condition.CONSTANT_VELOCITY]]))
+    shaken = float(np.median(pull[members[Condition.VARYING_VELOCITY]]))
+    if slow > _PURITY * fast or steady > _PURITY * shaken:
+        return (
+            f"conditions {counts}: static data move with {slow:.2g} (constant-velocity {fast:.2g}), constant-velocity "
+            f"data accelerate with {steady:.2g} (varying {shaken:.2g}): not clean, so all three steps are regressed together"
+        )
+    spread = np.ptp(motion.q[members[Condition.STATIC]], axis=0) / np.maximum(np.ptp(motion.q, axis=0), 1e-12)
+    if spread.min() < 0.3:
+        joint = int(np.argmin(spread)) + 1
+        return f"static data cover {spread.min():.0%} of the range of q{joint}, so all three steps are regressed together"
+    return ""

@@ -1,0 +1,165 @@
+"""From measured logs to samples fit for regression: one uniform grid, one filter, one derivative.
+
+Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
+motion it belongs to stay together in time; runs are treated one by one, never across a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import binary_dilation
+from scipy.signal import butter, sosfiltfilt
+
+from armloop.errors import LogError
+from armloop.log import MotionLog
+from armloop.motion import Motion, Samples
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How a log is prepared; kept in the model file, so that later logs are prepared alike.
+
+    Attributes:
+        cutoff_hz: corner of the zero-phase Butterworth low-pass (order 4, run both ways); 0 leaves the
+            samples as they are (for inverse-dynamics samples that are no time series).
+        oversampling: samples kept per period of the corner frequency.
+        dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
+    """
+
+    cutoff_hz: float = 10.0
+    oversampling: float = 4.0
+    dead_zone: float = 4.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return {"cutoff_hz": self.cutoff_hz, "oversampling": self.oversampling, "dead_zone": self.dead_zone}
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Zero-phase Butterworth low-pass of order 4 on a uniform grid of ``period`` seconds."""
+
+    cutoff_hz: float
+    period: float
+
+    def __call__(self, x: Array) -> Array:
+        """Filter (N, ...) along the first axis; runs shorter than the padding get a shorter padding."""
+        if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period:
+            return x
+        sos = butter(4, self.cutoff_hz, fs=1 / self.period, output="sos")
+        pad = min(len(x) - 1, int(np.ceil(1.5 / (self.cutoff_hz * self.period))))
+        return sosfiltfilt(sos, x, axis=0, padlen=pad)
+
+
+def uniform_period(time: Array) -> float:
+    """The sample period of a run, s: the median step, or the mean where stamps are jittered."""
+    steps = np.diff(time)
+    median = float(np.median(steps))
+    even = float(np.abs(steps - median).max()) < 1e-3 * median
+    return median if even else float(steps.mean())
+
+
+def derivative(x: Array, period: float) -> Array:
+    """Central difference along the first axis (second order at the ends)."""
+    return np.gradient(x, period, axis=0, edge_order=2)
+
+
+def condition(logs: Sequence[MotionLog], how: Conditioning) -> Samples:
+    """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
+
+    Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
+    ``oversampling`` samples per period of the corner. Half a period of the corner is cut at both ends.
+    ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
+
+    Returns:
+        The samples of all runs, one after the other; ``moving`` is false within half a period of the
+        corner of any instant at which the joint is inside its dead zone, because the filter smears the
+        torque of a standstill that far.
+
+    Raises:
+        LogError: no run is long enough for the filter.
+    """
+    if how.cutoff_hz <= 0:
+        return _as_they_are(logs)
+    noise = np.max([_velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
+    parts = []
+    for log in logs:
+        for run in log.runs():
+            part = _condition_run(log.select(run), how, how.dead_zone * noise)
+            if part is not None:
+                parts.append(part)
+    if not parts:
+        longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
+        raise LogError(
+            f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
+            f"{how.cutoff_hz:g} Hz a run must last at least {3 / how.cutoff_hz:.3g} s"
+        )
+    starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
+    time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
+    period = float(np.median(np.diff(parts[0][0])))
+    return Samples(Motion(time, q, v, vdot, starts), tau, moving.astype(bool), period, how.cutoff_hz)
+
+
+def smooth(samples: Samples, x: Array) -> Array:
+    """Pass x (N, ...) through the filter that the samples' torque has passed, run by run.
+
+    What has steps in it (friction, and every prediction that contains it) must be smeared like the
+    measured torque before the two are compared; smooth columns are hardly changed.
+    """
+    low_pass = LowPass(samples.cutoff_hz, samples.period)
+    if samples.cutoff_hz <= 0:
+        return x
+    return np.concatenate([low_pass(x[run]) for run in samples.motion.runs()])
+
+
+def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple[Array, ...] | None:
+    period = uniform_period(log.time)
+    trim = int(np.ceil(0.5 / (how.cutoff_hz * period)))
+    if len(log.time) < 6 * trim:
+        return None
+    grid = log.time[0] + period * np.arange(int(np.floor(np.ptp(log.time) / period + 1e-6)) + 1)
+    even = len(grid) == len(log.time) and bool(np.abs(grid - log.time).max() < 1e-3 * period)
+
+    def on_grid(x: Array) -> Array:
+        return x if even else CubicSpline(log.time, x)(grid)
+
+    low_pass = LowPass(how.cutoff_hz, period)
+    q, v, tau = (low_pass(on_grid(x)) for x in (log.q, log.v, log.tau))
+    vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
+    still = np.abs(v) <= dead_zone
+    smeared = binary_dilation(still, np.ones((2 * trim + 1, 1)))
+    stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period)))
+    keep = slice(trim, len(grid) - trim, stride)
+    return grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+
+
+def _velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
+    """(n,) standard deviation of the noise that a filter of this corner leaves in v.
+
+    White noise is assumed and read from third differences, which smooth motion hardly enters; it is
+    never less than the resolution of the recorded v.
+    """
+    rough = np.median(np.abs(np.diff(log.v, 3, axis=0)), axis=0) / (0.6745 * np.sqrt(20.0))
+    steps = np.abs(np.diff(log.v, axis=0))
+    resolution = np.min(np.where(steps > 0, steps, np.inf), axis=0)
+    sigma = np.maximum(rough, np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12))
+    return sigma * np.sqrt(min(1.0, 2 * cutoff_hz * uniform_period(log.time)))
+
+
+def _as_they_are(logs: Sequence[MotionLog]) -> Samples:
+    for log in logs:
+        if log.vdot is None:
+            raise LogError(f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}")
+    time, q, v, vdot, tau = (
+        np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("time", "q", "v", "vdot", "tau")
+    )
+    starts = np.cumsum([0] + [len(log.time) for log in logs[:-1]])
+    return Samples(Motion(time, q, v, vdot, starts), tau, np.ones_like(q, dtype=bool), 1.0)
