@@ -1,0 +1,51 @@
+# make setup   create .venv with everything in it, from requirements.lock
+# make loop    the main job, start to end; results in out/loop
+# make test    style, types and tests
+# make bench   the benchmarks' ratios
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Stamps, not the folder: each is touched only after its step has ended well.
+PACKAGES := $(VENV)/.packages
+INSTALLED := $(VENV)/.installed
+PYTEST_ARGS ?= -n 2 --dist loadfile
+
+.PHONY: setup loop test bench clean
+
+setup: $(INSTALLED)
+
+# The set-up counts towards what `make loop` takes, so it is kept short: two pip processes share the lock and resolve
+# nothing, and instead of compiling every module of every package (half a minute), the imports below compile those
+# that are used (4 s). They must not obey PYTHONDONTWRITEBYTECODE, or every later command would compile them again.
+$(PACKAGES): requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "armloop needs Python 3.11 or later: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@echo "Setting up $(VENV) from requirements.lock; this takes about half a minute"
+	@$(PYTHON) -m venv --clear $(VENV)
+	@grep '^[^#]' requirements.lock | xargs -P 2 -n 13 $(BIN)/pip install -qq --no-deps --no-compile
+	@export PYTHONDONTWRITEBYTECODE=; \
+	$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
+	$(BIN)/python -c 'import matplotlib.pyplot, control, osqp, jinja2, pyarrow.csv, pyarrow.parquet' \
+	  && $(BIN)/python -c 'import pydrake.multibody.plant, pydrake.multibody.parsing, pydrake.geometry' \
+	  && wait $$first
+	@touch $@
+
+$(INSTALLED): $(PACKAGES) pyproject.toml
+	@$(BIN)/pip install -qq --no-deps --no-build-isolation -e .
+	@touch $@
+
+loop: setup
+	$(BIN)/armloop loop --out out/loop
+
+test: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+bench: setup
+	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+clean:
+	rm -rf $(VENV) out dist

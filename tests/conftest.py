@@ -1,0 +1,28 @@
+"""What all tests share: one thread per process, no screen, and the way to the measured logs."""
+
+import os
+from pathlib import Path
+
+# before numpy is imported: the tests run in one process per core, more threads would only get in each other's way
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import pytest  # noqa: E402
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+MEASURED = REPOSITORY.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The root of the checkout."""
+    return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def measured() -> Path:
+    """The folder of the measured logs; skips the test where it is not at hand."""
+    if not MEASURED.is_dir():
+        pytest.skip(f"the measured logs are not at hand: no folder {MEASURED}")
+    return MEASURED
