@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-# before numpy is imported: the tests run in one process per core, more threads would only get in each other's way
+# before numpy is imported: the tests run in one process per core, where more threads only hinder
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 os.environ.setdefault("MPLBACKEND", "Agg")

@@ -6,7 +6,7 @@ row, says what is wrong and what would be right; the command line prints it and 
 
 
 class InputError(ValueError):
-    """The input is at fault; `str(error)` is one line that says where, what is wrong and what would be right."""
+    """The input is at fault; its text is one line: where, what is wrong and what would be right."""
 
     def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.split()))

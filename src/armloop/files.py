@@ -22,7 +22,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         os.replace(draft, path)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(f"{path}: cannot be written ({reason}); name a file in a folder you may write to") from error
+        raise InputError(f"{path}: cannot be written ({reason}); choose a folder you may write to") from error
     finally:
         draft.unlink(missing_ok=True)
 

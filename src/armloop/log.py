@@ -1,12 +1,13 @@
 """A motion log: what was measured on an arm, one row per sample, checked at the door.
 
-The file is CSV, or Parquet with the same columns: `time,q1..qn,v1..vn,tau1..taun` and optionally `vdot1..vdotn`;
+The file is CSV, or Parquet with the same columns: `time,q1..qn,v1..vn,tau1..taun`, optionally `vdot1..vdotn`;
 SI units; joints numbered from 1, base to tip. Columns of any other name are left alone.
 """
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -69,11 +70,11 @@ class MotionLog:
         return float(np.median(np.diff(self.time)))
 
     def runs(self) -> list[slice]:
-        """Return the stretches without a gap as slices, in order; never filter or differentiate across two."""
+        """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
         steps = np.diff(self.time)
-        starts = np.flatnonzero(steps > GAP_PERIODS * np.median(steps)) + 1 if len(steps) else []
-        edges = [0, *map(int, starts), self.samples]
-        return [slice(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+        gaps = np.flatnonzero(steps > GAP_PERIODS * np.median(steps)) if len(steps) else steps[:0]
+        edges = [0, *(int(gap) + 1 for gap in gaps), self.samples]
+        return [slice(first, last) for first, last in pairwise(edges)]
 
     def select(self, rows: slice) -> "MotionLog":
         """Return the log of these samples only; the arrays are views."""
@@ -119,7 +120,7 @@ def read_log(
 
 
 def write_log(path: str | Path, log: MotionLog) -> None:
-    """Write a log as CSV or Parquet, by the suffix of `path`, whole or not at all; `read_log` gives it back exactly.
+    """Write a log as CSV or Parquet, by its suffix, whole or not at all; `read_log` gives it back exactly.
 
     Raises `LogError` for another suffix and `InputError` when the place cannot be written to.
     """
@@ -144,7 +145,9 @@ def _check_header(path: Path, header: Sequence[str]) -> tuple[int, bool]:
         if match is not None:
             kind, number = match[1], int(match[2])
             if name != f"{kind}{number}" or number == 0:
-                raise LogError(f"{path}: column {name}: joints are numbered {kind}1, {kind}2, ... from the base")
+                raise LogError(
+                    f"{path}: column {name}: joints are numbered {kind}1, {kind}2, ... from the base"
+                )
             found[kind].add(number)
     n = max((number for numbers in found.values() for number in numbers), default=1)
     kinds = [kind for kind in found if kind != "vdot" or found[kind]]

@@ -31,7 +31,8 @@ class Motion:
             raise ValueError(f"time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}")
         if self.v.shape != self.q.shape or self.vdot.shape != self.q.shape:
             raise ValueError(
-                f"q, v and vdot must have one shape; they are {self.q.shape}, {self.v.shape}, {self.vdot.shape}"
+                "q, v and vdot must have one shape; "
+                f"they are {self.q.shape}, {self.v.shape}, {self.vdot.shape}"
             )
         if len(self.starts) == 0 or self.starts[0] != 0:
             raise ValueError("starts must begin with 0, the first sample of the first run")

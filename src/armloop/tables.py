@@ -32,25 +32,30 @@ def read_header(path: Path) -> list[str]:
             raise LogError(f"{path}: the file is empty; the first line must name the columns")
         names = _parquet_header(path) if path.suffix == PARQUET else next(_csv_rows(path), (0, []))[1]
     except OSError as error:
-        raise LogError(f"{path}: cannot be read ({error.strerror or error}); check its permissions") from error
+        raise LogError(
+            f"{path}: cannot be read ({error.strerror or error}); check its permissions"
+        ) from error
     return [name.strip() for name in names]
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
     """Return the columns `names` of a file whose header has been read and holds each of them once.
 
-    Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is not
-    a finite number, or the first row that has too few or too many cells.
+    Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
+    not a finite number, or the first row that has too few or too many cells.
     """
     table = _read_parquet(path, names) if path.suffix == PARQUET else _read_csv(path, names)
-    faults = {name: int(np.argmin(good)) for name, cells in table.items() if not (good := np.isfinite(cells)).all()}
+    faults = {
+        name: int(np.argmin(good)) for name, cells in table.items() if not (good := np.isfinite(cells)).all()
+    }
     if faults:
         name = min(faults, key=lambda key: faults[key])
         row = faults[name]
-        cell = "an empty cell" if np.isnan(table[name][row]) else str(table[name][row])
-        if path.suffix == CSV:
-            cell = repr(_csv_cell(path, name, row)) or cell
-        raise LogError(f"{path}: column {name}, {place(path, row)}: {cell} is not a finite number; repair or drop the row")
+        cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
+        raise LogError(
+            f"{path}: column {name}, {place(path, row)}: {cell!r} is not a finite number; "
+            "fill in the value or drop the row"
+        )
     return table
 
 
@@ -87,7 +92,7 @@ def place(path: Path, row: int) -> str:
 
 def _check_suffix(path: Path) -> None:
     if path.suffix not in (CSV, PARQUET):
-        raise LogError(f"{path}: unknown kind of file {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
+        raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
 
 
 def _parquet_header(path: Path) -> list[str]:
@@ -97,7 +102,9 @@ def _parquet_header(path: Path) -> list[str]:
     try:
         return list(pyarrow.parquet.read_schema(path).names)
     except pyarrow.ArrowInvalid as error:
-        raise LogError(f"{path}: not a Parquet file; write it anew, or give it the suffix {CSV} if it is text") from error
+        raise LogError(
+            f"{path}: not a Parquet file; write it anew, or name it {CSV} if it is text"
+        ) from error
 
 
 def _read_parquet(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
@@ -148,7 +155,8 @@ def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: E
             continue
         if len(cells) != len(header):
             return LogError(
-                f"{path}: row {row} (line {line}) has {len(cells)} cells; the header names {len(header)} columns"
+                f"{path}: row {row} (line {line}) has {len(cells)} cells; "
+                f"it must have {len(header)}, one for each name of the header"
             )
         for name in names:
             cell = cells[header.index(name)]
