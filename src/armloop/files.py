@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from armloop.errors import InputError
@@ -24,7 +24,10 @@ def replacing(path: str | Path) -> Iterator[Path]:
         reason = error.strerror or str(error)
         raise InputError(f"{path}: cannot be written ({reason}); choose a folder you may write to") from error
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(
+            OSError
+        ):  # gone when all went well; when it did not, the first error is the one to tell
+            draft.unlink()
 
 
 def write_text(path: str | Path, text: str) -> None:

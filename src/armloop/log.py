@@ -101,7 +101,7 @@ def read_log(
     """
     path = Path(path)
     if tau_unit not in TAU_UNITS:
-        raise LogError(f"tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
+        raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
     header = read_header(path)
     n, has_vdot = _check_header(path, header)
     if joints is not None and n != joints:
@@ -199,7 +199,7 @@ def _check_units(path: Path, log: MotionLog) -> None:
     for j, ratio in _clear_ratios(log):
         if not 0.5 < ratio < 2.0:
             raise LogError(
-                f"{path}: column v{j + 1} is {ratio:.4g} times the rate of q{j + 1}, {_likely_cause(ratio)}; "
+                f"{path}: column v{j + 1} is {ratio:.3g} times the rate of q{j + 1}, {_likely_cause(ratio)}; "
                 "time, q and v must be in s, rad (m) and rad/s (m/s)"
             )
 

@@ -1,0 +1,146 @@
+"""The way through the package runs one direction: each room imports only from rooms before it.
+
+A new room has to be put into `LAYERS`; if it is not clear where, the plan is wrong.
+"""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
+
+# A room may import itself and every room of an earlier layer.
+LAYERS = (
+    {"__init__"},
+    {"errors"},
+    {"files", "motion", "progress", "resources"},
+    {"blocks", "regression", "tables"},
+    {"arm", "log"},
+    {"kinematics", "signals"},
+    {"conditions", "excitation", "library"},
+    {"components", "effects", "sampling"},
+    {"model"},
+    {"scoring"},
+    {"drake_systems", "reconstruction"},
+    {"diagnosis"},
+    {"reports"},
+    {"loop", "reproduction"},
+    {"cli"},
+    {"__main__"},
+)
+RANK = {room: rank for rank, rooms in enumerate(LAYERS) for room in rooms}
+
+# What the order of the layers would allow and the plan does not.
+FORBIDDEN = {
+    "regression": {"motion", "files", "resources"},  # pure numerics: arrays in, arrays out
+    "diagnosis": {"drake_systems"},  # it sees arrays, never a simulator
+}
+
+
+def modules() -> dict[str, Path]:
+    """Return every module of the package by its dotted name."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = ["armloop", *path.relative_to(PACKAGE).with_suffix("").parts]
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+MODULES = modules()
+
+
+def room(module: str) -> str:
+    """Return the room that a module of the package belongs to."""
+    return module.split(".")[1] if "." in module else "__init__"
+
+
+def imports(module: str) -> Iterator[str]:
+    """Yield the dotted name of everything that a module imports, wherever in it the import stands."""
+    path = MODULES[module]
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            source = ".".join([*above, *([node.module] if node.module else [])])
+            yield from (f"{source}.{name.name}" for name in node.names)
+
+
+def own_imports(module: str) -> set[str]:
+    """Return the modules of the package that a module imports."""
+    found = set()
+    for name in imports(module):
+        while name.startswith("armloop") and name not in MODULES:
+            name = name.rpartition(".")[0]
+        if name in MODULES:
+            found.add(name)
+    return found - {module}
+
+
+def is_within(module: str, package: str) -> bool:
+    """Tell whether a dotted name is the package or lies in it."""
+    return f"{module}.".startswith(f"{package}.")
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_only_from_earlier_rooms(module: str) -> None:
+    here = room(module)
+    assert here in RANK, f"{here}: a new room; put it into LAYERS"
+    for other in sorted({room(name) for name in own_imports(module)} - {here}):
+        assert other in RANK, f"{other}: a new room; put it into LAYERS"
+        assert RANK[other] < RANK[here], f"{module} imports {other}, which does not come before {here}"
+        assert other not in FORBIDDEN.get(here, set()), f"{module} must not import {other}"
+
+
+def test_no_modules_import_each_other() -> None:
+    # a package's __init__ is its public face and imports its parts: they must not look at it
+    done: set[str] = set()
+
+    def follow(module: str, path: tuple[str, ...]) -> None:
+        assert module not in path, f"a circle of imports: {' -> '.join([*path, module])}"
+        if module not in done:
+            for other in sorted(own_imports(module)):
+                follow(other, (*path, module))
+            done.add(module)
+
+    for module in MODULES:
+        follow(module, ())
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_only_drake_systems_import_drake(module: str) -> None:
+    allowed = ["pydrake"] if room(module) == "drake_systems" else []
+    if module == "armloop.arm":  # reads URDFs with Drake's parser, builds no diagram
+        allowed = ["pydrake.multibody", "pydrake.math", "pydrake.common"]
+    for name in imports(module):
+        if is_within(name, "pydrake"):
+            assert any(is_within(name, package) for package in allowed), f"{module} imports {name}"
+
+
+def test_diagnosis_cannot_see_what_was_hidden_from_it() -> None:
+    for module in MODULES:
+        if room(module) == "diagnosis":
+            for name in imports(module):
+                assert "undeclared" not in name.lower(), f"{module} imports {name}"
+                assert "demonstration" not in name.lower(), f"{module} imports {name}"
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Return the top-level packages that are loaded after a statement, in an interpreter of its own."""
+    program = f"{statement}; import sys; print(*sys.modules, sep='\\n')"
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return {name.partition(".")[0] for name in answer.stdout.split()}
+
+
+def test_importing_the_package_is_cheap() -> None:
+    assert not loaded_by("import armloop") & {"numpy", "pydrake", "matplotlib"}
+
+
+@pytest.mark.skipif("armloop.cli" not in MODULES, reason="there is no command line yet")
+def test_the_command_line_starts_without_drake() -> None:
+    assert "pydrake" not in loaded_by("import armloop.cli")
