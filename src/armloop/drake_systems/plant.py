@@ -10,6 +10,7 @@ Drake 1.51 has no dry friction in joints (a URDF's `<dynamics friction>` only wa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -66,21 +67,22 @@ class JointLoads(LeafSystem):
         """friction : n joints; springs, ripples : rows as in `effects.Realisation`."""
         super().__init__()
         self._n = len(friction)
-        self._drop = np.array([f.static - f.coulomb for f in friction])
-        self._inverse_vs = np.array([1.0 / f.stribeck_velocity for f in friction])
-        self._springs = [(int(j), k, rest) for j, k, rest in springs]
-        self._ripples = [(int(j), a, order, phase) for j, a, order, phase in ripples]
+        self._drops = [(f.static - f.coulomb, 1.0 / f.stribeck_velocity) for f in friction]
+        self._springs = [(int(j), float(k), float(rest)) for j, k, rest in springs]
+        self._ripples = [(int(j), float(a), float(order), float(phase)) for j, a, order, phase in ripples]
         self._state = self.DeclareVectorInputPort("state", 2 * self._n)
         self.DeclareVectorOutputPort("tau", self._n, self._calc_tau)
 
     def _calc_tau(self, context: Context, output: BasicVector) -> None:
-        state = self._state.Eval(context)
-        v = state[self._n :]
-        tau = -self._drop * np.expm1(-np.square(v * self._inverse_vs)) * np.sign(v)
+        # Called every step: for a handful of joints plain floats are several times faster than arrays.
+        state = self._state.Eval(context).tolist()
+        tau = []
+        for (drop, inverse_vs), v in zip(self._drops, state[self._n :], strict=True):
+            tau.append(-math.copysign(drop, v) * math.expm1(-((v * inverse_vs) ** 2)))
         for j, stiffness, rest in self._springs:
             tau[j] -= stiffness * (state[j] - rest)
         for j, amplitude, order, phase in self._ripples:
-            tau[j] -= amplitude * np.sin(order * state[j] + phase)
+            tau[j] -= amplitude * math.sin(order * state[j] + phase)
         output.SetFromVector(tau)
 
 
@@ -89,10 +91,11 @@ class ArmPlant(Diagram):
 
     M(q) vdot + C(q, v) v = tau_g(q) + tau - f(v) + effects, with f of Eq. (34), sticking below f_s.
 
-    Input ports: `tau` (n,) drive torques, clamped to the arm's effort limits; with a servo also `desired_state`
-    (2n,), and the drive then adds p (q_d - q) + d (v_d - v), clamped together with `tau`.
-    Output ports: `state` (2n,) true q and v; `tau_drive` (n,) the drive's torque after the clamp, of the step that
-    ends now. All input ports must be connected. Discrete with period `time_step`.
+    Torque mode (no servo). Input port `tau` (n,): drive torques, clamped to the arm's effort limits.
+    Output ports `state` (2n,): true q, then v; `tau_drive` (n,): the drives' torques after the clamp.
+    Speed mode (servo). Input port `desired_state` (2n,): q_d, then v_d at the end of the coming step.
+    Output port `state`. The drives' torques follow from `servo_torque`.
+    All input ports must be connected. Discrete with period `time_step`.
     """
 
     def __init__(
@@ -117,6 +120,7 @@ class ArmPlant(Diagram):
         if len(friction) != arm.n:
             raise ValueError(f"friction is given for {len(friction)} joints; {arm.name} has {arm.n}")
         self.arm = arm
+        self._servo = servo
         self.effects = realise(arm, effects)
         self.friction = _with_effects(friction, self.effects)
         builder = DiagramBuilder()
@@ -148,30 +152,43 @@ class ArmPlant(Diagram):
         plant, n, actuators = self.plant, self.arm.n, self.plant.num_actuators()
         to_slots = np.zeros((actuators, n))
         to_slots[slots, range(n)] = 1.0
-        torque = builder.AddNamedSystem("drives", MatrixGain(to_slots))
-        builder.ExportInput(torque.get_input_port(), "tau")
-        builder.Connect(torque.get_output_port(), plant.get_actuation_input_port())
-        (instance,) = {plant.get_joint(i).model_instance() for i in plant.GetJointIndices()}
         # A friction actuator does nothing unless this port is connected; its desired velocity is 0.
-        desired = plant.get_desired_state_input_port(instance)
+        desired = plant.get_desired_state_input_port(plant.GetModelInstanceByName(self.arm.name))
         if servo is not None:
             widen = builder.AddNamedSystem("desired", MatrixGain(np.kron(np.eye(2), to_slots)))
             builder.ExportInput(widen.get_input_port(), "desired_state")
             builder.Connect(widen.get_output_port(), desired)
-        elif desired.size():
-            zero = builder.AddNamedSystem("rest", ConstantVectorSource(np.zeros(desired.size())))
-            builder.Connect(zero.get_output_port(), desired)
+        else:
+            rest = builder.AddNamedSystem("rest", ConstantVectorSource(np.zeros(desired.size())))
+            builder.Connect(rest.get_output_port(), desired)
+            widen = builder.AddNamedSystem("drives", MatrixGain(to_slots))
+            builder.ExportInput(widen.get_input_port(), "tau")
+            builder.Connect(widen.get_output_port(), plant.get_actuation_input_port())
+            narrow = builder.AddNamedSystem("tau_drive", MatrixGain(to_slots.T))
+            builder.Connect(plant.get_net_actuation_output_port(), narrow.get_input_port())
+            builder.ExportOutput(narrow.get_output_port(), "tau_drive")
         stribeck = any(f.static > f.coulomb for f in self.friction)
         if stribeck or len(self.effects.springs) or len(self.effects.ripples):
-            loads = builder.AddNamedSystem(
-                "loads", JointLoads(self.friction, self.effects.springs, self.effects.ripples)
-            )
+            loads = JointLoads(self.friction, self.effects.springs, self.effects.ripples)
+            builder.AddNamedSystem("loads", loads)
             builder.Connect(plant.get_state_output_port(), loads.get_input_port())
             builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
         builder.ExportOutput(plant.get_state_output_port(), "state")
-        drives = builder.AddNamedSystem("tau_drive", MatrixGain(to_slots.T))
-        builder.Connect(plant.get_net_actuation_output_port(), drives.get_input_port())
-        builder.ExportOutput(drives.get_output_port(), "tau_drive")
+
+    def servo_torque(self, state: Array, desired_state: Array) -> Array:
+        """Return the torques (N, n) that a drive in speed mode applied, clamp(p (q_d - q) + d (v_d - v)).
+
+        state : (N, 2n) at the end of each step; desired_state : (N, 2n) that was set for that end
+
+        The solver applies the law implicitly, so it holds with the state at the end of the step. (The plant's own
+        port `net_actuation` gives the sum with the friction when both actuators of a joint have gains.)
+        """
+        if self._servo is None:
+            raise ValueError("this plant's drives are in torque mode: it was built without a servo")
+        n = self.arm.n
+        error = desired_state - state
+        effort = np.array([joint.effort for joint in self.arm.joints])
+        return np.clip(self._servo.p * error[:, :n] + self._servo.d * error[:, n:], -effort, effort)
 
     def set_state(self, root_context: Context, q: Array, v: Array) -> None:
         """Put the arm at positions `q` and velocities `v`, (n,) each, inside a diagram's context."""

@@ -1,0 +1,167 @@
+"""Collect the data of a reconstruction from a simulated arm with friction, Sect. 4.3 of the paper.
+
+The drives are in speed mode (stiff servo, closed loop) and supply whatever torque the motion takes. Between segments
+the arm is put to the next start instead of being driven there: nothing of that way would be logged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.speed_mode import Instruments, Recording, SpeedModeArm
+from armloop.excitation import (
+    MotionRanges,
+    Reference,
+    constant_velocity_segments,
+    fourier_reference,
+    speeds,
+    static_segments,
+)
+from armloop.log import MotionLog
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+"""Called with the condition's name and the part of the whole collection that is done, 0 to 1."""
+
+
+def silent(what: str, done: float) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlantConfig:
+    """A simulated arm's friction, instruments and the ranges its data are collected in.
+
+    friction : one per joint; ranges : Tables 1 and 3; time_step : s
+    """
+
+    friction: tuple[JointFriction, ...]
+    ranges: MotionRanges
+    instruments: Instruments = field(default_factory=Instruments)
+    time_step: float = 1e-3
+
+
+@dataclass(frozen=True)
+class CollectionPlan:
+    """How much is collected. Times in s, speeds in rad/s (`_prismatic`: m/s); every segment settles, then is logged.
+
+    rate : Hz of the logs
+    dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
+    static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the paper)
+    velocity_segments : constant velocities from `slowest` to the range's largest
+    trajectories : Fourier-series trajectories, Eq. (31), of `trajectory_duration` each
+    """
+
+    rate: float = 250.0
+    dwell: bool = False
+    static_poses: int = 60
+    static_speed: float = float(np.deg2rad(0.1))
+    static_speed_prismatic: float = 1e-4
+    static_settle: float = 0.1
+    static_hold: float = 0.12
+    velocity_segments: int = 120
+    slowest: float = 0.01
+    slowest_prismatic: float = 1e-3
+    velocity_settle: float = 0.1
+    velocity_hold: float = 0.15
+    trajectories: int = 2
+    trajectory_duration: float = 20.0
+
+
+def collect(
+    arm: Arm, config: PlantConfig, plan: CollectionPlan, seed: int, progress: Progress = silent
+) -> dict[str, MotionLog]:
+    """Collect `static`, `constant_velocity` and `varying` logs from the simulated arm.
+
+    Only the settled part of each segment is logged; as the time before it passes, each segment is a run of its own.
+    The same seed gives the same logs.
+    """
+    rig = SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=config.time_step)
+    creep = 0.0 if plan.dwell else 1.0
+    static = static_segments(
+        config.ranges,
+        plan.static_poses,
+        creep * speeds(arm, plan.static_speed, plan.static_speed_prismatic),
+        plan.static_settle + plan.static_hold,
+        seed,
+    )
+    constant = constant_velocity_segments(
+        config.ranges,
+        plan.velocity_segments,
+        speeds(arm, plan.slowest, plan.slowest_prismatic),
+        plan.velocity_settle + plan.velocity_hold,
+        seed,
+    )
+    varying = [
+        fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k) for k in range(plan.trajectories)
+    ]
+    parts: list[tuple[str, Sequence[Reference], float]] = [
+        ("static", static, plan.static_settle),
+        ("constant_velocity", constant, plan.velocity_settle),
+        ("varying", varying, 0.0),
+    ]
+    total = sum(reference.duration for _, references, _ in parts for reference in references)
+    noise = np.random.default_rng(seed)
+    logs: dict[str, MotionLog] = {}
+    done = 0.0
+    for name, references, settle in parts:
+        recordings = []
+        for reference in references:
+            recordings.append(rig.follow(reference, rate=plan.rate, settle=settle))
+            done += reference.duration
+            progress(name, done / total)
+        if recordings:
+            logs[name] = _as_log(name, recordings, config.instruments, noise)
+    return logs
+
+
+def measure_run(
+    arm: Arm,
+    config: PlantConfig,
+    seed: int,
+    *,
+    duration: float = 50.0,
+    rate: float = 500.0,
+    effects: Sequence[UndeclaredEffect] = (),
+    reference: Reference | None = None,
+    progress: Progress = silent,
+) -> MotionLog:
+    """Measure one exciting run of the arm, with effects in the plant that the log says nothing of.
+
+    duration : s of a Fourier-series trajectory drawn from `seed`, unless a `reference` is given; rate : Hz
+    """
+    rig = SpeedModeArm(
+        arm, config.friction, effects=effects, instruments=config.instruments, time_step=config.time_step
+    )
+    if reference is None:
+        reference = fourier_reference(config.ranges, duration, seed, harmonics=5)
+    progress("run", 0.0)
+    recording = rig.follow(reference, rate=rate)
+    progress("run", 1.0)
+    return _as_log("run", [recording], config.instruments, np.random.default_rng(seed))
+
+
+def _as_log(
+    name: str, recordings: Sequence[Recording], instruments: Instruments, rng: np.random.Generator
+) -> MotionLog:
+    """Join recordings into one log, one run each, with the torque sensor's noise."""
+    period = float(np.median(np.diff(recordings[0].time)))
+    time, now = [], 0.0
+    for recording in recordings:
+        # At least 20 periods apart: longer than the gap that separates runs.
+        time.append(now + recording.time)
+        now = float(time[-1][-1]) + 20 * period
+    q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
+    rms = np.sqrt(np.mean(tau**2, axis=0))
+    tau = tau + instruments.torque_noise * rms * rng.standard_normal(tau.shape)
+    # No more digits than the instruments have: the files stay small.
+    return MotionLog(
+        np.round(np.concatenate(time), 6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
+    )

@@ -1,0 +1,141 @@
+"""An arm whose drives follow a reference in speed mode, and what its instruments record.
+
+The diagram is built once; every motion starts at time 0 from the state it is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import LogVectorOutput
+
+from armloop.arm import Arm
+from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.plant import ArmPlant, ServoGains
+from armloop.excitation import Reference
+
+Array = NDArray[np.float64]
+
+STIFF = ServoGains(p=1e6, d=1e4)
+"""A stiff drive: 10 N*m move it by 1e-5 rad, and it settles in d/p = 10 ms."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What the arm is measured with.
+
+    encoder_counts : per revolution, and per `prismatic_lead` metres of a sliding joint (its screw); 0 for ideal ones
+    torque_noise : standard deviation of white noise on the torque, as a part of each joint's RMS in the log
+    velocity_half_window : s; v is the central difference of the recorded q over this time to both sides
+    """
+
+    encoder_counts: int = 2**19
+    prismatic_lead: float = 0.02
+    torque_noise: float = 0.01
+    velocity_half_window: float = 0.005
+
+    def resolution(self, arm: Arm) -> Array:
+        """Return (n,) rad (m) per count, 0 for ideal encoders."""
+        travel = np.where(arm.revolute, 2 * np.pi, self.prismatic_lead)
+        return travel / self.encoder_counts if self.encoder_counts else 0.0 * travel
+
+    def encode(self, arm: Arm, q: Array) -> Array:
+        """Return positions (N, n) as the encoders read them."""
+        step = self.resolution(arm)
+        return np.round(q / step) * step if self.encoder_counts else q
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a logger holds of one motion, before the torque sensor's noise: time (N,), q, v, tau (N, n)."""
+
+    time: Array
+    q: Array
+    v: Array
+    tau: Array
+
+
+class TableSource(LeafSystem):
+    """Hold a table of desired states, one row per step.
+
+    Output port `desired_state`: (2n,), row k during [k, k+1) periods; the last row afterwards.
+    """
+
+    def __init__(self, width: int, period: float) -> None:
+        super().__init__()
+        self._rows = np.zeros((1, width))
+        self._period = period
+        self.DeclareVectorOutputPort("desired_state", width, self._calc_row)
+
+    def set_rows(self, rows: Array) -> None:
+        """Replace the table; `rows` is (K, width). Reset the context's time afterwards."""
+        self._rows = rows
+
+    def _calc_row(self, context: Context, output: BasicVector) -> None:
+        row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)
+        output.SetFromVector(self._rows[row])
+
+
+class SpeedModeArm:
+    """A simulated arm with drives in speed mode: `follow` a reference and get the recording."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        friction: Sequence[JointFriction],
+        *,
+        effects: Sequence[UndeclaredEffect] = (),
+        instruments: Instruments | None = None,
+        time_step: float = 1e-3,
+        servo: ServoGains = STIFF,
+    ) -> None:
+        self.arm = arm
+        self.instruments = instruments or Instruments()
+        self._step = time_step
+        builder = DiagramBuilder()
+        self.plant = builder.AddSystem(
+            ArmPlant(arm, friction, effects=effects, time_step=time_step, servo=servo)
+        )
+        self._source = builder.AddSystem(TableSource(2 * arm.n, time_step))
+        builder.Connect(self._source.get_output_port(), self.plant.GetInputPort("desired_state"))
+        self._logger = LogVectorOutput(self.plant.GetOutputPort("state"), builder, time_step)
+        self._simulator = Simulator(builder.Build())
+
+    def follow(self, reference: Reference, *, rate: float = 500.0, settle: float = 0.0) -> Recording:
+        """Start on the reference, follow it to its end and record from `settle` seconds on, `rate` Hz at most.
+
+        q is read from the encoders; v is their central difference over `velocity_half_window` to both sides, as an
+        offline logger computes it (zero phase). tau is the drives' torque, without the friction, averaged over the
+        steps before and after the sample, which centres it on the sample's time.
+        """
+        arm, n, context = self.arm, self.arm.n, self._simulator.get_mutable_context()
+        half = max(1, round(self.instruments.velocity_half_window / self._step))
+        last = round(reference.duration / self._step)
+        first = max(half, round(settle / self._step))
+        steps = last + half  # what the central difference needs beyond the end
+        t = self._step * np.arange(steps + 1)
+        q_d, v_d, _ = reference.evaluate(t)
+        desired = np.hstack([q_d, v_d])
+        self._source.set_rows(desired[1:])
+        context.SetTime(0.0)
+        self.plant.set_state(context, q_d[0], v_d[0])
+        log = self._logger.FindMutableLog(context)
+        log.Clear()
+        self._simulator.Initialize()
+        self._simulator.AdvanceTo(steps * self._step)
+        state = log.data().T
+        if len(state) != steps + 1:
+            raise RuntimeError(f"the simulation recorded {len(state)} steps; {steps + 1} were due")
+
+        torque = self.plant.servo_torque(state, desired)
+        q = self.instruments.encode(arm, state[:, :n])
+        rows = np.arange(first, last, max(1, round(1.0 / (rate * self._step))))
+        v = (q[rows + half] - q[rows - half]) / (2 * half * self._step)
+        tau = 0.5 * (torque[rows] + torque[rows + 1]) + self.plant.effects.torque_offset
+        return Recording(t[rows], q[rows], v, tau)
