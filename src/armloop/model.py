@@ -99,14 +99,14 @@ class ReconstructedModel:
             sensors: include what a faulty sensor adds to the record.
         """
         self._check(motion)
-        load = self.rigid_body(motion, step)
-        tau = load + self.friction.torque(motion, step, load)
-        if step >= 3 and self.effects:
-            context = self.context(motion)
-            for added in self.effects:
-                if sensors or not added.effect.sensor:
-                    tau += added.torque(context)
-        return tau
+        rigid = self.rigid_body(motion, step)
+        if step < 3 or not self.effects:
+            return rigid + self.friction.torque(motion, step, rigid)
+        context = self.context(motion)
+        torques = [(added.effect, added.torque(context)) for added in self.effects]
+        load = rigid + sum((tau for kind, tau in torques if kind.load), np.zeros_like(rigid))
+        tau = rigid + self.friction.torque(motion, step, load)
+        return tau + sum((extra for kind, extra in torques if sensors or not kind.sensor), np.zeros_like(rigid))
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""

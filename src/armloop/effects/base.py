@@ -58,6 +58,8 @@ class Effect(ABC):
         joint_wise: whether it sits in one joint.
         sensor: whether it falsifies what is recorded instead of acting on the arm.
         complexity: number of free parameters, for preferring the simplest of equals.
+        needs_inertial: whether its columns are made of the known model's inertial parameters.
+        load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
     """
 
     name: ClassVar[str]
@@ -65,6 +67,7 @@ class Effect(ABC):
     sensor: ClassVar[bool] = False
     complexity: ClassVar[int] = 1
     needs_inertial: ClassVar[bool] = False
+    load: ClassVar[bool] = False
 
     def __init__(self, joint: int | None = None) -> None:
         self.joint = joint
@@ -82,9 +85,21 @@ class Effect(ABC):
     def columns(self, context: Context, shape: float) -> Array:
         """(N, n, p) torque per unit of each coefficient, or (N, p) on the effect's own joint."""
 
+    def start(self, beta: Array) -> Array:
+        """Free parameters x (k,) nearest to unconstrained coefficients beta (p,)."""
+        return beta
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k); the identity by default.
+
+        An effect whose coefficients obey physical laws among themselves (a body's mass, centre and
+        inertia) states them here.
+        """
+        return x, np.eye(len(x))
+
     @abstractmethod
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        """Named parameters from the coefficients (p,) and their covariance (p, p)."""
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        """Named parameters from the free parameters (k,) and their covariance (k, k)."""
 
     @abstractmethod
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
@@ -141,9 +156,9 @@ class LinearJointEffect(Effect):
         joint = arm.joints[self.joint - 1]
         return self.unit.replace("TAU", joint.torque_unit).replace("POS", joint.position_unit)
 
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         error = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return {self.parameter: Estimate(float(beta[0]), error, self._unit(arm))}
+        return {self.parameter: Estimate(float(x[0]), error, self._unit(arm))}
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         e = parameters[self.parameter]

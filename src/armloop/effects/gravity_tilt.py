@@ -22,6 +22,7 @@ class GravityTilt(Effect):
     name = "gravity_tilt"
     joint_wise = False
     complexity = 2
+    load = True
     needs_inertial = True
 
     #: Step for the derivative with respect to roll and pitch, rad.
@@ -45,11 +46,11 @@ class GravityTilt(Effect):
         tilted = tilted_gravity(g, number(parameters["roll"]), number(parameters["pitch"]))
         return self._gravity_torque(context, tilted) - self._gravity_torque(context, g)
 
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         errors = np.sqrt(np.diag(covariance))
         return {
             name: Estimate(float(b), float(e), "rad")
-            for name, b, e in zip(("roll", "pitch"), beta, errors, strict=True)
+            for name, b, e in zip(("roll", "pitch"), x, errors, strict=True)
         }
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:

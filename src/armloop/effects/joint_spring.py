@@ -13,6 +13,7 @@ class JointSpring(Effect):
 
     name = "joint_spring"
     complexity = 2
+    load = True
 
     def columns(self, context: Context, shape: float) -> Array:
         assert self.joint is not None
@@ -23,10 +24,10 @@ class JointSpring(Effect):
         k, rest = number(parameters["stiffness"]), number(parameters["rest"])
         return self.full_columns(context, 0.0) @ np.array([k, k * rest])
 
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         assert self.joint is not None
         joint = arm.joints[self.joint - 1]
-        k, moment = float(beta[0]), float(beta[1])
+        k, moment = float(x[0]), float(x[1])
         safe = k if abs(k) > 1e-12 else 1e-12
         gradient = np.array([-moment / safe**2, 1 / safe])
         return {

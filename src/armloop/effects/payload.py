@@ -12,37 +12,56 @@ _TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Payload(Effect):
-    """A body of mass m with centre of mass c and inertia I about it, on the last link.
+    """A compact body of mass m with centre c on the last link: M(q), bias and gravity of a rigid body.
 
-    Its torques are linear in m, m c and the inertia about the link's origin (ten parameters; fewer are
-    visible where the last joints never turn). ``com`` is given in the frame of the link ``tool`` if the
-    URDF has one fixed to the last moving link, else in that link's frame.
+    Its torques are linear in ten parameters (m, m c, inertia about the link's origin). Of these a compact
+    body has five free ones: m, m c and one inertia about its own centre, equal in all directions; so a
+    motion that hides some of the ten cannot turn them into an impossible body. ``com`` is given in the
+    frame of the link ``tool`` if the URDF has one fixed to the last moving link, else in that link's frame.
     """
 
     name = "payload"
     joint_wise = False
-    complexity = 4
+    complexity = 5
+    load = True
 
     def columns(self, context: Context, shape: float) -> Array:
         motion = context.motion
         return regressor(context.arm, motion.q, motion.v, motion.vdot, links=[context.arm.n - 1])
 
+    def start(self, beta: Array) -> Array:
+        mass = max(float(beta[0]), 1e-3)
+        return np.array([mass, *beta[1:4], 1e-4 * mass])
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        mass, moment, own = max(float(x[0]), 1e-3), x[1:4], max(float(x[4]), 0.0)
+        point = (float(moment @ moment) * np.eye(3) - np.outer(moment, moment)) / mass
+        tensor = point + own * np.eye(3)
+        beta = np.concatenate([[mass], moment, [tensor[i] for i in _TENSOR]])
+        J = np.zeros((10, 5))
+        J[:4, :4] = np.eye(4)
+        J[4:, 0] = [-point[i] / mass for i in _TENSOR]
+        for k in range(3):
+            unit = np.eye(3)[k]
+            slope = (2 * moment[k] * np.eye(3) - np.outer(unit, moment) - np.outer(moment, unit)) / mass
+            J[4:, 1 + k] = [slope[i] for i in _TENSOR]
+        J[4:7, 4] = 1.0
+        return beta, J
+
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self.columns(context, 0.0) @ _link_parameters(context.arm, parameters)
 
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        mass = float(beta[0])
-        safe = mass if abs(mass) > 1e-9 else 1e-9
-        com = beta[1:4] / safe
-        J = np.hstack([-com[:, None] / safe, np.eye(3) / safe])
-        com_cov = J @ covariance[:4, :4] @ J.T
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        mass = max(float(x[0]), 1e-3)
+        com = x[1:4] / mass
+        J = np.hstack([-com[:, None] / mass, np.eye(3) / mass])
         R, p = arm.X_tool[:3, :3], arm.X_tool[:3, 3]
-        com_tool, com_tool_cov = R.T @ (com - p), R.T @ com_cov @ R
+        com_cov = R.T @ J @ covariance[:4, :4] @ J.T @ R
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return {
             "mass": Estimate(mass, float(errors[0]), "kg"),
-            "com": Estimate(com_tool.tolist(), np.sqrt(np.maximum(np.diag(com_tool_cov), 0)).tolist(), "m"),
-            "inertia": Estimate(beta[4:].tolist(), errors[4:].tolist(), "kg*m^2"),
+            "com": Estimate((R.T @ (com - p)).tolist(), np.sqrt(np.maximum(np.diag(com_cov), 0)).tolist(), "m"),
+            "own_inertia": Estimate(max(float(x[4]), 0.0), float(errors[4]), "kg*m^2"),
         }
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
@@ -61,9 +80,6 @@ def _link_parameters(arm: Arm, parameters: dict[str, Value]) -> Array:
     """(10,) parameters about the last link's origin, in its frame."""
     mass, com_tool = number(parameters["mass"]), np.asarray(parameters["com"], dtype=float)
     com = arm.X_tool[:3, :3] @ com_tool + arm.X_tool[:3, 3]
-    if "inertia" in parameters:
-        tensor = np.asarray(parameters["inertia"], dtype=float)
-    else:
-        point = mass * (float(com @ com) * np.eye(3) - np.outer(com, com))
-        tensor = np.array([point[i] for i in _TENSOR])
-    return np.concatenate([[mass], mass * com, tensor])
+    own = number(parameters.get("own_inertia", 0.0))
+    tensor = mass * (float(com @ com) * np.eye(3) - np.outer(com, com)) + own * np.eye(3)
+    return np.concatenate([[mass], mass * com, [tensor[i] for i in _TENSOR]])

@@ -38,18 +38,18 @@ class TorqueRipple(Effect):
         amplitude, order, phase = (number(parameters[key]) for key in ("amplitude", "order", "phase"))
         return self.full_columns(context, order) @ (amplitude * np.array([np.cos(phase), np.sin(phase)]))
 
-    def estimates(self, arm: Arm, beta: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         assert self.joint is not None
-        amplitude = float(np.hypot(*beta))
+        amplitude = float(np.hypot(*x))
         safe = max(amplitude, 1e-12)
-        along, across = beta / safe, np.array([-beta[1], beta[0]]) / safe
+        along, across = x / safe, np.array([-x[1], x[0]]) / safe
         return {
             "amplitude": Estimate(
                 amplitude, float(np.sqrt(along @ covariance @ along)), arm.joints[self.joint - 1].torque_unit
             ),
             "order": Estimate(shape, 0.0, "1/rev"),
             "phase": Estimate(
-                float(np.arctan2(beta[1], beta[0])), float(np.sqrt(across @ covariance @ across) / safe), "rad"
+                float(np.arctan2(x[1], x[0])), float(np.sqrt(across @ covariance @ across) / safe), "rad"
             ),
         }
 

@@ -1,0 +1,133 @@
+"""From a model and a measured run to a verdict, the effects found, and the augmented model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.alternatives import why_alike
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.effects import hypotheses
+from armloop.errors import InputError
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.motion import Samples
+from armloop.progress import Progress, silent
+from armloop.signals import condition
+
+Array = NDArray[np.float64]
+
+SCHEMA = "armloop/diagnosis/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The verdict on a run.
+
+    Attributes:
+        verdict: ``no_effect``, ``effects_found`` or ``unlisted_effect``.
+        outcome: the search's result.
+        model: the model with the effects found.
+        unlisted: the law of a residual that no listed effect explains, if there is such a residual.
+        samples: the run as it was judged.
+    """
+
+    verdict: str
+    outcome: Outcome
+    model: ReconstructedModel
+    unlisted: Unlisted | None
+    evidence: Evidence
+
+    @property
+    def samples(self) -> Samples:
+        """The run, conditioned."""
+        return self.evidence.samples
+
+    def errors(self) -> dict[str, Any]:
+        """RMSE per joint of held-out moving samples, before and after, beside the baseline's."""
+        scale = self.evidence.scale
+        tau = np.sqrt(_by_joint(self.outcome.before, self._torque() ** 2))
+        before, after = (
+            np.sqrt(_by_joint(f, f.held_out**2)) * scale for f in (self.outcome.before, self.outcome.after)
+        )
+        return {
+            "metric": "rmse",
+            "held_out": True,
+            "unit": self.model.arm.torque_units,
+            "before": before.tolist(),
+            "after": after.tolist(),
+            "noise_floor": scale.tolist(),
+            "nrmse": {"before": (before / tau).tolist(), "after": (after / tau).tolist()},
+        }
+
+    def _torque(self) -> Array:
+        stacked = self.outcome.before.stacked
+        order = np.argwhere(self.evidence.rows)
+        assert len(order) == len(stacked.y)
+        return np.asarray(self.samples.tau[order[:, 0], order[:, 1]])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``diagnosis.json``."""
+        effects: list[dict[str, Any]] = []
+        for found, added in zip(self.outcome.found, self.outcome.added(), strict=True):
+            effects.append(
+                {
+                    **added.to_dict(),
+                    "share": found.share,
+                    "words": added.effect.sentence(added.parameters),
+                    "alternatives": [
+                        {"effect": rival.name, "joint": rival.joint, "share": share, "why": why_alike(added.effect, rival)}
+                        for rival, share in found.rivals
+                    ],
+                }
+            )
+        effects.sort(key=lambda item: -item["share"])
+        if self.unlisted is not None:
+            effects.append(self.unlisted.to_dict())
+        return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": self.errors()}
+
+
+def _by_joint(fit: Fit, values: Array) -> Array:
+    """(n,) mean of row values over each joint."""
+    joints = fit.stacked.joint
+    n = len(np.unique(joints)) if len(joints) == 0 else int(joints.max()) + 1
+    return np.bincount(joints, weights=values, minlength=n) / np.maximum(np.bincount(joints, minlength=n), 1)
+
+
+def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Progress = silent) -> Diagnosis:
+    """Find what the model lacks on a measured run.
+
+    Args:
+        logs: one or more runs of the same arm under the same circumstances, torque in the model's unit.
+
+    Raises:
+        InputError: the logs do not fit the model, or hold too little motion to judge.
+    """
+    for log in logs:
+        if log.joints != model.arm.n:
+            raise InputError(f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}")
+    progress("conditioning the run like the model's training logs")
+    samples = condition(logs, model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    still = [j + 1 for j in range(model.arm.n) if samples.moving[:, j].sum() < 50]
+    blocks = len(np.unique(evidence.blocks))
+    if len(still) == model.arm.n or blocks < 8:
+        raise InputError(
+            f"{logs[0].name}: too little motion to judge ({blocks} blocks of 1.5 s, joints at rest: {still}); "
+            "log at least 12 s in which the joints move"
+        )
+    progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
+    outcome = search(evidence, progress)
+    unlisted = find_law(evidence, outcome.after, progress)
+    if unlisted is not None:
+        verdict = "effects_found" if outcome.found else "unlisted_effect"
+    else:
+        verdict = "effects_found" if outcome.found else "no_effect"
+    return Diagnosis(verdict, outcome, model.with_effects(outcome.added()), unlisted, evidence)

@@ -1,0 +1,106 @@
+"""A residual as evidence: what the model leaves on a run, weighed by what it leaves on its own baseline.
+
+One weighted unit is the model's baseline residual of a joint, so joints compare, and the model's own
+shortcomings count as the noise they are. Blocks of the run are dealt into folds; whatever is judged is
+judged on folds that were not fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_numbers
+from armloop.effects import Context, Effect
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.motion import Samples
+from armloop.regression.moments import Moments
+from armloop.signals import smooth
+
+Array = NDArray[np.float64]
+
+#: Length of a block, s, and number of folds: residuals stay correlated for a good second.
+BLOCK_SECONDS = 1.5
+FOLDS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The run, its residual and the weights.
+
+    Attributes:
+        samples: the run, conditioned like the model's training logs.
+        scale: (n,) the model's residual on its own held-out baseline data, N·m (N).
+        rows: (N, n) samples that count: the joint slides.
+        blocks: (N,) block of each sample.
+    """
+
+    model: ReconstructedModel
+    samples: Samples
+    scale: Array
+    rows: NDArray[np.bool_]
+    blocks: NDArray[np.intp]
+    context: Context
+
+    @staticmethod
+    def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
+        """Evidence of a run for a model; ``effects`` are those that will be asked about."""
+        scale = np.array([float(x) if x else np.nan for x in model.baseline.get("rmse", [])] or [np.nan])
+        scale = np.resize(scale, samples.motion.joints)
+        # A model without a baseline (written by hand, or noise-free) is weighed by the torque itself.
+        own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
+        scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
+        blocks = block_numbers(samples.motion, BLOCK_SECONDS)
+        return Evidence(model, samples, scale, samples.moving, blocks, model.context(samples.motion, effects))
+
+    @property
+    def fold(self) -> NDArray[np.intp]:
+        """(N,) fold of each sample."""
+        return self.blocks % FOLDS
+
+    def residual(self, known: list[AddedEffect]) -> Array:
+        """(N, n) what is left for ``known`` and further effects to explain.
+
+        The known effects' own torque is left in, but friction that grows with their load is not.
+        """
+        model = self.model.with_effects(known)
+        predicted = model.predict(self.samples.motion)
+        if known:
+            context = model.context(self.samples.motion, [*(a.effect for a in known)])
+            predicted = predicted - sum(added.torque(context) for added in known)
+        return self.samples.tau - smooth(self.samples, predicted)
+
+    def columns(self, effect: Effect, shape: float) -> Array:
+        """(N, n, p) columns of an effect through the run's filter."""
+        return smooth(self.samples, effect.full_columns(self.context, shape))
+
+    def stack(self, residual: Array, columns: list[Array]) -> Stacked:
+        """The weighted regression problem of all joints, one row per joint and counted sample."""
+        X = np.concatenate(columns, axis=2) if columns else np.zeros((*residual.shape, 0))
+        order = np.argwhere(self.rows)
+        samples, joints = order[:, 0], order[:, 1]
+        weight = 1 / self.scale[joints]
+        return Stacked(
+            X[samples, joints] * weight[:, None],
+            residual[samples, joints] * weight,
+            self.blocks[samples],
+            self.fold[samples],
+            joints,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Stacked:
+    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based) of each row."""
+
+    X: Array
+    y: Array
+    block: NDArray[np.intp]
+    fold: NDArray[np.intp]
+    joint: NDArray[np.intp]
+
+    def moments(self) -> list[Moments]:
+        """Moments of each fold."""
+        return [Moments.of(self.X[self.fold == k], self.y[self.fold == k]) for k in range(FOLDS)]

@@ -1,0 +1,134 @@
+"""Fitting effects to a residual: constrained least squares, cross-fitted errors, block-robust covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_sums
+from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
+from armloop.effects import Effect, Estimate
+from armloop.regression.moments import Moments, total
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 30
+_RIDGE = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Several effects fitted together to one residual.
+
+    Attributes:
+        effects, shapes: what was fitted.
+        parameters: one dict of estimates per effect, from all blocks.
+        held_out: (R,) residual of every weighted row after parameters fitted on the other folds.
+        stacked: the rows.
+    """
+
+    effects: tuple[Effect, ...]
+    shapes: tuple[float, ...]
+    parameters: tuple[dict[str, Estimate], ...]
+    held_out: Array
+    stacked: Stacked
+
+    @property
+    def complexity(self) -> int:
+        """Free parameters of all effects."""
+        return sum(effect.complexity for effect in self.effects)
+
+    def block_errors(self) -> Array:
+        """(B,) held-out squared error of each block."""
+        return block_sums(self.held_out**2, self.stacked.block)
+
+
+def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[float]) -> Fit:
+    """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
+    columns = [evidence.columns(e, s) for e, s in zip(effects, shapes, strict=True)]
+    sizes = [c.shape[2] for c in columns]
+    stacked = evidence.stack(residual, columns)
+    parts = stacked.moments()
+    whole = total(parts)
+    held_out = np.array(stacked.y)
+    for k in range(FOLDS):
+        beta, _, _ = solve(whole - parts[k], effects, sizes)
+        mine = stacked.fold == k
+        held_out[mine] -= stacked.X[mine] @ beta
+    beta, x, J = solve(whole, effects, sizes)
+    covariance = _block_covariance(stacked, beta, J)
+    parameters, start = [], 0
+    for effect, shape, free in zip(effects, shapes, x, strict=True):
+        block = slice(start, start + len(free))
+        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], shape))
+        start += len(free)
+    return Fit(tuple(effects), tuple(shapes), tuple(parameters), held_out, stacked)
+
+
+def solve(moments: Moments, effects: Sequence[Effect], sizes: Sequence[int]) -> tuple[Array, list[Array], Array]:
+    """Least squares over the effects' free parameters by Gauss-Newton (one step where all are linear).
+
+    Returns:
+        beta (p,), the free parameters per effect, and the derivative of beta with respect to them (p, k).
+    """
+    if not effects:
+        return np.zeros(0), [], np.zeros((0, 0))
+    edges = np.cumsum([0, *sizes])
+    unconstrained = _ridge(moments.G, moments.b)
+    x = [e.start(unconstrained[a:b]) for e, a, b in zip(effects, edges, edges[1:], strict=False)]
+    beta, J = _embed(effects, x)
+    error = moments.squared_error(beta)
+    for _ in range(_ITERATIONS):
+        step = _ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
+        for damping in (1.0, 0.3, 0.1, 0.03):
+            trial = _split(np.concatenate(x) + damping * step, x)
+            new_beta, new_J = _embed(effects, trial)
+            new_error = moments.squared_error(new_beta)
+            if new_error < error:
+                break
+        else:
+            break
+        converged = error - new_error <= 1e-10 * error
+        x, beta, J, error = trial, new_beta, new_J, new_error
+        if converged:
+            break
+    return beta, x, J
+
+
+def _split(flat: Array, like: Sequence[Array]) -> list[Array]:
+    return list(np.split(flat, np.cumsum([len(part) for part in like])[:-1]))
+
+
+def _embed(effects: Sequence[Effect], x: Sequence[Array]) -> tuple[Array, Array]:
+    pairs = [effect.embed(free) for effect, free in zip(effects, x, strict=True)]
+    beta = np.concatenate([b for b, _ in pairs])
+    J = np.zeros((len(beta), sum(j.shape[1] for _, j in pairs)))
+    row = column = 0
+    for b, j in pairs:
+        J[row : row + len(b), column : column + j.shape[1]] = j
+        row, column = row + len(b), column + j.shape[1]
+    return beta, J
+
+
+def _ridge(G: Array, b: Array) -> Array:
+    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+    scale[np.diag(G) <= 0] = 0.0
+    scaled = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
+    return scale * np.linalg.solve(scaled, scale * b)
+
+
+def _block_covariance(stacked: Stacked, beta: Array, J: Array) -> Array:
+    """Sandwich covariance with blocks as the independent units (Liang and Zeger 1986)."""
+    X = stacked.X @ J
+    G = X.T @ X
+    scores = X * (stacked.y - stacked.X @ beta)[:, None]
+    _, index = np.unique(stacked.block, return_inverse=True)
+    sums = np.zeros((index.max() + 1, X.shape[1]))
+    np.add.at(sums, index, scores)
+    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+    bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
+    blocks = len(sums)
+    return np.asarray(bread @ (sums.T @ sums) @ bread) * blocks / max(blocks - 1, 1)

@@ -1,0 +1,155 @@
+"""The search: add the effect that explains most on data not fitted, the simplest of equals, until none is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit, fit
+from armloop.effects import Effect, hypotheses
+from armloop.model import AddedEffect
+from armloop.progress import Progress
+
+Array = NDArray[np.float64]
+
+#: An effect must lower the held-out error by this many standard errors (over blocks) …
+SIGNIFICANCE = 3.0
+#: … and, on the joints it acts on, by this part of the energy the model leaves on its own baseline: what is
+#: smaller cannot be told from the model's own shortcomings.
+BASELINE_SHARE = 0.35
+#: Fits whose held-out error is within this part of the explained energy of the best count as equals.
+EQUAL_SHARE = 0.03
+_MOST_EFFECTS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """One effect that was accepted.
+
+    Attributes:
+        share: part of the explainable held-out energy that it removed.
+        rivals: effects that explain the run as well, with their share.
+    """
+
+    effect: Effect
+    shape: float
+    share: float
+    rivals: list[tuple[Effect, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What the search found: accepted effects, and the fits without and with them."""
+
+    found: list[Found]
+    before: Fit
+    after: Fit
+    residual: Array
+
+    def added(self) -> list[AddedEffect]:
+        """The effects with their parameters, ready to be composed with the model."""
+        return [
+            AddedEffect(effect, parameters)
+            for effect, parameters in zip(self.after.effects, self.after.parameters, strict=True)
+        ]
+
+
+def search(evidence: Evidence, progress: Progress) -> Outcome:
+    """Greedy forward search with joint re-estimation, then a last pass for load-dependent friction."""
+    residual = evidence.residual([])
+    before = current = fit(evidence, residual, [], [])
+    energy = before.held_out**2
+    rows_per_joint = np.bincount(before.stacked.joint, minlength=residual.shape[1])
+    explainable = max(float(energy.sum()) - len(energy), 1e-9)
+    found: list[Found] = []
+    listed = hypotheses(evidence.model.arm)
+    while len(found) < _MOST_EFFECTS:
+        trials = []
+        for effect in listed:
+            if any(f.effect.name == effect.name and f.effect.joint == effect.joint for f in found):
+                continue
+            trial = _trial(evidence, residual, current, effect)
+            if trial is not None and _worth(current, trial, rows_per_joint):
+                trials.append(trial)
+        if not trials:
+            break
+        best = _simplest_of_equals(current, trials)
+        gain = _gain(current, best)
+        rivals = [
+            (trial.effects[-1], _gain(current, trial) / explainable)
+            for trial in trials
+            if trial is not best and _gain(current, trial) >= (1 - 2 * EQUAL_SHARE) * gain
+        ]
+        found.append(Found(best.effects[-1], best.shapes[-1], gain / explainable, rivals))
+        progress(f"found {best.effects[-1].label()}: removes {gain / explainable:.0%} of what can be explained")
+        current = best
+    after = _refit(evidence, current)
+    return Outcome(found, before, after, residual)
+
+
+def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
+    shapes = list(effect.shapes(evidence.context))
+    if not shapes:
+        return None
+    shape = shapes[0] if len(shapes) == 1 else _best_shape(evidence, residual, current, effect, shapes)
+    trial = fit(evidence, residual, [*current.effects, effect], [*current.shapes, shape])
+    arm = evidence.model.arm
+    if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
+        return None
+    return trial
+
+
+def _best_shape(evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]) -> float:
+    """The shape whose columns explain most of what the current effects leave on the effect's joint."""
+    assert effect.joint is not None
+    j = effect.joint - 1
+    left = np.array(residual[:, j])
+    rows = evidence.rows[:, j]
+    left[rows] = current.held_out[current.stacked.joint == j] * evidence.scale[j]
+    explained = []
+    for shape in shapes:
+        X = evidence.columns(effect, shape)[rows, j]
+        beta = np.linalg.lstsq(X, left[rows], rcond=None)[0]
+        explained.append(float(left[rows] @ X @ beta))
+    return shapes[int(np.argmax(explained))]
+
+
+def _gain(current: Fit, trial: Fit) -> float:
+    return float((current.held_out**2).sum() - (trial.held_out**2).sum())
+
+
+def _worth(current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
+    """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
+    gains = current.block_errors() - trial.block_errors()
+    spread = float(np.sqrt(len(gains)) * gains.std(ddof=1))
+    if gains.sum() <= SIGNIFICANCE * spread:
+        return False
+    joints = current.stacked.joint
+    by_joint = np.bincount(joints, weights=current.held_out**2 - trial.held_out**2, minlength=len(rows_per_joint))
+    return bool((by_joint > BASELINE_SHARE * rows_per_joint).any())
+
+
+def _simplest_of_equals(current: Fit, trials: list[Fit]) -> Fit:
+    """Among trials whose held-out error is as good as the best, the one with the fewest parameters."""
+    best = max(trials, key=lambda trial: _gain(current, trial))
+    gain = _gain(current, best)
+    equals = []
+    for trial in trials:
+        excess = trial.block_errors() - best.block_errors()
+        spread = float(np.sqrt(len(excess)) * excess.std(ddof=1))
+        if excess.sum() <= max(EQUAL_SHARE * gain, min(spread, 2 * EQUAL_SHARE * gain)):
+            equals.append(trial)
+    return min(equals, key=lambda trial: (trial.complexity, -_gain(current, trial)))
+
+
+def _refit(evidence: Evidence, current: Fit) -> Fit:
+    """Fit once more with the friction that the found loads cause, where the model's friction feels load."""
+    if not current.effects:
+        return current
+    added = [AddedEffect(e, p) for e, p in zip(current.effects, current.parameters, strict=True)]
+    again = fit(evidence, evidence.residual(added), current.effects, current.shapes)
+    better = (again.held_out**2).sum() < (current.held_out**2).sum()
+    return again if better else current
