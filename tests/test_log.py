@@ -136,6 +136,7 @@ FAULTS: dict[str, tuple[Callable[[Rows], object], str]] = {
     "a joint without velocity": (add_column("q3"), r"the header lacks v3, tau3;"),
     "a hole in the numbering": (cell(0, 2, "q3"), r"the header lacks q2, v3, tau3;"),
     "one acceleration only": (add_column("vdot1"), r"the header lacks vdot2;"),
+    "a joint too many": (cell(0, 6, "tau999"), r"the header lacks q3, .* and \d+ more;"),
     "numbered from zero": (cell(0, 1, "q0"), r"column q0: joints are numbered q1, q2"),
     "zero-padded numbers": (cell(0, 1, "q01"), r"column q01: joints are numbered q1, q2"),
     "a column twice": (cell(0, 2, "q1"), r"column q1 stands 2 times; each must stand once"),
@@ -152,6 +153,7 @@ FAULTS: dict[str, tuple[Callable[[Rows], object], str]] = {
     "not a number": (cell(3, 2, "nan"), r"column q2, row 3 \(line 4\): 'nan' is not a finite number"),
     "infinite": (cell(60, 6, "-inf"), r"column tau2, row 60 \(line 61\): '-inf' is not a finite number"),
     "too large for a double": (cell(5, 1, "1e999"), r"column q1, row 5 \(line 6\): '1e999' is not a"),
+    "absurdly large": (cell(5, 1, "1e200"), r"column q1, row 5 \(line 6\): '1e200' is too large a number"),
     "a short row": (lambda rows: rows[12].pop(), r"row 12 \(line 13\) has 6 cells; it must have 7"),
     "a long row": (lambda rows: rows[12].append("1"), r"row 12 \(line 13\) has 8 cells; it must have 7"),
     "time goes back": (

@@ -22,7 +22,7 @@ GAP_PERIODS = 10.0
 FEWEST_SAMPLES = 20
 """Fewer rows than this are no motion: filters and derivatives need more."""
 
-_JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d+)")
+_JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
 # An arm's joint that turns beyond the first at more than the second is not in rad and rad/s (m and m/s).
 _LARGEST_Q, _LARGEST_V = 30.0, 20.0
 

@@ -15,6 +15,8 @@ from armloop.errors import LogError
 from armloop.files import replacing
 
 CSV, PARQUET = ".csv", ".parquet"
+# No time, position or force in SI units is as large; squares and products of what is smaller do not overflow.
+_LARGEST = 1e12
 
 
 def read_header(path: Path) -> list[str]:
@@ -46,15 +48,17 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     """
     table = _read_parquet(path, names) if path.suffix == PARQUET else _read_csv(path, names)
     faults = {
-        name: int(np.argmin(good)) for name, cells in table.items() if not (good := np.isfinite(cells)).all()
+        name: int(np.argmin(good))
+        for name, cells in table.items()
+        if not (good := np.abs(cells) < _LARGEST).all()
     }
     if faults:
         name = min(faults, key=lambda key: faults[key])
         row = faults[name]
         cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
+        wrong = "too large a number" if np.isfinite(table[name][row]) else "not a finite number"
         raise LogError(
-            f"{path}: column {name}, {place(path, row)}: {cell!r} is not a finite number; "
-            "fill in the value or drop the row"
+            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; fill in the value or drop the row"
         )
     return table
 
