@@ -1,0 +1,89 @@
+"""The fields of scenario files, with their units and defaults: plain data, as `pydrake.common.yaml` reads it.
+
+Checks are in `scenarios`. No postponed annotations here: the reader looks at the types themselves, and it knows
+`Optional[X]`, not `X | None`.
+"""
+
+from dataclasses import dataclass, field
+from typing import Optional
+
+CONTROLLERS = ("pid", "pid_step1", "pid_step3")
+"""The controllers of the paper: without a model, Eq. (35) and Eq. (36)."""
+
+
+@dataclass
+class FrictionData:
+    """Eq. (34) of one joint."""
+
+    static: float = 0.0  # f_s, N*m (N for a prismatic joint)
+    coulomb: float = 0.0  # f_c, N*m (N)
+    stribeck_velocity: float = 0.1  # v_s, rad/s (m/s)
+    viscous: float = 0.0  # f_v, N*m*s/rad (N*s/m)
+
+
+@dataclass
+class RangesData:
+    """What the joints may do during a collection, one number per joint."""
+
+    lower: list[float] = field(default_factory=list)  # rad (m)
+    upper: list[float] = field(default_factory=list)  # rad (m)
+    velocity: list[float] = field(default_factory=list)  # rad/s (m/s), both directions
+    acceleration: list[float] = field(default_factory=list)  # rad/s^2 (m/s^2), both directions
+
+
+@dataclass
+class PlantData:
+    """A simulated arm."""
+
+    arm: str = ""  # built-in name, or the path of a URDF, from the scenario's folder
+    friction: list[FrictionData] = field(default_factory=list)  # one per joint, base to tip
+    ranges: Optional[RangesData] = None  # noqa: UP045; default: from the limits
+    time_step: float = 0.001  # s, of the plant and of the controllers
+    encoder_counts: int = 524288  # per revolution; 0 for ideal encoders
+    prismatic_lead: float = 0.02  # m per revolution of a sliding joint's screw
+    torque_noise: float = 0.01  # standard deviation, as a part of each joint's RMS
+
+
+@dataclass
+class PlanData:
+    """How much is collected; see `CollectionPlan`."""
+
+    rate: float = 250.0  # Hz of the logs
+    dwell: bool = False  # stand still at the static poses instead of creeping
+    static_poses: int = 60  # each in both directions
+    static_speed: float = 0.0017453292519943296  # rad/s (0.1 deg/s)
+    static_speed_prismatic: float = 0.0001  # m/s
+    static_settle: float = 0.1  # s before the log of a segment starts
+    static_hold: float = 0.12  # s that are logged
+    velocity_segments: int = 120
+    slowest: float = 0.01  # rad/s
+    slowest_prismatic: float = 0.001  # m/s
+    velocity_settle: float = 0.1  # s
+    velocity_hold: float = 0.15  # s
+    trajectories: int = 2  # Fourier-series trajectories
+    trajectory_duration: float = 20.0  # s each
+
+
+@dataclass
+class ReferenceData:
+    """What to track."""
+
+    kind: str = "paper"  # paper: Fig. 14, three joints; fourier: random within the plant's ranges
+    unit: float = 0.1  # rad, of the paper's k
+    periods: int = 2  # of 20 s, of the paper's
+    duration: float = 40.0  # s, of a fourier one
+
+
+@dataclass
+class TrackingData:
+    """A tracking experiment."""
+
+    plant: str = ""  # a plant of plants.yaml, or empty when `own_plant` is given
+    own_plant: Optional[PlantData] = None  # noqa: UP045
+    kp: list[float] = field(default_factory=lambda: [80.0])  # N*m/rad (N/m); one number, or one per joint
+    ki: list[float] = field(default_factory=lambda: [8.0])  # N*m/(rad s)
+    kd: list[float] = field(default_factory=lambda: [2.0])  # N*m*s/rad
+    reference: ReferenceData = field(default_factory=ReferenceData)
+    score: list[float] = field(default_factory=lambda: [20.0, 40.0])  # s, the interval that is scored
+    controllers: list[str] = field(default_factory=lambda: list(CONTROLLERS))
+    random_seed: int = 0

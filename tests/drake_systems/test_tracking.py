@@ -1,0 +1,91 @@
+"""Tracking with an exact model: the loop itself against the figures the design measured, on the scored period."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.exact import ExactModel
+from armloop.drake_systems.scenarios import load_tracking
+from armloop.drake_systems.tracking import controllers_for, run_tracking, track
+from armloop.excitation import FourierReference
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return load_tracking("three_axis_tracking")
+
+
+@pytest.fixture(scope="module")
+def exact(scenario):
+    return ExactModel(scenario.plant.arm, scenario.plant.config.friction)
+
+
+@pytest.fixture(scope="module")
+def short(scenario):
+    """The same loop for two seconds."""
+    reference = dataclasses.replace(scenario.reference, duration=2.0)
+    return dataclasses.replace(scenario, reference=reference, score=(1.0, 2.0))
+
+
+@pytest.mark.slow
+def test_exact_model_gives_the_designs_figures(scenario, exact):
+    """Mean absolute errors in deg over the second period of 20 s; the paper has 1.10, 1.21, 1.23 for PID."""
+    results = run_tracking(scenario, {"model": exact})
+    assert list(results) == ["pid", "pid_step1", "pid_step3"]
+    assert_allclose(results["pid"].eta, [1.10, 1.21, 1.23], rtol=0.15)
+    assert_allclose(results["pid_step1"].eta, [0.63, 0.37, 0.70], rtol=0.1)
+    assert np.all(results["pid_step3"].eta < 0.005)
+    assert results["pid"].scored == slice(20_000, 40_000)
+
+
+def test_order_of_controllers_on_a_short_run(short, exact):
+    results = run_tracking(short, {"model": exact, "again": exact}, processes=2)
+    assert list(results) == ["pid", "pid_step1", "pid_step3", "pid_again"]
+    # Joint 2 carries the weight: in the first seconds the integrator has not yet taken it over.
+    assert results["pid"].eta[1] > 3 * results["pid_step1"].eta[1]
+    assert np.all(results["pid_step3"].eta < 0.01)
+    assert_allclose(results["pid_again"].eta, results["pid_step3"].eta)
+    assert results["pid"].unit == ("deg",) * 3
+
+
+def test_run_is_repeatable_and_consistent(short):
+    first, again = track(short, "pid", {}), track(short, "pid", {})
+    assert np.array_equal(first.q, again.q)
+    error = np.abs(np.rad2deg(first.q_ref - first.q))[first.scored]
+    assert_allclose(first.eta, error.mean(axis=0))
+    assert_allclose(first.largest, error.max(axis=0))
+    assert_allclose(first.rms, np.sqrt((error**2).mean(axis=0)))
+
+
+def test_an_undeclared_payload_costs_and_knowing_it_pays(short, exact):
+    payload = UndeclaredEffect("payload", None, {"mass": 0.5, "com": [0.02, 0.0, 0.0]})
+    knowing = ExactModel(short.plant.arm, short.plant.config.friction, [payload])
+    results = run_tracking(short, {"model": exact, "augmented": knowing}, [payload], processes=1)
+    assert results["pid_step3"].eta[1] > 0.5
+    assert np.all(results["pid_augmented"].eta < 0.01)
+
+
+def test_without_a_model_only_pid_runs(short):
+    assert controllers_for(short, {}) == ["pid"]
+
+
+def test_a_model_that_is_not_finite_stops_the_run(short):
+    class Broken:
+        def feedforward(self, q, v, vdot, step):
+            return np.full(3, np.nan)
+
+    with pytest.raises(RuntimeError, match="not finite"):
+        track(short, "pid_step3", {"model": Broken()})
+
+
+def test_integral_removes_a_constant_error(short):
+    """Held at a pose against gravity, the integrator takes over what the proportional part left (K_p / K_i = 10 s)."""
+    still = FourierReference(np.array([0.0, 0.5, 0.3]), np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1)), 3.0)
+    gains = dataclasses.replace(short.gains, ki=np.full(3, 80.0))
+    scenario = dataclasses.replace(short, reference=still, gains=gains, score=(2.5, 3.0))
+    result = track(scenario, "pid", {})
+    early, late = (np.abs(result.q_ref - result.q)[row, 1] for row in (200, -1))
+    assert late < 0.25 * early
