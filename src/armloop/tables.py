@@ -58,7 +58,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
         cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
         wrong = "too large a number" if np.isfinite(table[name][row]) else "not a finite number"
         raise LogError(
-            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; fill in the value or drop the row"
+            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
         )
     return table
 
