@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from armloop.files import write_text
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
 from armloop.motion import Motion
+from armloop.pointwise import Pointwise, pointwise
 from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
@@ -111,31 +113,39 @@ class ReconstructedModel:
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
         effects = [added.effect for added in self.effects] if needed is None else needed
-        inertial = self.inertial_parameters(motion) if any(e.needs_inertial for e in effects) else None
-        return Context(self.arm, motion, inertial, float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0)
+        inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
+        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
+        return Context(self.arm, motion, inertial, period)
 
-    def inertial_parameters(self, motion: Motion) -> Array:
-        """(10 n,) link parameters that reproduce the model's rigid-body torques on a motion.
+    def inertial_parameters(self) -> Array:
+        """(10 n,) link parameters that reproduce the model's rigid-body torques.
 
-        Where the motion leaves a parameter undetermined, the arm's nominal value stands.
+        Found by least squares on random motion within the ranges the model was fitted on; where the
+        torques do not reveal a parameter, the arm's nominal value stands.
         """
         if "inertial" in self.history:
             return np.asarray(self.history["inertial"], dtype=float)
-        rows = np.linspace(0, motion.samples - 1, min(motion.samples, 600)).astype(int)
-        q, v, vdot = motion.q[rows], motion.v[rows], motion.vdot[rows]
-        part = Motion(motion.time[rows], q, v, vdot, np.array([0]))
-        Y = regressor(self.arm, q, v, vdot).reshape(-1, 10 * self.arm.n)
+        n, rng = self.arm.n, np.random.default_rng(0)
+        size = np.array(self.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+        q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
+        part = Motion(np.arange(400.0), q + size[3], v, vdot, np.array([0]))
+        Y = regressor(self.arm, part.q, v, vdot).reshape(-1, 10 * n)
         nominal = nominal_parameters(self.arm)
         rest = self.rigid_body(part).ravel() - Y @ nominal
-        return nominal + np.linalg.lstsq(Y, rest, rcond=1e-6)[0]
+        return nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
 
     def feedforward(self, q: Array, v: Array, vdot: Array, step: int = 3) -> Array:
         """(n,) torque a controller should supply for one sample; sensor effects excluded.
 
         Friction with memory acts as if fully slid: a single sample has no history.
         """
-        motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.array([0]))
-        return self.predict(motion, step, sensors=False)[0]
+        if step not in self._pointwise:
+            self._pointwise[step] = pointwise(self, step)
+        return self._pointwise[step](q, v, vdot)
+
+    @cached_property
+    def _pointwise(self) -> dict[int, Pointwise]:
+        return {}
 
     def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:
         """The model with further effects."""

@@ -144,14 +144,18 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
 def _velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
     """(n,) standard deviation of the noise that a filter of this corner leaves in v.
 
-    White noise is assumed and read from third differences, which smooth motion hardly enters; it is
-    never less than the resolution of the recorded v.
+    It is taken to be as strong below the corner as in the octave above it, where there is hardly any
+    motion; the median over the run with the most samples keeps impacts and reversals out. It is never
+    less than what rounding the recorded v leaves.
     """
-    rough = np.median(np.abs(np.diff(log.v, 3, axis=0)), axis=0) / (0.6745 * np.sqrt(20.0))
-    steps = np.abs(np.diff(log.v, axis=0))
-    resolution = np.min(np.where(steps > 0, steps, np.inf), axis=0)
-    sigma = np.maximum(rough, np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12))
-    return sigma * np.sqrt(min(1.0, 2 * cutoff_hz * uniform_period(log.time)))
+    run = max(log.runs(), key=lambda run: run.stop - run.start)
+    v, period = log.v[run], uniform_period(log.time[run])
+    octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
+    rough = np.median(np.abs(octave), axis=0) / 0.6745
+    steps = np.abs(np.diff(v, axis=0))
+    resolution = np.min(np.where(steps > 1e-12, steps, np.inf), axis=0)
+    rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)
+    return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
 
 
 def _as_they_are(logs: Sequence[MotionLog]) -> Samples:

@@ -7,7 +7,7 @@ then turned into named physical parameters. The same object predicts its torque 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -19,6 +19,7 @@ from armloop.motion import Motion
 
 Array = NDArray[np.float64]
 Value = float | list[float]
+Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,15 @@ class Effect(ABC):
     @abstractmethod
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         """(N, n) torque that the drive must supply in addition (or that the sensor adds)."""
+
+    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
+        """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,)."""
+
+        def torque(q: Array, v: Array, vdot: Array) -> Array:
+            motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.zeros(1, dtype=np.intp))
+            return self.torque(Context(arm, motion, inertial), parameters)[0]
+
+        return torque
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         """Whether the parameters are physically possible."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.effects.base import Array, Context, Effect, Estimate, Pointwise, Value, number
 from armloop.kinematics import regressor
+from armloop.newton_euler import inverse_dynamics
 
 
 def tilted_gravity(gravity: Array, roll: float, pitch: float) -> Array:
@@ -45,6 +46,14 @@ class GravityTilt(Effect):
         g = context.arm.gravity
         tilted = tilted_gravity(g, number(parameters["roll"]), number(parameters["pitch"]))
         return self._gravity_torque(context, tilted) - self._gravity_torque(context, g)
+
+    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
+        assert inertial is not None
+        tilted = tilted_gravity(arm.gravity, number(parameters["roll"]), number(parameters["pitch"]))
+        # Gravity torques are linear in gravity: the difference of the two directions is one of them.
+        change = inverse_dynamics(arm, inertial, tilted - arm.gravity)
+        rest = np.zeros(arm.n)
+        return lambda q, v, vdot: change(q, rest, rest)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         errors = np.sqrt(np.diag(covariance))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.effects.base import Array, Context, Effect, Estimate, Pointwise, Value, number
 from armloop.kinematics import regressor
+from armloop.newton_euler import inverse_dynamics
 
 _TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -50,6 +51,10 @@ class Payload(Effect):
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self.columns(context, 0.0) @ _link_parameters(context.arm, parameters)
+
+    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
+        others = np.zeros(10 * (arm.n - 1))
+        return inverse_dynamics(arm, np.concatenate([others, _link_parameters(arm, parameters)]))
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         mass = max(float(x[0]), 1e-3)

@@ -14,7 +14,7 @@ from armloop.blocks import folds
 from armloop.errors import InputError
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
+from armloop.motion import Motion, Samples
 from armloop.progress import Progress, silent
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import RIGID_BODY_CONDITIONING, rigid_body
@@ -116,12 +116,20 @@ def reconstruct(
             "logs": [log.name for log in logs],
             "steps": [report.to_dict() for report in found.reports],
             "notes": found.notes,
+            "range": _range(samples.motion),
             **found.history,
         },
     )
     held = score(model, samples, held_out)
     object.__setattr__(model, "baseline", {**held.moving, "rms": held.rms, "samples": held.samples})
     return Reconstruction(model, found.reports, held, found.notes)
+
+
+def _range(motion: Motion) -> list[list[float]]:
+    """Half ranges of q, v, vdot, then the centre of q: where the model knows the arm."""
+    low, high = np.quantile(motion.q, 0.005, axis=0), np.quantile(motion.q, 0.995, axis=0)
+    rates = [np.quantile(np.abs(x), 0.995, axis=0).tolist() for x in (motion.v, motion.vdot)]
+    return [(0.5 * (high - low)).tolist(), *rates, (0.5 * (high + low)).tolist()]
 
 
 def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:

@@ -1,0 +1,20 @@
+"""The one-sample recursion against the vectorised regressor."""
+
+import numpy as np
+import pytest
+
+from armloop.arm import load_arm
+from armloop.kinematics import regressor
+from armloop.newton_euler import inverse_dynamics
+
+
+@pytest.mark.parametrize("name", ["three_axis", "scara"])
+def test_one_sample_agrees_with_the_regressor(name):
+    arm = load_arm(name)
+    rng = np.random.default_rng(5)
+    parameters = rng.normal(size=10 * arm.n)
+    gravity = np.array([1.0, -2.0, -9.0])
+    torques = inverse_dynamics(arm, parameters, gravity)
+    for q, v, vdot in rng.normal(size=(10, 3, arm.n)):
+        expected = regressor(arm, q[None], v[None], vdot[None], gravity)[0] @ parameters
+        np.testing.assert_allclose(torques(q, v, vdot), expected, rtol=1e-12, atol=1e-12)

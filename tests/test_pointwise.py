@@ -1,0 +1,61 @@
+"""One sample at a time gives what the vectorised prediction gives, effects and steps included."""
+
+import numpy as np
+import pytest
+
+from armloop.arm import load_arm
+from armloop.components import RigidBody, SparseTerms
+from armloop.effects import Estimate, effect
+from armloop.kinematics import nominal_parameters
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect, ReconstructedModel, load_model
+from armloop.motion import Motion
+
+PARAMETERS = {
+    "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001},
+    "viscous_friction": {"coefficient": 0.3},
+    "coulomb_friction": {"level": 0.2},
+    "joint_spring": {"stiffness": 1.5, "rest": 0.3},
+    "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
+    "rotor_inertia": {"inertia": 0.05},
+    "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
+}
+
+
+def model_with(name: str) -> ReconstructedModel:
+    arm = load_arm("three_axis")
+    whole = name in ("payload", "gravity_tilt")
+    added = AddedEffect(
+        effect(name, None if whole else 2), {k: Estimate(v, 0.0, "") for k, v in PARAMETERS[name].items()}
+    )
+    terms = SparseTerms(2, np.array([[0, 2], [4, 10]]), np.array([[0.5, 0.0, 1.0], [0.0, 2.0, 0.3]]))
+    body = RigidBody(np.concatenate([nominal_parameters(arm), [0.1, 0.2, 0.3]]), ("m1",), np.array([1.0]))
+    joint = (
+        FrictionTerm("sign", 0.7),
+        FrictionTerm("stribeck", -0.2, 0.1),
+        FrictionTerm("viscous", 2.0),
+        FrictionTerm("load_sign", 0.03),
+    )
+    return ReconstructedModel(arm, (terms, body), FrictionLaw((joint,) * 3), effects=(added,))
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_pointwise_is_the_vectorised_prediction(name, step, tmp_path):
+    model = model_with(name)
+    model.save(tmp_path / "model.json")
+    again = load_model(tmp_path / "model.json")
+    for q, v, vdot in np.random.default_rng(1).uniform(-1, 1, (5, 3, 3)):
+        motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.array([0]))
+        expected = model.predict(motion, step)[0]
+        np.testing.assert_allclose(model.feedforward(q, v, vdot, step), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(again.predict(motion, step)[0], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_sensor_effect_is_predicted_but_not_supplied():
+    model = model_with("viscous_friction")
+    faulty = model.with_effects([AddedEffect(effect("torque_offset", 1), {"offset": Estimate(0.5, 0.0, "N*m")})])
+    q = np.array([0.1, 0.2, 0.3])
+    motion = Motion(np.zeros(1), q[None], q[None], q[None], np.array([0]))
+    assert faulty.predict(motion)[0, 0] == pytest.approx(model.predict(motion)[0, 0] + 0.5)
+    np.testing.assert_allclose(faulty.feedforward(q, q, q), model.feedforward(q, q, q))
