@@ -139,13 +139,17 @@ class ArmPlant(Diagram):
             moving = self.plant.GetJointByName(joint.name)
             moving.set_default_damping(friction.viscous)
             drive = self.plant.AddJointActuator(f"drive_{j + 1}", moving, joint.effort)
-            drive.set_default_rotor_inertia(self.effects.rotor_inertia[j])
             if servo is not None:
                 drive.set_controller_gains(PdControllerGains(p=servo.p, d=servo.d))
             slots.append(int(drive.index()))
+            last = drive
             if friction.static > 0:
                 brake = self.plant.AddJointActuator(f"friction_{j + 1}", moving, friction.static)
                 brake.set_controller_gains(PdControllerGains(p=0.0, d=STICKING_GAIN))
+                last = brake
+            # Drake 1.51 keeps the reflected inertia of a joint's last actuator only.
+            last.set_default_gear_ratio(1.0)
+            last.set_default_rotor_inertia(self.effects.rotor_inertia[j])
         return slots
 
     def _connect(self, builder: DiagramBuilder, slots: list[int], servo: ServoGains | None) -> None:

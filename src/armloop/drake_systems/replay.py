@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import replace
@@ -20,6 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 from armloop.arm import Arm
 from armloop.drake_systems.plant import add_links
 from armloop.drake_systems.tracking import TrackingResult
+from armloop.files import write_text
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def write_replay(
 
     The ghost is the reference. Arms are drawn with the URDF's own shapes (sticks when it has none, or needs meshes).
     The Meshcat server listens on the loopback interface only and ends with this call. The file is written whole or
-    not at all.
+    not at all; raises `InputError` when it cannot be.
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
@@ -64,7 +64,7 @@ def write_replay(
         diagram.ForcedPublish(context)
     visualizer.StopRecording()
     visualizer.PublishRecording()
-    _write(Path(path), meshcat.StaticHtml())
+    write_text(path, meshcat.StaticHtml())
 
 
 def _reach(arm: Arm) -> float:
@@ -113,13 +113,3 @@ def _add_sticks(
             along = RigidTransform(RotationMatrix.MakeFromOneVector(tip, 2), 0.5 * tip)
             plant.RegisterVisualGeometry(body, along, Cylinder(_STICK, length), f"stick_{i + 1}", colour)
     return instance
-
-
-def _write(path: Path, text: str) -> None:
-    """Write the file whole or not at all."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
