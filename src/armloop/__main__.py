@@ -1,0 +1,7 @@
+"""``python -m armloop``."""
+
+import sys
+
+from armloop.cli import main
+
+sys.exit(main())
