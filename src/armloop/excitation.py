@@ -38,7 +38,9 @@ class MotionRanges:
             object.__setattr__(self, name, value)
             if value.ndim != 1 or value.shape != self.lower.shape or not np.isfinite(value).all():
                 raise ValueError(f"{name} must be finite numbers, one per joint; it is {value}")
-        if not (np.all(self.lower < self.upper) and np.all(self.velocity > 0) and np.all(self.acceleration > 0)):
+        if not (
+            np.all(self.lower < self.upper) and np.all(self.velocity > 0) and np.all(self.acceleration > 0)
+        ):
             raise ValueError("each range must have lower below upper, and velocity and acceleration above 0")
 
     @property
@@ -50,7 +52,8 @@ class MotionRanges:
     def of(arm: Arm) -> MotionRanges:
         """Return ranges for an arm without stated ones: nine tenths of its travel, half its speed.
 
-        Joints without a limit get +-pi rad (+-0.1 m) and 1 rad/s (0.1 m/s); acceleration is twice the velocity.
+        Joints without a limit get +-pi rad (+-0.1 m) and 1 rad/s (0.1 m/s); acceleration is twice the
+        velocity.
         """
         turns = arm.revolute
         lower, upper, velocity = (
@@ -83,8 +86,8 @@ class FourierReference:
     """q_i(t) = c_i + s(t) sum_h [a_ih cos(w_ih t) + b_ih sin(w_ih t)], Eq. (31) of the paper.
 
     offset : (n,) c; cosine, sine, omega : (n, H) a, b, w; duration : s
-    ramp : s; the factor s(t) rises from 0 to 1 with zero velocity and acceleration at both ends (quintic), so that
-        the motion starts from rest at c; 0 for no ramp
+    ramp : s; the factor s(t) rises from 0 to 1 with zero velocity and acceleration at both ends (quintic), so
+        that the motion starts from rest at c; 0 for no ramp
     """
 
     offset: Array
@@ -127,8 +130,8 @@ def fourier_reference(
     duration : s; omega : rad/s, the interval the frequencies are drawn from; ramp : s
     fill : how much of the tightest of the three limits of each joint is used
 
-    Position, velocity and acceleration are checked on a fine grid; the amplitudes of a joint are scaled until the
-    tightest limit is met, and its centre is drawn from what travel is left.
+    Position, velocity and acceleration are checked on a fine grid; the amplitudes of a joint are scaled until
+    the tightest limit is met, and its centre is drawn from what travel is left.
     """
     rng = np.random.default_rng(seed)
     n = ranges.n
@@ -156,7 +159,8 @@ def fourier_reference(
 def paper_reference(unit: float = 0.1, periods: int = 2) -> FourierReference:
     """Return the reference of Figs. 14 and 15 for three joints: period 20 s, k in units of `unit` rad.
 
-    In plain radians (`unit=1`) the joints would turn by more than 430 degrees; with 0.1 rad they stay within 76.
+    In plain radians (`unit=1`) the joints would turn by more than 430 degrees; with 0.1 rad they stay within
+    76.
     """
     k1, k2, k3 = 2.0 * unit, 3.0 * unit, 4.0 * unit
     omega = np.tile(np.pi * np.array([0.5, 0.4, 0.3]), (3, 1))
@@ -190,10 +194,10 @@ def static_poses(ranges: MotionRanges, count: int, seed: int) -> Array:
 def static_segments(
     ranges: MotionRanges, count: int, speed: ArrayLike, duration: float, seed: int
 ) -> list[Segment]:
-    """Return two segments per pose, one in each direction, that pass the pose at mid-time with creeping speed.
+    """Return two segments per pose, one in each direction, that creep through the pose at mid-time.
 
-    speed : (n,) or scalar, rad/s (m/s); 0 dwells (one segment per pose). All joints move at once, in combinations of
-    directions that differ from pose to pose.
+    speed : (n,) or scalar, rad/s (m/s); 0 dwells (one segment per pose). All joints move at once, in
+    combinations of directions that differ from pose to pose.
     """
     rng = np.random.default_rng(seed)
     v = np.broadcast_to(np.asarray(speed, dtype=float), (ranges.n,))
@@ -211,10 +215,10 @@ def constant_velocity_segments(
 ) -> list[Segment]:
     """Return segments at many constant velocity vectors, both directions, from poses all over the ranges.
 
-    slowest : (n,) or scalar, rad/s (m/s), the least speed. No joint rests: the torque of a sticking joint is not
-    determined. Even segments draw speeds evenly up to the range's, odd ones evenly in their logarithm, so that both
-    the Stribeck and the viscous part of the friction are seen, and slow joints meet fast ones. Every second pair
-    repeats a draw with all velocities reversed.
+    slowest : (n,) or scalar, rad/s (m/s), the least speed. No joint rests: the torque of a sticking joint is
+    not determined. Even segments draw speeds evenly up to the range's, odd ones evenly in their logarithm, so
+    that both the Stribeck and the viscous part of the friction are seen, and slow joints meet fast ones.
+    Every second pair repeats a draw with all velocities reversed.
     """
     n = ranges.n
     least = np.broadcast_to(np.asarray(slowest, dtype=float), (n,))
@@ -239,7 +243,7 @@ def speeds(arm: Arm, revolute: float, prismatic: float) -> Array:
 
 
 def within(ranges: MotionRanges, references: Sequence[Reference], slack: float = 1e-9) -> bool:
-    """Tell whether references keep within the ranges of position, velocity and acceleration (on a 5 ms grid)."""
+    """Tell whether references keep within the ranges (checked on a 5 ms grid)."""
     for reference in references:
         q, v, vdot = reference.evaluate(np.arange(0.0, reference.duration, 0.005))
         if np.any(q < ranges.lower - slack) or np.any(q > ranges.upper + slack):

@@ -27,12 +27,12 @@ def inverse_dynamics_samples(
 ) -> dict[str, MotionLog]:
     """Sample states evenly from `ranges` and compute their torques: one log per condition, with `vdot`.
 
-    counts : samples per condition, in the order of `CONDITIONS` (2000, 4000, 4000 for the SCARA arm of the paper;
-        1000, 10000, 10000 for the three-axis arm). Static: v = vdot = 0; constant velocity: vdot = 0.
-    snr : signal-to-noise ratios in dB of q, v and vdot; white Gaussian noise of each joint's signal power is added
-        to the states after the torques are computed. None for exact data. A zero signal stays zero.
+    counts : samples per condition, in the order of `CONDITIONS` (2000, 4000, 4000 for the SCARA arm of the
+        paper; 1000, 10000, 10000 for the three-axis arm). Static: v = vdot = 0; constant velocity: vdot = 0.
+    snr : signal-to-noise ratios in dB of q, v and vdot; white Gaussian noise of each joint's signal power is
+        added to the states after the torques are computed. None for exact data. A zero signal stays zero.
     """
-    rng = np.random.default_rng(seed)
+    rng, noise = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     parameters = nominal_parameters(arm)
     logs = {}
     for condition, count in zip(CONDITIONS, counts, strict=True):
@@ -41,9 +41,9 @@ def inverse_dynamics_samples(
         vdot = rng.uniform(-1.0, 1.0, q.shape) * ranges.acceleration * (condition == "varying")
         tau = regressor(arm, q, v, vdot) @ parameters
         if snr is not None:
-            q, v, vdot = (_noisy(x, level, rng) for x, level in zip((q, v, vdot), snr, strict=True))
+            q, v, vdot = (_noisy(x, level, noise) for x, level in zip((q, v, vdot), snr, strict=True))
         # Unordered samples have no time; a regular one keeps the file a log.
-        logs[condition] = MotionLog(1e-3 * np.arange(count), q, v, tau, vdot, name=condition)
+        logs[condition] = MotionLog(1e-3 * np.arange(count, dtype=float), q, v, tau, vdot, name=condition)
     return logs
 
 

@@ -37,7 +37,9 @@ def healthy(arm):
 
 def added_torque(arm, healthy, *effects):
     """What the drives supply in addition on the same motion, and that motion exactly."""
-    run = SpeedModeArm(arm, FRICTION, effects=effects, instruments=IDEAL).follow(MOTION, rate=100.0, settle=0.2)
+    run = SpeedModeArm(arm, FRICTION, effects=effects, instruments=IDEAL).follow(
+        MOTION, rate=100.0, settle=0.2
+    )
     assert_allclose(run.q, healthy.q, atol=1e-4)  # a stiff drive: the motion hardly changes
     return run.tau - healthy.tau, *MOTION.evaluate(run.time)
 
@@ -111,7 +113,7 @@ def test_payload_mass_and_centre_are_exact(arm, healthy):
         arm, healthy, UndeclaredEffect("payload", None, {"mass": mass, "com": com})
     )
     # The tool is 0.35 m out on the last link, turned like it; a steel ball of 0.6 kg has 8e-5 kg m^2.
-    c = com + [0.35, 0.0, 0.0]
+    c = com + np.array([0.35, 0.0, 0.0])
     radius = (3 * mass / (4 * np.pi * 7850.0)) ** (1 / 3)
     own = 0.4 * mass * radius**2
     I = mass * (c @ c * np.eye(3) - np.outer(c, c)) + own * np.eye(3)  # noqa: E741
@@ -127,7 +129,9 @@ def test_payload_gravity_torque_by_hand(arm):
         add_links(plant, arm, realise(arm, effects))
         plant.Finalize()
         torques.append(-plant.CalcGravityGeneralizedForces(plant.CreateDefaultContext()))
-    assert_allclose(torques[1] - torques[0], 2.0 * 9.81 * np.array([0.0, 0.4 + 0.35 + 0.1, 0.35 + 0.1]), atol=1e-9)
+    assert_allclose(
+        torques[1] - torques[0], 2.0 * 9.81 * np.array([0.0, 0.4 + 0.35 + 0.1, 0.35 + 0.1]), atol=1e-9
+    )
 
 
 def test_two_effects_add_up(arm, healthy):

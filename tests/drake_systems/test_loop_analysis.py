@@ -18,8 +18,8 @@ def flywheel(tmp_path):
     path.write_text(
         """<robot name="flywheel"><link name="base"/><link name="wheel"><inertial><mass value="1"/>
         <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-        <joint name="j" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 0 1"/></joint>
-        </robot>"""
+        <joint name="j" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 0
+        1"/></joint> </robot>"""
     )
     return load_arm(path)
 
@@ -35,13 +35,17 @@ def test_flywheel_against_the_transfer_function(flywheel):
         position = ((1 - a) * inertia / d * velocity + (h - (1 - a) * inertia / d) / d) / (z - 1)
         return (kp + ki * h / (z - 1)) * position + kd * velocity
 
-    (margins,) = loop_margins(flywheel, [JointFriction(viscous=d)], PidGains([kp], [ki], [kd]), [0.0], period=h)
+    (margins,) = loop_margins(
+        flywheel, [JointFriction(viscous=d)], PidGains([kp], [ki], [kd]), [0.0], period=h
+    )
     crossing = brentq(lambda w: abs(loop(w)) - 1, 1.0, 1e3)
     assert margins.phase_margin == pytest.approx(180 + np.rad2deg(np.angle(loop(crossing))), abs=0.05)
     assert margins.gain_margin == pytest.approx(-1 / loop(np.pi / h).real, rel=1e-3)
     w = np.geomspace(0.01, 3000, 20000)
     assert margins.sensitivity_peak == pytest.approx(np.abs(1 / (1 + loop(w))).max(), rel=1e-3)
-    assert abs(loop(margins.bandwidth) / (1 + loop(margins.bandwidth))) == pytest.approx(np.sqrt(0.5), rel=0.02)
+    assert abs(loop(margins.bandwidth) / (1 + loop(margins.bandwidth))) == pytest.approx(
+        np.sqrt(0.5), rel=0.02
+    )
 
 
 def test_posture_model_of_the_three_axis_arm():
@@ -62,7 +66,8 @@ def test_the_papers_gains_are_comfortable():
     margins = loop_margins(arm, friction, PidGains.paper(3), [0.0, 0.3, -0.5])
     assert all(m.phase_margin > 35 and m.gain_margin > 2 and m.sensitivity_peak < 2 for m in margins)
     assert all(10 < m.bandwidth < 1000 for m in margins)
-    # With a derivative gain of 200 N*m*s/rad at 1 kHz joint 3 rings up: its gains must shrink, however little.
+    # With a derivative gain of 200 N*m*s/rad at 1 kHz joint 3 rings up: its gains must shrink, however
+    # little.
     wild = loop_margins(arm, friction, PidGains([80.0] * 3, [8.0] * 3, [200.0] * 3), [0.0, 0.3, -0.5])
     assert wild[2].gain_margin == np.inf
     assert 0.02 < wild[2].gain_reduction < 0.5

@@ -1,4 +1,4 @@
-"""Tracking with an exact model: the loop itself against the figures the design measured, on the scored period."""
+"""Tracking with an exact model: the loop itself, without the errors of a reconstruction."""
 
 import dataclasses
 
@@ -82,8 +82,10 @@ def test_a_model_that_is_not_finite_stops_the_run(short):
 
 
 def test_integral_removes_a_constant_error(short):
-    """Held at a pose against gravity, the integrator takes over what the proportional part left (K_p / K_i = 10 s)."""
-    still = FourierReference(np.array([0.0, 0.5, 0.3]), np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1)), 3.0)
+    """Held at a pose against gravity, the integrator takes over what the proportional part left."""
+    still = FourierReference(
+        np.array([0.0, 0.5, 0.3]), np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1)), 3.0
+    )
     gains = dataclasses.replace(short.gains, ki=np.full(3, 80.0))
     scenario = dataclasses.replace(short, reference=still, gains=gains, score=(2.5, 3.0))
     result = track(scenario, "pid", {})

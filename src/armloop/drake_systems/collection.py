@@ -1,7 +1,7 @@
 """Collect the data of a reconstruction from a simulated arm with friction, Sect. 4.3 of the paper.
 
-The drives are in speed mode (stiff servo, closed loop) and supply whatever torque the motion takes. Between segments
-the arm is put to the next start instead of being driven there: nothing of that way would be logged.
+The drives are in speed mode (stiff servo, closed loop) and supply whatever torque the motion takes. Between
+segments the arm is put to the next start instead of being driven there: nothing of that way would be logged.
 """
 
 from __future__ import annotations
@@ -50,11 +50,14 @@ class PlantConfig:
 
 @dataclass(frozen=True)
 class CollectionPlan:
-    """How much is collected. Times in s, speeds in rad/s (`_prismatic`: m/s); every segment settles, then is logged.
+    """How much is collected: every segment settles, then is logged.
+
+    Times in s, speeds in rad/s (`_prismatic`: m/s).
 
     rate : Hz of the logs
     dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
-    static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the paper)
+    static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the
+        paper)
     velocity_segments : constant velocities from `slowest` to the range's largest
     trajectories : Fourier-series trajectories, Eq. (31), of `trajectory_duration` each
     """
@@ -80,8 +83,8 @@ def collect(
 ) -> dict[str, MotionLog]:
     """Collect `static`, `constant_velocity` and `varying` logs from the simulated arm.
 
-    Only the settled part of each segment is logged; as the time before it passes, each segment is a run of its own.
-    The same seed gives the same logs.
+    Only the settled part of each segment is logged; as the time before it passes, each segment is a run of
+    its own. The same seed gives the same logs.
     """
     rig = SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=config.time_step)
     creep = 0.0 if plan.dwell else 1.0
@@ -100,7 +103,8 @@ def collect(
         seed,
     )
     varying = [
-        fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k) for k in range(plan.trajectories)
+        fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k)
+        for k in range(plan.trajectories)
     ]
     parts: list[tuple[str, Sequence[Reference], float]] = [
         ("static", static, plan.static_settle),
@@ -163,5 +167,5 @@ def _as_log(
     tau = tau + instruments.torque_noise * rms * rng.standard_normal(tau.shape)
     # No more digits than the instruments have: the files stay small.
     return MotionLog(
-        np.round(np.concatenate(time), 6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
+        np.concatenate(time).round(6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
     )

@@ -1,7 +1,8 @@
 """Effects that a plant has and nobody declared, put into the simulated arm itself.
 
-The laws are those of the diagnosis, with its sign: what the drive must supply *in addition* (a spring k (q - q0)
-pulls on the plant with -k (q - q0)), or what the sensor says. Nothing here knows how they are found again.
+The laws are those of the diagnosis, with its sign: what the drive must supply *in addition* (a spring k (q -
+q0) pulls on the plant with -k (q - q0)), or what the sensor says. Nothing here knows how they are found
+again.
 """
 
 from __future__ import annotations

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 class ExactModel:
     """Inverse dynamics of the plant (Drake) and Eq. (34), by steps as a reconstructed model has them.
 
-    Step 1: gravity and dry friction as seen at creeping speed, f_s sign(v). Step 2: Coriolis and centrifugal terms
-    and the whole of Eq. (34). Step 3: inertia. `effects` may hold a payload, a tilt and added friction.
+    Step 1: gravity and dry friction as seen at creeping speed, f_s sign(v). Step 2: Coriolis and centrifugal
+    terms and the whole of Eq. (34). Step 3: inertia. `effects` may hold a payload, a tilt and added friction.
     """
 
     def __init__(

@@ -21,12 +21,12 @@ class FeedforwardModel(Protocol):
 class Feedforward(LeafSystem):
     """Torque that a model says the reference needs: the sum of Y^S Xi^S over steps in Eqs. (35), (36).
 
-    tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with velocity
-    terms, 3 with acceleration terms.
+    tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with
+    velocity terms, 3 with acceleration terms.
 
     Input ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each. Output port: `tau_ff` (n,), N*m (N).
-    Stateless, direct feedthrough; scalar type float only. A prediction that is not finite raises `RuntimeError`:
-    an unset or NaN torque would silently spoil a simulation.
+    Stateless, direct feedthrough; scalar type float only. A prediction that is not finite raises
+    `RuntimeError`: an unset or NaN torque would silently spoil a simulation.
     """
 
     def __init__(self, model: FeedforwardModel, n: int, step: int = 3) -> None:

@@ -36,7 +36,7 @@ class JointFriction:
             raise ValueError(f"stribeck_velocity {self.stribeck_velocity} must be above 0")
 
     def dry(self, v: ArrayLike) -> NDArray[np.float64]:
-        """Return the part with sign(v) at velocities `v` (any shape); 0 at rest, where it is not determined."""
+        """Return the part with sign(v) at `v` (any shape); 0 at rest, where it is not determined."""
         v = np.asarray(v, dtype=float)
         level = self.coulomb + (self.static - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
         return np.asarray(level * np.sign(v))

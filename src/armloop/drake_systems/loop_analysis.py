@@ -1,9 +1,10 @@
 """How much room a PID loop has before it rings: margins of each joint's loop about a posture.
 
-The arm at rest at q0 is linearised, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the stiffness
-of gravity. Dry friction is not linear and left out: it only adds damping where the joint slides. The controller is
-discrete, so the arm is sampled with a zero-order hold. The loop of joint i is cut at its drive while the other
-joints' loops stay closed, and judged from frequency-response data up to the Nyquist frequency.
+The arm at rest at q0 is linearised, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the
+stiffness of gravity. Dry friction is not linear and left out: it only adds damping where the joint slides.
+The controller is discrete, so the arm is sampled with a zero-order hold. The loop of joint i is cut at its
+drive while the other joints' loops stay closed, and judged from frequency-response data up to the Nyquist
+frequency.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ class LoopMargins:
     """One joint's loop.
 
     gain_margin : factor above 1 by which the gains may grow (inf: any)
-    gain_reduction : factor below 1 to which they may shrink (0: any); an arm that gravity tips over needs some gain
+    gain_reduction : factor below 1 to which they may shrink (0: any); an arm that gravity tips over needs
+        some gain
     phase_margin : deg
     bandwidth : rad/s, where the closed loop's gain first falls to 0.707; inf if it does not below Nyquist
     sensitivity_peak : largest |1 / (1 + L)|; below 2 is comfortable
@@ -81,7 +83,9 @@ def loop_margins(
     sampled = control.sample_system(control.ss(A, B, np.eye(2 * n), np.zeros((2 * n, n))), period, "zoh")
     w = np.geomspace(1e-2, np.pi / period, points)
     z = np.exp(1j * w * period)
-    X = np.linalg.solve(z[:, None, None] * np.eye(2 * n) - sampled.A, np.broadcast_to(sampled.B, (points, 2 * n, n)))
+    X = np.linalg.solve(
+        z[:, None, None] * np.eye(2 * n) - sampled.A, np.broadcast_to(sampled.B, (points, 2 * n, n))
+    )
     # The controller's law, with the sum that stands for the integral.
     position = gains.kp + gains.ki * period / (z[:, None] - 1)
     L = position[:, :, None] * X[:, :n] + gains.kd[:, None] * X[:, n:]  # (points, n, n)

@@ -26,7 +26,12 @@ class PidGains:
         for name in ("kp", "ki", "kd"):
             value = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
             object.__setattr__(self, name, value)
-            if value.ndim != 1 or value.shape != self.kp.shape or not np.isfinite(value).all() or np.any(value < 0):
+            if (
+                value.ndim != 1
+                or value.shape != self.kp.shape
+                or not np.isfinite(value).all()
+                or np.any(value < 0)
+            ):
                 raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
 
     @staticmethod
@@ -38,11 +43,11 @@ class PidGains:
 class PidController(LeafSystem):
     """tau = K_p e + K_i integral(e) + K_d de/dt + tau_ff, with e = q_ref - q and de/dt = v_ref - v.
 
-    q is read through encoders of the given resolution; v is the joint module's own velocity signal. The integral is
-    the sum of e times the period (forward Euler).
+    q is read through encoders of the given resolution; v is the joint module's own velocity signal. The
+    integral is the sum of e times the period (forward Euler).
 
-    Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output port: `tau` (n,), held by the discrete plant,
-    whose time step must be `period`. One discrete state (n,), the integral. Scalar type float only.
+    Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output port: `tau` (n,), held by the discrete
+    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar type float only.
     """
 
     def __init__(self, gains: PidGains, period: float, resolution: ArrayLike = 0.0) -> None:

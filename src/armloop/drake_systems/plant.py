@@ -2,7 +2,8 @@
 
 Drake 1.51 has no dry friction in joints (a URDF's `<dynamics friction>` only warns). Eq. (34) is split into
 
-- -clamp(d v, +-f_s): a second actuator on every joint with a pure, very stiff velocity gain and effort limit f_s.
+- -clamp(d v, +-f_s): a second actuator on every joint with a pure, very stiff velocity gain and effort limit
+f_s.
   Drake's discrete solver applies gains and limits implicitly, so the joint sticks below f_s;
 - +(f_s - f_c) (1 - exp(-(v/v_s)^2)) sign(v): smooth, from the system `JointLoads`;
 - -f_v v: the joint's damping, implicit too.
@@ -59,8 +60,8 @@ class JointLoads(LeafSystem):
 
     tau_i = (f_s - f_c)_i (1 - exp(-(v_i/v_si)^2)) sign(v_i) - sum k (q_i - q0) - sum A sin(N q_i + phi)
 
-    Input port `state`: (2n,) positions, then velocities. Output port `tau`: (n,) generalized forces on the plant.
-    Stateless; not for scalar types other than float.
+    Input port `state`: (2n,) positions, then velocities. Output port `tau`: (n,) generalized forces on the
+    plant. Stateless; not for scalar types other than float.
     """
 
     def __init__(self, friction: Sequence[JointFriction], springs: Array, ripples: Array) -> None:
@@ -184,8 +185,8 @@ class ArmPlant(Diagram):
 
         state : (N, 2n) at the end of each step; desired_state : (N, 2n) that was set for that end
 
-        The solver applies the law implicitly, so it holds with the state at the end of the step. (The plant's own
-        port `net_actuation` gives the sum with the friction when both actuators of a joint have gains.)
+        The solver applies the law implicitly, so it holds with the state at the end of the step. (The plant's
+        own port `net_actuation` gives the sum with the friction when both actuators of a joint have gains.)
         """
         if self._servo is None:
             raise ValueError("this plant's drives are in torque mode: it was built without a servo")
@@ -203,7 +204,8 @@ class ArmPlant(Diagram):
 def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = None) -> None:
     """Add an arm's links and joints to a plant that is not finalized, payloads and the base's tilt included.
 
-    Links are `link_1`.. and keep the frames of `arm`; joints keep their names and limits. The world is the base.
+    Links are `link_1`.. and keep the frames of `arm`; joints keep their names and limits. The world is the
+    base.
 
     Raises `ArmError` when a link's inertia is not that of a body.
     """

@@ -11,10 +11,10 @@ from armloop.excitation import Reference
 
 
 class ReferenceSource(LeafSystem):
-    """Give q_ref(t), v_ref(t), vdot_ref(t), held over each period (as a controller running at that period reads it).
+    """Give q_ref(t), v_ref(t), vdot_ref(t), held over each period as a controller of that period reads it.
 
-    Output ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, in rad, rad/s, rad/s^2 (m, ..). After the reference's
-    duration the last values are held. The reference is evaluated once, on construction.
+    Output ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, in rad, rad/s, rad/s^2 (m, ..). After the
+    reference's duration the last values are held. The reference is evaluated once, on construction.
     """
 
     def __init__(self, reference: Reference, period: float) -> None:

@@ -35,9 +35,9 @@ def write_replay(
 ) -> None:
     """Write a replay of tracking runs: the arms side by side, a colour per controller, each in a grey ghost.
 
-    The ghost is the reference. Arms are drawn with the URDF's own shapes (sticks when it has none, or needs meshes).
-    The Meshcat server listens on the loopback interface only and ends with this call. The file is written whole or
-    not at all; raises `InputError` when it cannot be.
+    The ghost is the reference. Arms are drawn with the URDF's own shapes (sticks when it has none, or needs
+    meshes). The Meshcat server listens on the loopback interface only and ends with this call. The file is
+    written whole or not at all; raises `InputError` when it cannot be.
     """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)

@@ -1,7 +1,7 @@
 """The fields of scenario files, with their units and defaults: plain data, as `pydrake.common.yaml` reads it.
 
-Checks are in `scenarios`. No postponed annotations here: the reader looks at the types themselves, and it knows
-`Optional[X]`, not `X | None`.
+Checks are in `scenarios`. No postponed annotations here: the reader looks at the types themselves, and it
+knows `Optional[X]`, not `X | None`.
 """
 
 from dataclasses import dataclass, field
@@ -37,7 +37,7 @@ class PlantData:
 
     arm: str = ""  # built-in name, or the path of a URDF, from the scenario's folder
     friction: list[FrictionData] = field(default_factory=list)  # one per joint, base to tip
-    ranges: Optional[RangesData] = None  # noqa: UP045; default: from the limits
+    ranges: Optional[RangesData] = None  # noqa: UP045 -- from the limits when absent
     time_step: float = 0.001  # s, of the plant and of the controllers
     encoder_counts: int = 524288  # per revolution; 0 for ideal encoders
     prismatic_lead: float = 0.02  # m per revolution of a sliding joint's screw
@@ -79,7 +79,7 @@ class TrackingData:
     """A tracking experiment."""
 
     plant: str = ""  # a plant of plants.yaml, or empty when `own_plant` is given
-    own_plant: Optional[PlantData] = None  # noqa: UP045
+    own_plant: Optional[PlantData] = None
     kp: list[float] = field(default_factory=lambda: [80.0])  # N*m/rad (N/m); one number, or one per joint
     ki: list[float] = field(default_factory=lambda: [8.0])  # N*m/(rad s)
     kd: list[float] = field(default_factory=lambda: [2.0])  # N*m*s/rad

@@ -1,8 +1,8 @@
 """Scenarios: plants, collection plans and tracking experiments as YAML data, checked at the door.
 
 Files are read with `pydrake.common.yaml` into the plain dataclasses of `scenario_data`, then
-validated and turned into the frozen types of the simulation. Whatever is wrong raises `ScenarioError`, one line that
-names the file and the field.
+validated and turned into the frozen types of the simulation. Whatever is wrong raises `ScenarioError`, one
+line that names the file and the field.
 """
 
 from __future__ import annotations
@@ -86,7 +86,12 @@ def load_plan(name: str) -> CollectionPlan:
     path = scenario_path("collection")
     data = _entry(path, name, PlanData)
     where = f"{path}: {name}"
-    for key, least in (("rate", 10.0), ("static_hold", 0.02), ("velocity_hold", 0.02), ("trajectory_duration", 5.0)):
+    for key, least in (
+        ("rate", 10.0),
+        ("static_hold", 0.02),
+        ("velocity_hold", 0.02),
+        ("trajectory_duration", 5.0),
+    ):
         if not getattr(data, key) >= least:
             raise ScenarioError(f"{where}: {key} is {getattr(data, key)}; it must be at least {least}")
     for key, value in dataclasses.asdict(data).items():
@@ -111,7 +116,9 @@ def load_tracking(spec: str | Path) -> TrackingScenario:
     if data.own_plant is not None:
         plant = _plant(path.stem, data.own_plant, path, "own_plant")
     elif data.plant not in plant_names():
-        raise ScenarioError(f"{path}: plant: {data.plant!r} is unknown; there are: {', '.join(plant_names())}")
+        raise ScenarioError(
+            f"{path}: plant: {data.plant!r} is unknown; there are: {', '.join(plant_names())}"
+        )
     else:
         plant = load_plant(data.plant)
     reference = _reference(data, plant, path)
@@ -124,7 +131,7 @@ def load_tracking(spec: str | Path) -> TrackingScenario:
         raise ScenarioError(f"{path}: controllers: {given}; there are: {', '.join(CONTROLLERS)}")
     if len(data.score) != 2 or not 0 <= data.score[0] < data.score[1] <= reference.duration + 1e-9:
         raise ScenarioError(
-            f"{path}: score is {data.score}; it must be a start and an end within 0 to {reference.duration:g} s"
+            f"{path}: score is {data.score}; it must be a start and an end in 0 to {reference.duration:g} s"
         )
     return TrackingScenario(
         path.stem,
@@ -141,15 +148,23 @@ def _reference(data: TrackingData, plant: Plant, path: Path) -> Reference:
     wanted = data.reference
     if wanted.kind == "paper":
         if plant.arm.n != 3:
-            raise ScenarioError(f"{path}: reference: the paper's is for 3 joints; {plant.arm.name} has {plant.arm.n}")
+            raise ScenarioError(
+                f"{path}: reference: the paper's is for 3 joints; {plant.arm.name} has {plant.arm.n}"
+            )
         if not 1 <= wanted.periods <= _LONGEST / 20:
-            raise ScenarioError(f"{path}: reference.periods is {wanted.periods}; it must be 1 to {_LONGEST / 20:g}")
+            raise ScenarioError(
+                f"{path}: reference.periods is {wanted.periods}; it must be 1 to {_LONGEST / 20:g}"
+            )
         if not 0 < wanted.unit <= 1:
-            raise ScenarioError(f"{path}: reference.unit is {wanted.unit}; it must be above 0 and at most 1 rad")
+            raise ScenarioError(
+                f"{path}: reference.unit is {wanted.unit}; it must be above 0 and at most 1 rad"
+            )
         reference = paper_reference(wanted.unit, wanted.periods)
     elif wanted.kind == "fourier":
         if not 5 <= wanted.duration <= _LONGEST:
-            raise ScenarioError(f"{path}: reference.duration is {wanted.duration}; it must be 5 to {_LONGEST:g} s")
+            raise ScenarioError(
+                f"{path}: reference.duration is {wanted.duration}; it must be 5 to {_LONGEST:g} s"
+            )
         reference = fourier_reference(plant.config.ranges, wanted.duration, data.random_seed)
     else:
         raise ScenarioError(f"{path}: reference.kind is {wanted.kind!r}; it must be paper or fourier")
@@ -172,7 +187,9 @@ def _plant(name: str, data: PlantData, path: Path, where: str) -> Plant:
     except ArmError as error:
         raise ScenarioError(f"{path}: {where}: arm: {error}") from error
     if len(data.friction) != arm.n:
-        raise ScenarioError(f"{path}: {where}: friction has {len(data.friction)} joints; {arm.name} has {arm.n}")
+        raise ScenarioError(
+            f"{path}: {where}: friction has {len(data.friction)} joints; {arm.name} has {arm.n}"
+        )
     friction = []
     for j, values in enumerate(data.friction):
         try:
@@ -236,7 +253,7 @@ def _entry(path: Path, name: str, schema: type[T]) -> T:
 
 
 def _typed(path: Path, raw: Any, schema: type[T], name: str | None) -> T:
-    """Check fields and types with messages a person understands, then let Drake's reader build the dataclass."""
+    """Check fields and types, with messages a person understands; then let Drake's reader do its part."""
     _check(raw, schema, f"{path}: {name}" if name else str(path))
     try:
         return yaml_load_typed(schema=schema, filename=str(path), child_name=name, defaults=schema())

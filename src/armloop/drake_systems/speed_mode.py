@@ -30,7 +30,8 @@ STIFF = ServoGains(p=1e6, d=1e4)
 class Instruments:
     """What the arm is measured with.
 
-    encoder_counts : per revolution, and per `prismatic_lead` metres of a sliding joint (its screw); 0 for ideal ones
+    encoder_counts : per revolution, and per `prismatic_lead` metres of a sliding joint (its screw); 0 for
+        ideal ones
     torque_noise : standard deviation of white noise on the torque, as a part of each joint's RMS in the log
     velocity_half_window : s; v is the central difference of the recorded q over this time to both sides
     """
@@ -108,18 +109,18 @@ class SpeedModeArm:
         self._simulator = Simulator(builder.Build())
 
     def follow(self, reference: Reference, *, rate: float = 500.0, settle: float = 0.0) -> Recording:
-        """Start on the reference, follow it to its end and record from `settle` seconds on, `rate` Hz at most.
+        """Start on the reference, follow it to its end; record from `settle` seconds on, `rate` Hz at most.
 
-        q is read from the encoders; v is their central difference over `velocity_half_window` to both sides, as an
-        offline logger computes it (zero phase). tau is the drives' torque, without the friction, averaged over the
-        steps before and after the sample, which centres it on the sample's time.
+        q is read from the encoders; v is their central difference over `velocity_half_window` to both sides,
+        as an offline logger computes it (zero phase). tau is the drives' torque, without the friction,
+        averaged over the steps before and after the sample, which centres it on the sample's time.
         """
         arm, n, context = self.arm, self.arm.n, self._simulator.get_mutable_context()
         half = max(1, round(self.instruments.velocity_half_window / self._step))
         last = round(reference.duration / self._step)
         first = max(half, round(settle / self._step))
         steps = last + half  # what the central difference needs beyond the end
-        t = self._step * np.arange(steps + 1)
+        t: Array = self._step * np.arange(steps + 1, dtype=float)
         q_d, v_d, _ = reference.evaluate(t)
         desired = np.hstack([q_d, v_d])
         self._source.set_rows(desired[1:])

@@ -1,4 +1,4 @@
-"""Closed-loop tracking of a reference by PID with and without a model, Eqs. (35), (36) and Fig. 15 of the paper."""
+"""Closed-loop tracking by PID with and without a model: Eqs. (35), (36) and Fig. 15 of the paper."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class TrackingResult:
     """How one controller tracked.
 
     time (N,); q_ref, q, tau (N, n) over the whole run, q the true positions, tau the drives' torques
-    scored : the samples that eta, rms and largest, (n,) each in `unit`, are of: mean absolute, root mean square and
-        largest absolute error; unit : per joint, "deg" or "mm"
+    scored : the samples that eta, rms and largest, (n,) each in `unit`, are of: mean absolute, root mean
+        square and largest absolute error; unit : per joint, "deg" or "mm"
     """
 
     controller: str
