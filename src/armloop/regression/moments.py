@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 Array = NDArray[np.float64]
+
+#: A column whose part outside the others is smaller than this (squared, relative) is theirs already.
+DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +54,35 @@ class Moments:
         scale = 1 / np.sqrt(np.maximum(np.diag(sub.G), 1e-300))
         G = sub.G * np.outer(scale, scale)
         ridge = 1e-13 * len(G)
-        factor = cho_factor(G + ridge * np.eye(len(G)))
-        return scale * cho_solve(factor, scale * sub.b)
+        factor = cho_factor(G + ridge * np.eye(len(G)), check_finite=False)
+        return scale * cho_solve(factor, scale * sub.b, check_finite=False)
+
+    def gains(self, support: NDArray[np.intp], others: NDArray[np.intp] | None = None) -> tuple[float, Array]:
+        """Squared error of a support, and by how much each further column alone would lower it.
+
+        Args:
+            others: (m,) columns asked about; all by default. Columns that the support spans gain nothing.
+        """
+        others = np.arange(len(self.b)) if others is None else others
+        size, b = np.diag(self.G)[others], self.b[others]
+        if len(support) == 0:
+            return self.yy, b**2 / np.maximum(size, 1e-300)
+        scale = 1 / np.sqrt(np.maximum(np.diag(self.G)[support], 1e-300))
+        S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
+        L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
+        H = solve_triangular(L, scale[:, None] * self.G[np.ix_(support, others)], lower=True, check_finite=False)
+        h = solve_triangular(L, scale * self.b[support], lower=True, check_finite=False)
+        own = size - np.einsum("kp,kp->p", H, H)
+        gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, 1e-300), 0.0)
+        return max(self.yy - float(h @ h), 0.0), gains
+
+    def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
+        """Squared error of a support, and by how much dropping each of its columns alone would raise it."""
+        scale = 1 / np.sqrt(np.maximum(np.diag(self.G)[support], 1e-300))
+        S = self.G[np.ix_(support, support)] * np.outer(scale, scale) + 1e-12 * np.eye(len(support))
+        inverse = np.linalg.inv(S)
+        beta = inverse @ (scale * self.b[support])
+        return max(self.yy - float(beta @ (scale * self.b[support])), 0.0), beta**2 / np.diag(inverse)
 
     def squared_error(self, beta: Array, columns: NDArray[np.intp] | None = None) -> float:
         """Σ (y − x β)² for given coefficients; round-off can make it slightly negative, so it is clipped."""

@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from sklearn.linear_model import lars_path_gram
 
-from armloop.regression.moments import Moments
+from armloop.regression.moments import DEPENDENT, Moments
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 ESTIMATORS = ("lasso_ebic", "lasso", "least_squares")
 
-# A column whose part outside the forced ones is smaller than this (squared, relative) is theirs already.
-_DEPENDENT = 1e-9
 # Relative squared error below which data count as noise-free: round-off of the normal equations.
 _FLOOR = 1e-12
 
@@ -99,7 +97,7 @@ def _project_out(moments: Moments, forced: Index) -> tuple[Index, Moments]:
         H = solve_triangular(L, d[:, None] * moments.G[np.ix_(forced, free)], lower=True)
         h = solve_triangular(L, d * moments.b[forced], lower=True)
         G, b, yy = G - H.T @ H, b - H.T @ h, yy - float(h @ h)
-    left = np.diag(G) > _DEPENDENT * np.maximum(size, 1e-300)
+    left = np.diag(G) > DEPENDENT * np.maximum(size, 1e-300)
     free, G, b = free[left], G[np.ix_(left, left)], b[left]
     scale = 1 / np.sqrt(np.diag(G))
     return free.astype(np.intp), Moments(G * np.outer(scale, scale), b * scale, max(yy, 0.0), moments.count)
@@ -164,19 +162,6 @@ class _Search:
                     return support
             support, score = candidate, best_score
 
-    def _gains(self, support: Index) -> tuple[float, Array]:
-        """Squared error of the support, and by how much each further column would lower it."""
-        G, b = self.problem.G, self.problem.b
-        if len(support) == 0:
-            return self.problem.yy, b**2
-        L = np.linalg.cholesky(G[np.ix_(support, support)] + 1e-12 * np.eye(len(support)))
-        H = solve_triangular(L, G[support], lower=True)
-        h = solve_triangular(L, b[support], lower=True)
-        left = 1 - np.einsum("kp,kp->p", H, H)
-        gains = np.where(left > _DEPENDENT, (b - h @ H) ** 2 / np.maximum(left, _DEPENDENT), 0.0)
-        gains[support] = 0.0
-        return self.problem.yy - float(h @ h), gains
-
     def _best_add(self, support: Index) -> tuple[float, Index]:
         if len(support) >= self.max_terms:
             return np.inf, support
@@ -184,9 +169,17 @@ class _Search:
         j = int(np.argmax(gains))
         return float(self.criterion(rss - gains[j], len(support) + 1)), np.append(support, j)
 
+    def _gains(self, support: Index) -> tuple[float, Array]:
+        rss, gains = self.problem.gains(support)
+        gains[support] = 0.0
+        return rss, gains
+
     def _best_drop(self, support: Index) -> tuple[float, Index]:
-        options = [(self.score(np.delete(support, k)), np.delete(support, k)) for k in range(len(support))]
-        return min(options, key=lambda option: option[0], default=(np.inf, support))
+        if len(support) == 0:
+            return np.inf, support
+        rss, losses = self.problem.losses(support)
+        k = int(np.argmin(losses))
+        return float(self.criterion(rss + losses[k], len(support) - 1)), np.delete(support, k)
 
     def _best_swap(self, support: Index) -> tuple[float, Index]:
         best: tuple[float, Index] = (np.inf, support)
