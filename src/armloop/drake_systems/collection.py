@@ -55,6 +55,7 @@ class CollectionPlan:
     Times in s, speeds in rad/s (`_prismatic`: m/s).
 
     rate : Hz of the logs
+    segment_time_step : of the plant during segments of constant velocity, where nothing changes fast
     dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
     static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the
         paper)
@@ -63,6 +64,7 @@ class CollectionPlan:
     """
 
     rate: float = 250.0
+    segment_time_step: float = 2e-3
     dwell: bool = False
     static_poses: int = 60
     static_speed: float = float(np.deg2rad(0.1))
@@ -86,7 +88,10 @@ def collect(
     Only the settled part of each segment is logged; as the time before it passes, each segment is a run of
     its own. The same seed gives the same logs.
     """
-    rig = SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=config.time_step)
+    coarse, fine = (
+        SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=step)
+        for step in (plan.segment_time_step, config.time_step)
+    )
     creep = 0.0 if plan.dwell else 1.0
     static = static_segments(
         config.ranges,
@@ -106,16 +111,16 @@ def collect(
         fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k)
         for k in range(plan.trajectories)
     ]
-    parts: list[tuple[str, Sequence[Reference], float]] = [
-        ("static", static, plan.static_settle),
-        ("constant_velocity", constant, plan.velocity_settle),
-        ("varying", varying, 0.0),
+    parts: list[tuple[str, SpeedModeArm, Sequence[Reference], float]] = [
+        ("static", coarse, static, plan.static_settle),
+        ("constant_velocity", coarse, constant, plan.velocity_settle),
+        ("varying", fine, varying, 0.0),
     ]
-    total = sum(reference.duration for _, references, _ in parts for reference in references)
+    total = sum(reference.duration for _, _, references, _ in parts for reference in references)
     noise = np.random.default_rng(seed)
     logs: dict[str, MotionLog] = {}
     done = 0.0
-    for name, references, settle in parts:
+    for name, rig, references, settle in parts:
         recordings = []
         for reference in references:
             recordings.append(rig.follow(reference, rate=plan.rate, settle=settle))

@@ -49,6 +49,7 @@ class PlanData:
     """How much is collected; see `CollectionPlan`."""
 
     rate: float = 250.0  # Hz of the logs
+    segment_time_step: float = 0.002  # s, of the plant during segments of constant velocity
     dwell: bool = False  # stand still at the static poses instead of creeping
     static_poses: int = 60  # each in both directions
     static_speed: float = 0.0017453292519943296  # rad/s (0.1 deg/s)

@@ -97,6 +97,8 @@ def load_plan(name: str) -> CollectionPlan:
     for key, value in dataclasses.asdict(data).items():
         if value < 0:
             raise ScenarioError(f"{where}: {key} is {value}; it must not be negative")
+    if not _FINEST <= data.segment_time_step <= _COARSEST:
+        raise ScenarioError(f"{where}: segment_time_step must be {_FINEST:g} to {_COARSEST:g} s")
     for key in ("static_settle", "velocity_settle"):
         if getattr(data, key) <= 10.0 / data.rate:
             raise ScenarioError(f"{where}: {key} must be above 10 sample periods, {10.0 / data.rate} s")

@@ -39,7 +39,7 @@ class Instruments:
     encoder_counts: int = 2**19
     prismatic_lead: float = 0.02
     torque_noise: float = 0.01
-    velocity_half_window: float = 0.005
+    velocity_half_window: float = 0.006
 
     def resolution(self, arm: Arm) -> Array:
         """Return (n,) rad (m) per count, 0 for ideal encoders."""

@@ -1,0 +1,69 @@
+"""The small systems of the tracking loop: ports by name, laws by hand."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.drake_systems.feedforward import Feedforward
+from armloop.drake_systems.pid import PidController, PidGains
+from armloop.drake_systems.reference import ReferenceSource
+from armloop.excitation import paper_reference
+
+
+class Recorder:
+    """A model that gives q + 10 v + 100 vdot, by steps."""
+
+    def feedforward(self, q, v, vdot, step):
+        return q + 10 * v * (step > 1) + 100 * vdot * (step > 2)
+
+
+@pytest.mark.parametrize(("step", "expected"), [(1, 1.0), (2, 21.0), (3, 321.0)])
+def test_feedforward_takes_the_reference_on_named_ports(step, expected):
+    system = Feedforward(Recorder(), 2, step)
+    context = system.CreateDefaultContext()
+    for name, value in (("q_ref", 1.0), ("v_ref", 2.0), ("vdot_ref", 3.0)):
+        system.GetInputPort(name).FixValue(context, np.full(2, value))
+    assert_allclose(system.GetOutputPort("tau_ff").Eval(context), expected)
+
+
+def test_reference_source_holds_between_periods():
+    reference = paper_reference()
+    source = ReferenceSource(reference, 1e-2)
+    context = source.CreateDefaultContext()
+    for t, sampled in ((0.0, 0.0), (1.0, 1.0), (7.1302, 7.13), (100.0, 40.0)):
+        context.SetTime(t)
+        values = [source.GetOutputPort(name).Eval(context) for name in ("q_ref", "v_ref", "vdot_ref")]
+        assert_allclose(values, [row[0] for row in reference.evaluate(sampled)], atol=1e-12)
+
+
+def pid_torque(resolution, q=0.1):
+    pid = PidController(PidGains([80.0, 40.0], [8.0, 4.0], [2.0, 1.0]), 0.5, resolution)
+    context = pid.CreateDefaultContext()
+    pid.GetInputPort("q_ref").FixValue(context, [0.3, 0.0])
+    pid.GetInputPort("v_ref").FixValue(context, [1.0, 0.0])
+    pid.GetInputPort("tau_ff").FixValue(context, [5.0, -5.0])
+    pid.GetInputPort("state").FixValue(context, [q, 0.2, 0.4, -1.0])
+    context.SetDiscreteState(np.array([0.25, 0.5]))
+    updated = pid.EvalUniquePeriodicDiscreteUpdate(context).value()
+    return pid.GetOutputPort("tau").Eval(context), updated
+
+
+def test_pid_law_and_its_integral():
+    """Eq. (35): 80 e + 8 int + 2 de + ff, and the integral grows by e times the period."""
+    tau, integral = pid_torque(0.0)
+    assert_allclose(tau, [80 * 0.2 + 8 * 0.25 + 2 * 0.6 + 5.0, -40 * 0.2 + 4 * 0.5 + 1.0 - 5.0])
+    assert_allclose(integral, [0.25 + 0.5 * 0.2, 0.5 - 0.5 * 0.2])
+
+
+def test_pid_reads_q_through_the_encoder():
+    exact, _ = pid_torque(0.0, q=0.1)
+    coarse, _ = pid_torque(0.1, q=0.131)
+    assert_allclose(coarse, exact)
+
+
+@pytest.mark.parametrize(
+    "bad", [([80.0], [8.0], [-2.0]), ([80.0, 80.0], [8.0], [2.0]), ([np.inf], [8.0], [2.0])]
+)
+def test_gains_are_checked(bad):
+    with pytest.raises(ValueError, match="at least 0, one per joint"):
+        PidGains(*bad)
