@@ -1,0 +1,116 @@
+"""A report: sections of text, tables, formulas and figures, as one HTML file that needs nothing else.
+
+Figures go in as SVG whose frame and text colours follow the page, light or dark; dense parts of them are
+rasterised. Nothing is loaded from anywhere.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import dataclass, field
+
+import matplotlib
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from armloop import __version__
+from armloop.reports.plots.style import GRID, INK, MUTED, SURFACE
+from armloop.reports.tables import Table
+
+_THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE: "var(--surface)"}
+_DPI = 150
+#: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
+_REM_PER_INCH = 6.4
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with a caption that says what it shows."""
+
+    figure: Figure
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A headline figure: a number in large type, what it is, and a word on it."""
+
+    figure: str
+    title: str
+    text: str = ""
+    tone: str = "plain"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a report.
+
+    Attributes:
+        title: heading; it appears in the table of contents.
+        text: paragraphs that say what was done, why, and what the figures show.
+        tables, pictures: shown in this order after the text.
+        formulas: (summary, preformatted text) pairs, folded away until asked for.
+        notes: remarks that the reader must not miss.
+    """
+
+    title: str
+    text: list[str] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    formulas: list[tuple[str, str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def anchor(self) -> str:
+        """The section's identifier within the page."""
+        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class Report:
+    """A whole page: a title, a sentence or two, headline cards, links to files beside it, sections."""
+
+    title: str
+    lead: str
+    sections: list[Section]
+    cards: list[Card] = field(default_factory=list)
+    links: list[tuple[str, str]] = field(default_factory=list)
+    hero: Picture | None = None
+
+
+def render(report: Report) -> str:
+    """Render a report as one self-contained HTML page."""
+    environment = Environment(
+        loader=PackageLoader("armloop.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["svg"] = lambda figure: Markup(svg(figure))
+    return environment.get_template("report.html").render(report=report, version=__version__)
+
+
+def svg(figure: Figure) -> str:
+    """A figure as an ``<svg>`` element that takes its frame colours from the page."""
+    text = io.StringIO()
+    # a fixed salt makes equal figures equal text; without a date the file does not change from run to run
+    with matplotlib.rc_context({"svg.hashsalt": "armloop", "svg.fonttype": "path"}):
+        figure.savefig(text, format="svg", dpi=_DPI, metadata={"Date": None})
+    body = text.getvalue()
+    body = body[body.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r"<!--.*?-->\n?", "", body, flags=re.DOTALL)
+    body = re.sub(
+        r' id="(?:figure|axes|patch|text|line2d|matplotlib|xtick|ytick|legend)[\w.]*_\d+"', "", body
+    )
+    body = re.sub(r'(?<= d=")[^"]*', _shorter, body)
+    for color, variable in _THEME.items():
+        body = body.replace(color, variable)
+    # the page decides the width; the view box keeps the proportions
+    body = re.sub(r' (?:width|height)="[\d.]+pt"', "", body, count=2)
+    width = f"max-width:{_REM_PER_INCH * figure.get_figwidth():.1f}rem"
+    return body.replace("<svg ", f'<svg style="{width}" role="img" ', 1)
+
+
+def _shorter(match: re.Match[str]) -> str:
+    """Coordinates to a hundredth of a point: finer than any screen."""
+    return re.sub(r"(\d\.\d\d)\d+", r"\1", match[0]).replace("\n", " ")

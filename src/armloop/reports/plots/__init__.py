@@ -1,0 +1,23 @@
+"""Figures of the reports: each function takes results and returns a matplotlib figure."""
+
+from armloop.reports.plots.conditions import clusters_figure
+from armloop.reports.plots.orders import has_trials, orders_figure
+from armloop.reports.plots.residual import residual_shape_figure, residual_time_figure
+from armloop.reports.plots.ring import Stage, ring_figure
+from armloop.reports.plots.shares import shares_figure
+from armloop.reports.plots.torque import torque_figure
+from armloop.reports.plots.tracking import eta_figure, tracking_figure
+
+__all__ = [
+    "Stage",
+    "clusters_figure",
+    "eta_figure",
+    "has_trials",
+    "orders_figure",
+    "residual_shape_figure",
+    "residual_time_figure",
+    "ring_figure",
+    "shares_figure",
+    "torque_figure",
+    "tracking_figure",
+]

@@ -1,0 +1,48 @@
+"""Samples in the plane of the two activation indicators, and the elbow."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from armloop.conditions import Clusters, Condition
+from armloop.reports.plots.style import BLUE, CONDITIONS, INK, SURFACE, every, figure, legend, polish
+from armloop.reports.words import counted
+
+_MOST = 6000
+
+
+def clusters_figure(clusters: Clusters) -> Figure:
+    """Left the samples, coloured by condition, with the cluster centres; right the elbow of Eq. (9)."""
+    made = figure(10, 3.9)
+    plane, elbow = made.subplots(1, 2, gridspec_kw={"width_ratios": [1.7, 1]})
+    for kind in Condition:
+        members = clusters.indicator[clusters.condition == kind]
+        shown = members[every(len(members), _MOST // 3)]
+        label = f"{kind.name.lower().replace('_', ' ')}: {counted(len(members), 'sample')}"
+        plane.scatter(
+            *shown.T, s=9, color=CONDITIONS[int(kind)], alpha=0.35, linewidths=0, label=label, rasterized=True
+        )
+    plane.scatter(
+        *clusters.centers.T, marker="X", s=110, color=INK, edgecolors=SURFACE, linewidths=1.2, zorder=5
+    )
+    polish(plane, "activation of velocity", "activation of acceleration", "Conditions of the samples")
+    plane.margins(0.06)
+    legend(plane, 1, loc="best")
+    counts = np.arange(1, len(clusters.wcss) + 1)
+    elbow.plot(counts, clusters.wcss, color=BLUE, linewidth=2, marker="o", markersize=5)
+    elbow.plot(
+        clusters.elbow, clusters.wcss[clusters.elbow - 1], "o", color=INK, markersize=11, fillstyle="none"
+    )
+    elbow.annotate(
+        f"elbow at {clusters.elbow}",
+        (clusters.elbow, clusters.wcss[clusters.elbow - 1]),
+        textcoords="offset points",
+        xytext=(12, 10),
+        color=INK,
+        fontsize=9.5,
+    )
+    elbow.set_xticks(counts)
+    elbow.set_ylim(bottom=0)
+    polish(elbow, "number of clusters", "within-cluster sum", "Elbow")
+    return made

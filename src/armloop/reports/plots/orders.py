@@ -1,0 +1,77 @@
+"""Held-out error against the orders of the library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from armloop.reconstruction import StepReport
+from armloop.reports.plots.style import BLUE, INK, MUTED, figure, polish
+from armloop.reports.words import percent
+
+_ROMAN = {1: "I", 2: "II", 3: "III"}
+
+
+def has_trials(reports: Sequence[StepReport]) -> bool:
+    """Whether orders were tried at all; libraries without orders have nothing to show."""
+    return any(report.trials for report in reports)
+
+
+def orders_figure(reports: Sequence[StepReport], baseline: Sequence[StepReport] = ()) -> Figure:
+    """One panel per search for orders: error on held-out blocks, the chosen order marked.
+
+    Steps regressed together share one search and one panel; ``baseline`` adds the one-shot method's.
+    """
+    panels: dict[str, tuple[str, StepReport]] = {}
+    for report in reports:
+        if report.trials:
+            key = str(report.trials)
+            name = (
+                f"{panels[key][0]} + {_ROMAN[report.step]}"
+                if key in panels
+                else f"Step {_ROMAN[report.step]}"
+            )
+            panels[key] = (name, report)
+    shown = [*panels.values(), *(("One-shot SINDy", report) for report in baseline[:1] if report.trials)]
+    made = figure(max(4.6, 3.3 * len(shown)), 3.3)
+    row = made.subplots(1, len(shown), squeeze=False)[0]
+    for axes, (name, report) in zip(row, shown, strict=True):
+        labels = [f"({orders[0]}, {orders[1]})" for orders, _ in report.trials]
+        errors = [error for _, error in report.trials]
+        axes.plot(range(len(errors)), errors, color=BLUE, linewidth=2, marker="o", markersize=5)
+        chosen = _chosen(report)
+        axes.plot(chosen, errors[chosen], "o", color=INK, markersize=12, fillstyle="none")
+        axes.annotate(
+            f"chosen: {percent(errors[chosen])}",
+            (chosen, errors[chosen]),
+            textcoords="offset points",
+            xytext=(0, -20),
+            ha="center",
+            color=INK,
+            fontsize=9.5,
+        )
+        axes.set_yscale("log")
+        axes.set_xticks(range(len(labels)), labels)
+        polish(axes, "orders (N1, N2)", "held-out error / RMS torque" if axes is row[0] else "", name)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.3g} %"))
+        axes.yaxis.set_minor_formatter(_minor(errors))
+        axes.tick_params(which="minor", colors=MUTED, labelsize=8, length=0)
+        axes.margins(x=0.22)
+        axes.set_ylim(0.75 * min(errors), 1.25 * max(errors))
+    return made
+
+
+def _minor(errors: Sequence[float]) -> FuncFormatter:
+    """Labels between the powers of ten where the errors span too little for those to appear."""
+    narrow = max(errors) < 5 * min(errors)
+    return FuncFormatter(lambda y, _: f"{100 * y:.3g} %" if narrow else "")
+
+
+def _chosen(report: StepReport) -> int:
+    """Index of the trial whose order N1 was kept (N2 too, where a trial tells them apart)."""
+    assert report.orders is not None
+    same = [k for k, (orders, _) in enumerate(report.trials) if orders == report.orders]
+    first = [k for k, (orders, _) in enumerate(report.trials) if orders[0] == report.orders[0]]
+    return (same or first or [len(report.trials) - 1])[0]

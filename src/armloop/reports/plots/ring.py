@@ -1,0 +1,222 @@
+"""The loop as one picture: eight stages on a ring, each with a small figure and its key number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+from numpy.typing import NDArray
+
+from armloop.reports.plots.style import BLUE, GRID, INK, MUTED, SURFACE, thin
+from armloop.reports.words import number
+
+Array = NDArray[np.float64]
+
+# All lengths in inches, the figure's own unit.
+_WIDTH, _HEIGHT = 12.8, 6.9
+_CARD_WIDTH, _CARD_HEIGHT = 2.66, 2.34
+_MARGIN, _BOTTOM = 0.42, 0.36
+_PER_ROW = 4
+_SPARK_POINTS = 400
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the loop.
+
+    Attributes:
+        title: a word or two.
+        figure: its key number with unit, or a verdict.
+        text: one short line that says what the number is.
+        draw: draws the small figure on bare axes.
+        color: of the stage.
+    """
+
+    title: str
+    figure: str
+    text: str
+    draw: Callable[[Axes], None]
+    color: str = BLUE
+
+
+def ring_figure(stages: Sequence[Stage], headline: str, line: str) -> Figure:
+    """Eight stages clockwise on a ring, from the upper left, with a headline and a line of text inside.
+
+    Raises:
+        ValueError: there are not eight stages.
+    """
+    if len(stages) != 2 * _PER_ROW:
+        raise ValueError(f"the ring has room for {2 * _PER_ROW} stages, there are {len(stages)}")
+    made = Figure(figsize=(_WIDTH, _HEIGHT), dpi=110)
+    made.patch.set_alpha(0.0)
+    page = made.add_axes((0, 0, 1, 1))
+    page.set_xlim(0, _WIDTH)
+    page.set_ylim(0, _HEIGHT)
+    page.axis("off")
+    places = _places()
+    _track(page, places)
+    for k, (stage, place) in enumerate(zip(stages, places, strict=True)):
+        _card(made, page, k + 1, stage, place)
+    middle = 0.5 * _HEIGHT
+    page.text(
+        0.5 * _WIDTH,
+        middle + 0.2,
+        headline,
+        color=INK,
+        fontsize=17,
+        fontweight="bold",
+        ha="center",
+        va="center",
+    )
+    page.text(0.5 * _WIDTH, middle - 0.27, line, color=MUTED, fontsize=11.5, ha="center", va="center")
+    return made
+
+
+def _places() -> list[tuple[float, float]]:
+    """Lower left corners of the cards, clockwise from the upper left one."""
+    pitch = (_WIDTH - 2 * _MARGIN - _CARD_WIDTH) / (_PER_ROW - 1)
+    columns = [_MARGIN + k * pitch for k in range(_PER_ROW)]
+    top = _HEIGHT - _BOTTOM - _CARD_HEIGHT
+    return [*((x, top) for x in columns), *((x, _BOTTOM) for x in reversed(columns))]
+
+
+def _track(page: Axes, places: Sequence[tuple[float, float]]) -> None:
+    """The band that the cards lie on, and an arrow wherever it shows between two of them."""
+    left, right = _MARGIN + 0.5 * _CARD_WIDTH, _WIDTH - _MARGIN - 0.5 * _CARD_WIDTH
+    low, high = _BOTTOM + 0.5 * _CARD_HEIGHT, _HEIGHT - _BOTTOM - 0.5 * _CARD_HEIGHT
+    page.add_patch(
+        FancyBboxPatch(
+            (left, low),
+            right - left,
+            high - low,
+            boxstyle="round,pad=0,rounding_size=0.6",
+            facecolor="none",
+            edgecolor=GRID,
+            linewidth=15,
+        )
+    )
+    for k, (x, y) in enumerate(places):
+        to_x, to_y = places[(k + 1) % len(places)]
+        if abs(to_y - y) > 0.1:  # down on the right, up on the left
+            at = x + 0.5 * _CARD_WIDTH
+            start, end = sorted((y, to_y))
+            tail, tip = (start + _CARD_HEIGHT + 0.22, end - 0.22)
+            ends = ((at, tip), (at, tail)) if to_y < y else ((at, tail), (at, tip))
+        else:
+            step = np.sign(to_x - x)
+            gap = x + _CARD_WIDTH if step > 0 else x
+            other = to_x if step > 0 else to_x + _CARD_WIDTH
+            level = y + 0.5 * _CARD_HEIGHT
+            ends = ((gap + 0.06 * step, level), (other - 0.04 * step, level))
+        page.add_patch(
+            FancyArrowPatch(
+                *ends, arrowstyle="-|>", mutation_scale=17, color=INK, linewidth=2, shrinkA=0, shrinkB=0
+            )
+        )
+
+
+def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float, float]) -> None:
+    x, y = place
+    page.add_patch(
+        FancyBboxPatch(
+            place,
+            _CARD_WIDTH,
+            _CARD_HEIGHT,
+            boxstyle="round,pad=0,rounding_size=0.14",
+            facecolor=SURFACE,
+            edgecolor=stage.color,
+            linewidth=1.6,
+            zorder=3,
+        )
+    )
+    top = y + _CARD_HEIGHT - 0.29
+    page.scatter([x + 0.3], [top], s=330, color=stage.color, zorder=4, linewidths=0)
+    page.text(
+        x + 0.3,
+        top - 0.008,
+        str(count),
+        color=SURFACE,
+        fontsize=11,
+        fontweight="bold",
+        ha="center",
+        va="center",
+        zorder=5,
+    )
+    page.text(x + 0.56, top, stage.title, color=INK, fontsize=12.5, fontweight="bold", va="center", zorder=5)
+    page.text(
+        x + 0.18,
+        y + 0.5,
+        stage.figure,
+        color=stage.color,
+        fontsize=14 if len(stage.figure) < 22 else 11,
+        fontweight="bold",
+        va="center",
+        zorder=5,
+    )
+    page.text(
+        x + 0.18, y + 0.2, stage.text, color=MUTED, fontsize=_fitting(stage.text), va="center", zorder=5
+    )
+    inset = (x + 0.18, y + 0.78, _CARD_WIDTH - 0.36, _CARD_HEIGHT - 1.36)
+    axes = made.add_axes(
+        (inset[0] / _WIDTH, inset[1] / _HEIGHT, inset[2] / _WIDTH, inset[3] / _HEIGHT),
+        facecolor="none",
+        zorder=6,
+    )
+    axes.axis("off")
+    stage.draw(axes)
+
+
+def _fitting(text: str) -> float:
+    """Font size at which a line of text stays within a card."""
+    return min(9.0, 9.0 * 37 / max(len(text), 1))
+
+
+def lines(
+    x: Array,
+    ys: Sequence[Array],
+    colors: Sequence[str],
+    band: float | None = None,
+    limit: float | None = None,
+    first_wide: bool = False,
+) -> Callable[[Axes], None]:
+    """Small lines over one another.
+
+    ``band`` shades ±band, ``limit`` fixes the height to ±limit, ``first_wide`` draws the first line wide and pale,
+    so that one that agrees with it can be seen upon it.
+    """
+
+    def draw(axes: Axes) -> None:
+        if band is not None:
+            axes.axhspan(-band, band, color=GRID, linewidth=0)
+        for k, (y, color) in enumerate(zip(ys, colors, strict=True)):
+            wide = first_wide and k == 0
+            axes.plot(
+                *thin(x, y, _SPARK_POINTS),
+                color=color,
+                linewidth=4 if wide else 1.3,
+                alpha=0.5 if wide else 1,
+            )
+        axes.margins(x=0)
+        if limit is not None:
+            axes.set_ylim(-limit, limit)
+
+    return draw
+
+
+def bars(values: Sequence[float], colors: Sequence[str], labels: Sequence[str]) -> Callable[[Axes], None]:
+    """A few horizontal bars with a word before and the value behind each."""
+
+    def draw(axes: Axes) -> None:
+        largest = max([*values, 1e-12])
+        for k, (value, color, label) in enumerate(zip(values, colors, labels, strict=True)):
+            axes.barh(k, value, 0.62, color=color)
+            axes.text(-0.03 * largest, k, label, color=MUTED, fontsize=8.5, ha="right", va="center")
+            axes.text(value + 0.03 * largest, k, number(value, 2), color=INK, fontsize=8.5, va="center")
+        axes.set_xlim(-0.62 * largest, 1.3 * largest)
+        axes.set_ylim(len(values) - 0.4, -0.6)
+
+    return draw

@@ -1,0 +1,116 @@
+"""One look for all figures: colours that stay apart for colour-blind eyes, light frames, few lines.
+
+`INK`, `MUTED`, `GRID` and `SURFACE` are the colours of a light page; a report that is read on a dark page
+exchanges exactly these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+INK, MUTED, GRID, SURFACE = "#1b2430", "#5d6877", "#e3e7ec", "#fefefe"
+BLUE, ORANGE, GREEN, PINK, GREY = "#2f7fd1", "#e8833a", "#12a284", "#c566a5", "#8791a1"
+
+BEFORE, AFTER, BASELINE = ORANGE, BLUE, GREY
+STEPS = {1: ORANGE, 2: GREEN, 3: BLUE}
+CONDITIONS = {1: ORANGE, 2: GREEN, 3: BLUE}
+CYCLE = (BLUE, ORANGE, GREEN, PINK, GREY)
+
+#: More points than this on a line cannot be seen.
+MOST_POINTS = 2000
+
+
+def controller_colors(names: Sequence[str]) -> dict[str, str]:
+    """A colour per controller; the paper's three always have the same."""
+    fixed = {"pid": ORANGE, "pid_step1": GREEN, "pid_step3": BLUE}
+    spare = iter([PINK, GREY, *CYCLE] * (1 + len(names)))
+    return {name: fixed.get(name) or next(spare) for name in names}
+
+
+def figure(width: float = 10.0, height: float = 4.0) -> Figure:
+    """Make an empty figure without pyplot's global state; no background, so that it lies on any page."""
+    made = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    made.patch.set_alpha(0.0)
+    return made
+
+
+def polish(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "", grid: str = "both") -> Axes:
+    """Give axes the common look: no box, a light grid, quiet ticks."""
+    axes.set_facecolor("none")
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color(GRID)
+    axes.tick_params(colors=MUTED, labelsize=9, length=0, pad=4)
+    axes.grid(True, axis=grid, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.set_xlabel(xlabel, color=MUTED, fontsize=9.5)
+    axes.set_ylabel(ylabel, color=MUTED, fontsize=9.5)
+    if title:
+        axes.set_title(title, color=INK, fontsize=10.5, fontweight="bold", loc="left")
+    return axes
+
+
+def legend(target: Axes | Figure, columns: int = 4, **options: object) -> None:
+    """Add a frameless legend; on a figure it stands in a row above the axes."""
+    if isinstance(target, Figure):
+        handles: dict[str, object] = {}
+        for axes in target.axes:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                handles.setdefault(label, handle)
+        made = target.legend(
+            list(handles.values()),
+            list(handles),
+            loc="outside upper left",
+            ncols=columns,
+            frameon=False,
+            fontsize=9.5,
+        )
+    else:
+        made = target.legend(frameon=False, fontsize=9, ncols=columns, **options)
+    for handle in made.legend_handles:
+        if hasattr(handle, "set_linewidth") and handle.get_label() and not hasattr(handle, "get_hatch"):
+            handle.set_linewidth(2.2)
+        if hasattr(handle, "set_alpha"):
+            handle.set_alpha(0.9)
+    for text in made.get_texts():
+        text.set_color(INK)
+
+
+def thin(x: Array, y: Array, points: int = MOST_POINTS) -> tuple[Array, Array]:
+    """Reduce a line (N,) to about ``points``, keeping the least and the largest value of every piece.
+
+    NaN in y, which interrupts a line, is kept where a whole piece is NaN.
+    """
+    half = max(1, points // 2)
+    if len(x) <= 2 * half:
+        return x, y
+    size = int(np.ceil(len(x) / half))
+    pad = -len(x) % size
+    rows = np.concatenate([y, np.full(pad, y[-1])]).reshape(-1, size)
+    start = size * np.arange(len(rows))
+    low = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
+    high = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
+    keep = np.sort(np.column_stack([start + low, start + high]), axis=1).ravel()
+    keep = np.minimum(keep, len(x) - 1)
+    return x[keep], y[keep]
+
+
+def every(count: int, most: int) -> slice:
+    """Pick at most about ``most`` of ``count`` points, evenly."""
+    return slice(None, None, max(1, int(np.ceil(count / most))))
+
+
+def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
+    """Interrupt a line (N,) where time jumps by more than ten steps, so that runs are not joined."""
+    steps = np.diff(time)
+    if len(steps) == 0:
+        return time, values
+    gaps = np.flatnonzero((steps > 10 * np.median(steps)) | (steps < 0)) + 1
+    return np.insert(time, gaps, time[gaps]), np.insert(values, gaps, np.nan)

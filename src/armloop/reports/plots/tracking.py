@@ -1,0 +1,144 @@
+"""How the controllers follow the reference, like Fig. 15 of the paper, and their η."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from armloop.reports import paper as published
+from armloop.reports.plots.style import (
+    GRID,
+    INK,
+    MUTED,
+    controller_colors,
+    figure,
+    legend,
+    polish,
+    thin,
+)
+from armloop.reports.words import controller, number
+
+if TYPE_CHECKING:
+    from armloop.drake_systems.tracking import TrackingResult
+
+#: From so many joints on, joints are rows instead of columns.
+_MANY_JOINTS = 5
+
+
+def tracking_figure(
+    results: Mapping[str, TrackingResult],
+    names: Mapping[str, str] | None = None,
+    colors: Mapping[str, str] | None = None,
+) -> Figure:
+    """Reference and controllers per joint over the scored interval, and below it the tracking error.
+
+    Args:
+        names: what to call the controllers; by default after their keys.
+        colors: a colour per key, by default those of :func:`controller_colors`.
+    """
+    first = next(iter(results.values()))
+    n = len(first.eta)
+    colors = colors or controller_colors(list(results))
+    if n < _MANY_JOINTS:
+        made = figure(max(5.5, 3.5 * n), 5.2)
+        grid = made.subplots(2, n, sharex=True, squeeze=False, gridspec_kw={"height_ratios": [1.25, 1]})
+    else:
+        made = figure(10.5, 1.7 * n)
+        grid = made.subplots(n, 2, sharex=True, squeeze=False).T
+    for j, unit in enumerate(first.unit):
+        scale = np.rad2deg(1.0) if unit == "deg" else 1e3
+        follow, error = grid[0, j], grid[1, j]
+        rows = first.scored
+        follow.plot(
+            *thin(first.time[rows], scale * first.q_ref[rows, j]),
+            color=MUTED,
+            linewidth=3.2,
+            alpha=0.45,
+            label="reference",
+        )
+        for name, result in results.items():
+            rows = result.scored
+            label = (names or {}).get(name) or controller(name)
+            line = {"color": colors[name], "linewidth": 1.3, "label": label}
+            follow.plot(*thin(result.time[rows], scale * result.q[rows, j]), **line)
+            deviation = scale * (result.q_ref[rows, j] - result.q[rows, j])
+            error.plot(*thin(result.time[rows], deviation), **line)
+        polish(follow, "", f"position [{unit}]", f"Joint {j + 1}")
+        polish(error, "time [s]" if n < _MANY_JOINTS or j == n - 1 else "", f"error [{unit}]")
+        if n >= _MANY_JOINTS and j == n - 1:
+            follow.set_xlabel("time [s]", color=MUTED, fontsize=9.5)
+        error.axhline(0, color=GRID, linewidth=1)
+    legend(made, 5)
+    return made
+
+
+def eta_figure(
+    results: Mapping[str, TrackingResult],
+    paper: bool = False,
+    names: Mapping[str, str] | None = None,
+    colors: Mapping[str, str] | None = None,
+) -> Figure:
+    """Mean absolute tracking error per joint and controller; the paper's as dashed outlines."""
+    keys = list(results)
+    first = results[keys[0]]
+    n, colors = len(first.eta), colors or controller_colors(keys)
+    made = figure(max(6.0, 2.6 * n + 1.5), 3.4)
+    parts: list[list[int]] = [
+        [j for j in range(n) if first.unit[j] == unit] for unit in dict.fromkeys(first.unit)
+    ]
+    row = made.subplots(
+        1, len(parts), squeeze=False, gridspec_kw={"width_ratios": [len(part) for part in parts]}
+    )[0]
+    for axes, joints in zip(row, parts, strict=True):
+        _bars(axes, joints, results, names or {}, colors, paper)
+        polish(axes, "", f"mean absolute error η [{first.unit[joints[0]]}]", grid="y")
+        axes.set_xticks(range(len(joints)), [f"joint {j + 1}" for j in joints])
+        axes.tick_params(axis="x", labelsize=10, labelcolor=INK)
+        axes.margins(y=0.12)
+    legend(made, 5)
+    return made
+
+
+def _bars(
+    axes: Axes,
+    joints: Sequence[int],
+    results: Mapping[str, TrackingResult],
+    names: Mapping[str, str],
+    colors: Mapping[str, str],
+    paper: bool,
+) -> None:
+    width = 0.8 / len(results)
+    for k, (name, result) in enumerate(results.items()):
+        x = np.arange(len(joints)) + (k - 0.5 * (len(results) - 1)) * width
+        values = [float(result.eta[j]) for j in joints]
+        label = names.get(name) or controller(name)
+        axes.bar(x, values, 0.88 * width, color=colors[name], label=label)
+        theirs = published.ETA_DEG.get(name, ()) if paper else ()
+        tops = list(values)
+        if len(theirs) == len(result.eta):
+            shown = [theirs[j] for j in joints]
+            last = k == len(results) - 1
+            axes.bar(
+                x,
+                shown,
+                0.88 * width,
+                facecolor="none",
+                edgecolor=MUTED,
+                linestyle=(0, (3, 2)),
+                label="the paper's" if last else None,
+            )
+            tops = [max(pair) for pair in zip(values, shown, strict=True)]
+        for at, top, value in zip(x, tops, values, strict=True):
+            axes.annotate(
+                f"{value:.2f}" if value >= 0.095 else number(value, 2),
+                (at, top),
+                textcoords="offset points",
+                xytext=(0, 3),
+                ha="center",
+                color=INK,
+                fontsize=8.5,
+            )

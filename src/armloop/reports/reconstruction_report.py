@@ -1,0 +1,108 @@
+"""Sections on how a model came about and how well it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.conditions import Clusters
+from armloop.motion import Samples
+from armloop.reconstruction import Reconstruction, StepReport
+from armloop.reports.html import Picture, Section
+from armloop.reports.plots import clusters_figure, has_trials, orders_figure, torque_figure
+from armloop.reports.tables import Table, formulas, make_table, score_table, steps_table
+from armloop.reports.words import counted, number, percent
+from armloop.scoring import Score
+
+_ORDERS = (
+    "Each candidate library was fitted with some blocks of data set aside; the smallest one whose error "
+    "there is within a standard error of the best was kept (ringed)."
+)
+_ORDERS_WITH_BASELINE = " The last panel is the one-shot baseline, which keeps its best."
+_TORQUE = (
+    "Measured and predicted torque over time. Step I knows gravity and dry friction, Step II adds what "
+    "depends on velocity, Step III what depends on acceleration: the last curve should lie on the measured "
+    "one."
+)
+_CLUSTERS = (
+    "Every dot is a sample; crosses are the cluster centres. The elbow of the within-cluster sum tells how "
+    "many kinds of motion the indicator sees."
+)
+
+
+def mean_nrmse(score: Score) -> float:
+    """Mean over the joints of the nRMSE of moving samples; NaN if no joint moves."""
+    values = [x for x in score.moving["nrmse"] if x is not None]
+    return float(np.mean(values)) if values else float("nan")
+
+
+def conditions_section(clusters: Clusters, title: str = "Sorting the samples") -> Section:
+    """How the samples were sorted into the three working conditions."""
+    text = (
+        "The relative activation indicator says of every sample how much the arm moves and how much it "
+        "accelerates; k-means sorts the samples by it, so that each step is fitted on data in which the "
+        "later steps' terms are absent."
+    )
+    return Section(title, [text], [Picture(clusters_figure(clusters), _CLUSTERS)])
+
+
+def reconstruction_sections(
+    reconstruction: Reconstruction,
+    samples: Samples | None = None,
+    baseline: Reconstruction | None = None,
+) -> list[Section]:
+    """How the model was reconstructed, what it says, and how well it predicts.
+
+    Args:
+        samples: motion to show measured and predicted torque on, conditioned like the model's logs.
+        baseline: the one-shot reconstruction of the same data, to be compared with.
+    """
+    model, history = reconstruction.model, reconstruction.model.history
+    pictures = []
+    if has_trials(reconstruction.reports):
+        trials = orders_figure(reconstruction.reports, baseline.reports if baseline else ())
+        pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_BASELINE if baseline else "")))
+    if samples is not None:
+        pictures.append(Picture(torque_figure(model, samples), _TORQUE))
+    tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
+    text = [
+        f"The model was reconstructed from {counted(len(history.get('logs', [])), 'log')} with the method "
+        f"{history.get('method', 'unknown')} on the library {history.get('library', 'unknown')}: from many "
+        "candidate functions a sparse regression keeps those that lower the error on data it was not "
+        "fitted on.",
+        f"On the {counted(reconstruction.held_out.samples, 'sample')} that no step has seen, it is off by "
+        f"{percent(mean_nrmse(reconstruction.held_out))} of the measured torque (nRMSE of moving samples, "
+        "mean of the joints).",
+    ]
+    if baseline is not None:
+        tables.append(comparison(reconstruction, baseline))
+        text.append(_against(reconstruction, baseline))
+    folded = [("The model as formulas, one per joint", formulas(model))]
+    return [Section("Reconstruction", text, pictures, tables, folded, list(reconstruction.notes))]
+
+
+def comparison(ours: Reconstruction, baseline: Reconstruction) -> Table:
+    """Held-out nRMSE per joint and number of terms of the model and of the one-shot baseline."""
+    rows = []
+    for name, made in (("stepwise", ours), ("one-shot SINDy", baseline)):
+        errors = [percent(x) for x in made.held_out.moving["nrmse"]]
+        rows.append([name, *errors, " / ".join(map(str, _terms(made.reports)))])
+    headers = ["method", *(f"joint {j + 1}" for j in range(ours.model.arm.n)), "terms per joint"]
+    return make_table(headers, rows, "Held-out nRMSE of moving samples, same data")
+
+
+def _terms(reports: Sequence[StepReport]) -> list[int]:
+    return [int(x) for x in np.sum([report.terms for report in reports], axis=0)]
+
+
+def _against(ours: Reconstruction, baseline: Reconstruction) -> str:
+    mine, theirs = mean_nrmse(ours.held_out), mean_nrmse(baseline.held_out)
+    if not np.isfinite(mine + theirs) or min(mine, theirs) <= 0:
+        return "One-shot SINDy was run on the same data; the table compares the two."
+    factor = max(mine, theirs) / min(mine, theirs)
+    verdict = "more" if mine < theirs else "less"
+    return (
+        f"One-shot SINDy on the same data is off by {percent(theirs)}, {number(factor, 2)} times {verdict} "
+        "than the stepwise model."
+    )

@@ -1,0 +1,214 @@
+"""Tables of results: aligned text for a terminal, the same cells for a report."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.diagnosis import Diagnosis
+from armloop.model import ReconstructedModel
+from armloop.reconstruction import StepReport
+from armloop.reports import paper as published
+from armloop.reports.words import (
+    MISSING,
+    controller,
+    effect_label,
+    number,
+    numbers,
+    percent,
+    unit,
+    with_error,
+)
+from armloop.scoring import Score
+
+if TYPE_CHECKING:  # the class lives among Drake's systems, which a terminal must not have to load
+    from armloop.drake_systems.tracking import TrackingResult
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells that are already text. ``str(table)`` aligns them: the first column left, the others right."""
+
+    headers: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    title: str | None = None
+    left: tuple[int, ...] = (0,)
+
+    def __str__(self) -> str:
+        lines = [self.headers, *self.rows]
+        widths = [max(len(line[k]) for line in lines) for k in range(len(self.headers))]
+
+        def aligned(line: Sequence[str]) -> str:
+            cells = [
+                cell.ljust(width) if k in self.left else cell.rjust(width)
+                for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+            ]
+            return "  ".join(cells).rstrip()
+
+        rule = "─" * (sum(widths) + 2 * (len(widths) - 1))
+        top = [self.title] if self.title else []
+        return "\n".join([*top, rule, aligned(self.headers), rule, *map(aligned, self.rows), rule])
+
+
+def table(headers: Sequence[object], rows: Sequence[Sequence[object]], title: str | None = None) -> str:
+    """Align cells for a terminal; floats get three significant digits, None a dash."""
+    return str(make_table(headers, rows, title))
+
+
+def make_table(
+    headers: Sequence[object],
+    rows: Sequence[Sequence[object]],
+    title: str | None = None,
+    left: tuple[int, ...] = (0,),
+) -> Table:
+    """Build a table of any cells; raises ``ValueError`` when a row has not one cell per header."""
+    for row in rows:
+        if len(row) != len(headers):
+            raise ValueError(f"a row has {len(row)} cells, the table {len(headers)} columns: {row!r}")
+    return Table(tuple(map(_cell, headers)), tuple(tuple(map(_cell, row)) for row in rows), title, left)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return MISSING
+    if isinstance(value, (float, np.floating)):
+        return number(float(value))
+    return str(value)
+
+
+def eta_table(
+    results: Mapping[str, TrackingResult], paper: bool = False, title: str | None = "Tracking error η"
+) -> Table:
+    """Mean absolute tracking error η per controller and joint, beside the paper's where it has one."""
+    first = next(iter(results.values()))
+    n = len(first.eta)
+    rows: list[list[object]] = []
+    for name, result in results.items():
+        row: list[object] = [controller(name), *result.eta]
+        if paper:
+            theirs = published.ETA_DEG.get(name, ())
+            row += theirs if len(theirs) == n else [None] * n
+        rows.append(row)
+    headers = [f"η{j + 1} [{u}]" for j, u in enumerate(first.unit)]
+    return make_table(
+        ["controller", *headers, *([f"paper η{j + 1}" for j in range(n)] if paper else [])], rows, title
+    )
+
+
+def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the reconstruction") -> Table:
+    """Orders, library sizes, terms kept per joint, samples per joint and held-out error of each step."""
+    rows = []
+    for report in reports:
+        chosen = [error for orders, error in report.trials if report.orders and orders[0] == report.orders[0]]
+        rows.append(
+            [
+                report.step,
+                MISSING if report.orders is None else f"({report.orders[0]}, {report.orders[1]})",
+                report.candidates,
+                report.independent,
+                " / ".join(map(str, report.terms)),
+                " / ".join(map(str, report.samples)),
+                percent(min(chosen)) if chosen else MISSING,
+            ]
+        )
+    headers = [
+        "step",
+        "(N1, N2)",
+        "candidates",
+        "independent",
+        "terms per joint",
+        "samples per joint",
+        "held-out error",
+    ]
+    return make_table(headers, rows, title)
+
+
+def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") -> Table:
+    """RMSE and nRMSE per joint, of the moving joint and at standstill."""
+    rows = []
+    for j, joint in enumerate(arm.joints):
+        rows.append(
+            [
+                f"{j + 1}  {joint.name}",
+                unit(joint.torque_unit),
+                score.rms[j],
+                score.moving["rmse"][j],
+                percent(score.moving["nrmse"][j]),
+                score.standstill["rmse"][j],
+            ]
+        )
+    headers = ["joint", "unit", "RMS measured", "RMSE moving", "nRMSE moving", "RMSE at rest"]
+    return make_table(headers, rows, title, left=(0, 1))
+
+
+def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
+    """Each effect found with its parameters ± standard error and its share of the explainable residual."""
+    rows: list[list[object]] = []
+    for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True):
+        for k, (key, e) in enumerate(added.parameters.items()):
+            rows.append(
+                [
+                    effect_label(found.effect) if k == 0 else "",
+                    key.replace("_", " "),
+                    with_error(e.value, e.std_error),
+                    unit(e.unit),
+                    percent(found.share) if k == 0 else "",
+                ]
+            )
+    if diagnosis.unlisted is not None:
+        rows.append(
+            [f"unlisted, joint {diagnosis.unlisted.joint}", "law", diagnosis.unlisted.form or MISSING, "", ""]
+        )
+    return make_table(["effect", "parameter", "value", "unit", "share"], rows, title, left=(0, 1, 3))
+
+
+def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not fitted, RMSE") -> Table:
+    """RMSE per joint before and after the effects were added, and the model's own on its baseline data."""
+    errors = diagnosis.errors()
+    relative = errors["nrmse"]
+    rows = [
+        [f"{j + 1}  {joint.name}", unit(errors["unit"][j]), errors["before"][j], errors["after"][j]]
+        + [errors["noise_floor"][j], percent(relative["before"][j]), percent(relative["after"][j])]
+        for j, joint in enumerate(diagnosis.model.arm.joints)
+    ]
+    headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]
+    return make_table(headers, rows, title, left=(0, 1))
+
+
+def diagnosis_table(diagnosis: Diagnosis) -> str:
+    """The verdict, the effects found and the errors per joint, for a terminal."""
+    parts = [f"Verdict: {diagnosis.verdict}"]
+    if diagnosis.outcome.found or diagnosis.unlisted is not None:
+        parts.append(str(effects_table(diagnosis)))
+    return "\n\n".join([*parts, str(errors_table(diagnosis))])
+
+
+def seconds_table(seconds: Mapping[str, float], title: str | None = "Time taken") -> Table:
+    """Seconds per stage and in all."""
+    rows = [[stage.replace("_", " "), f"{value:.1f} s"] for stage, value in seconds.items()]
+    return make_table(["stage", "time"], [*rows, ["in all", f"{sum(seconds.values()):.1f} s"]], title)
+
+
+def formulas(model: ReconstructedModel, width: int = 110, most_terms: int | None = None) -> str:
+    """The model's formulas, wrapped to a width; with ``most_terms`` long ones are cut and say so."""
+    lines = []
+    for formula in model.formulas():
+        head, _, body = formula.partition(" = ")
+        terms = body.replace(" - ", "\n- ").replace(" + ", "\n+ ").split("\n")
+        if most_terms is not None and len(terms) > most_terms:
+            terms = [*terms[:most_terms], f"… and {len(terms) - most_terms} more terms"]
+        lines.append(
+            textwrap.fill(f"{head} = {' '.join(terms)}", width, subsequent_indent=" " * (len(head) + 3))
+        )
+    return "\n".join(lines)
+
+
+def tracking_summary(result: TrackingResult) -> str:
+    """One controller's η of all joints with its unit, as a report quotes it."""
+    units = list(dict.fromkeys(result.unit))
+    return f"{numbers(result.eta)} {units[0] if len(units) == 1 else '(' + ', '.join(result.unit) + ')'}"

@@ -1,0 +1,109 @@
+"""How numbers, units and names are written in tables, figures and reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from armloop.effects import Effect
+
+MISSING = "–"
+
+_STEPS = {"step1": "Step I", "step2": "Step II", "step3": "Step III"}
+_UNITS = {"*": "·", "^2": "²", "^3": "³"}
+
+
+def number(x: float | None, digits: int = 3) -> str:
+    """Significant digits without exponents where a person would not write one; a dash for None and NaN."""
+    if x is None or not np.isfinite(x):
+        return MISSING
+    x = float(x)
+    if x == 0:
+        return "0"
+    if not 1e-4 <= abs(x) < 1e6:
+        return f"{x:.{digits - 1}e}"
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(x)))))
+    return f"{x:.{decimals}f}"
+
+
+def numbers(values: Iterable[float | None], digits: int = 3, separator: str = " / ") -> str:
+    """Several numbers, one per joint."""
+    return separator.join(number(x, digits) for x in values)
+
+
+def percent(x: float | None) -> str:
+    """A part as a percentage."""
+    if x is None or not np.isfinite(x):
+        return MISSING
+    return f"{100 * x:.0f} %" if abs(x) >= 0.0995 else f"{number(100 * x, 2)} %"
+
+
+def unit(text: str) -> str:
+    """``N*m`` as N·m, ``kg*m^2`` as kg·m²."""
+    for plain, sign in _UNITS.items():
+        text = text.replace(plain, sign)
+    return text
+
+
+def vector(value: float | Sequence[float], digits: int = 3) -> str:
+    """A scalar, or a vector in brackets."""
+    if isinstance(value, Sequence):
+        return "(" + ", ".join(number(x, digits) for x in value) + ")"
+    return number(value, digits)
+
+
+def with_error(value: float | Sequence[float], std_error: float | Sequence[float]) -> str:
+    """A parameter and its standard error, to the digit at which the error begins."""
+    if isinstance(value, Sequence):
+        errors = std_error if isinstance(std_error, Sequence) else [std_error] * len(value)
+        return "(" + ", ".join(with_error(x, e) for x, e in zip(value, errors, strict=True)) + ")"
+    error = float(np.max(std_error))
+    if not np.isfinite(error) or error <= 0:
+        return number(value)
+    decimals = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def angle(text: str, of: str) -> str:
+    """A tracking error with its unit, ``deg`` or ``mm``, as short as a headline needs it."""
+    return f"{text}°" if of == "deg" else f"{text} {of}"
+
+
+def controller(name: str) -> str:
+    """``pid_step1`` as PID + Step I."""
+    if name == "pid":
+        return "PID"
+    rest = name.removeprefix("pid_")
+    return f"PID + {_STEPS.get(rest, rest)}"
+
+
+def effect_name(name: str, joint: int | None) -> str:
+    """``viscous_friction`` at joint 2 as viscous friction, joint 2."""
+    plain = name.replace("_", " ")
+    return plain if joint is None else f"{plain}, joint {joint}"
+
+
+def effect_label(effect: Effect) -> str:
+    """The name of an effect with its joint."""
+    return effect_name(effect.name, effect.joint)
+
+
+def counted(count: int, singular: str, plural: str | None = None) -> str:
+    """``1 run``, ``12 345 runs``."""
+    digits = f"{count:,}".replace(",", "\u202f")
+    return f"{digits} {singular if count == 1 else plural or singular + 's'}"
+
+
+def listed(items: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else ""
+
+
+def parameters(values: Mapping[str, object]) -> str:
+    """Plain parameters as ``mass 0.45, com (0.03, 0, 0.02)``."""
+    parts = []
+    for key, value in values.items():
+        array = np.asarray(value, dtype=float)
+        parts.append(f"{key.replace('_', ' ')} {vector(array.tolist())}")
+    return ", ".join(parts)
