@@ -146,7 +146,6 @@ class LinearJointEffect(Effect):
 
     parameter: ClassVar[str]
     unit: ClassVar[str]
-    rate_unit: ClassVar[str] = ""
     law: ClassVar[str]
     nonnegative: ClassVar[bool] = False
 
@@ -164,7 +163,9 @@ class LinearJointEffect(Effect):
     def _unit(self, arm: Arm) -> str:
         assert self.joint is not None
         joint = arm.joints[self.joint - 1]
-        return self.unit.replace("TAU", joint.torque_unit).replace("POS", joint.position_unit)
+        inertia = "kg*m^2" if joint.kind == "revolute" else "kg"
+        unit = self.unit.replace("TAU", joint.torque_unit).replace("POS", joint.position_unit)
+        return unit.replace("INERTIA", inertia)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         error = float(np.sqrt(max(covariance[0, 0], 0.0)))

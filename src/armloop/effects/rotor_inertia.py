@@ -11,7 +11,7 @@ class RotorInertia(LinearJointEffect):
 
     name = "rotor_inertia"
     parameter = "inertia"
-    unit = "kg*m^2"
+    unit = "INERTIA"
     law = "I vdot"
     nonnegative = True
 

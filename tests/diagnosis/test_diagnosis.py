@@ -1,0 +1,216 @@
+"""Each listed effect is found on a run whose law was written here, and nothing is found where nothing is."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from synthetic import (
+    COULOMB,
+    STATIC,
+    STRIBECK_VELOCITY,
+    VISCOUS,
+    fourier_motion,
+    friction,
+    measured,
+    rigid_torque,
+    three_axis,
+)
+
+from armloop.components import RigidBody
+from armloop.diagnosis import Diagnosis, diagnose
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.motion import Motion
+from armloop.scoring import score
+from armloop.signals import condition
+
+Law = Callable[[Motion], np.ndarray]
+
+
+def on_joint(motion: Motion, joint: int, torque: np.ndarray) -> np.ndarray:
+    tau = np.zeros_like(motion.q)
+    tau[:, joint - 1] = torque
+    return tau
+
+
+def payload(motion: Motion) -> np.ndarray:
+    """0.45 kg, a ball of 3 cm radius at (-0.05, 0.02, -0.03) m of the tool, 0.35 m along the last link."""
+    mass, com = 0.45, np.array([0.30, 0.02, -0.03])
+    inertia = mass * (com @ com * np.eye(3) - np.outer(com, com)) + 0.4 * mass * 0.03**2 * np.eye(3)
+    entries = [inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    Y = regressor(three_axis(), motion.q, motion.v, motion.vdot)[:, :, 20:]
+    return Y @ np.array([mass, *(mass * com), *entries])
+
+
+def tilt(motion: Motion) -> np.ndarray:
+    """The base rolled by 0.06 rad about x, then pitched by -0.04 rad about y."""
+    cr, sr, cp, sp = np.cos(0.06), np.sin(0.06), np.cos(-0.04), np.sin(-0.04)
+    Rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    Ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    arm, rest = three_axis(), np.zeros_like(motion.q)
+    level, tilted = (
+        regressor(arm, motion.q, rest, rest, g) for g in (arm.gravity, (Ry @ Rx).T @ arm.gravity)
+    )
+    return (tilted - level) @ nominal_parameters(arm)
+
+
+# effect, joint -> the law, and the parameters that must come out
+CASES: dict[tuple[str, int | None], tuple[Law, dict[str, object]]] = {
+    ("payload", None): (payload, {"mass": 0.45, "com": [-0.05, 0.02, -0.03]}),
+    ("viscous_friction", 2): (lambda m: on_joint(m, 2, 0.6 * m.v[:, 1]), {"coefficient": 0.6}),
+    ("coulomb_friction", 1): (lambda m: on_joint(m, 1, 0.3 * np.sign(m.v[:, 0])), {"level": 0.3}),
+    ("coulomb_friction", 3): (lambda m: on_joint(m, 3, -0.2 * np.sign(m.v[:, 2])), {"level": -0.2}),
+    ("joint_spring", 2): (
+        lambda m: on_joint(m, 2, 1.5 * (m.q[:, 1] - 0.3)),
+        {"stiffness": 1.5, "rest": 0.3},
+    ),
+    ("torque_ripple", 3): (
+        lambda m: on_joint(m, 3, 0.25 * np.sin(9 * m.q[:, 2] + 0.8)),
+        {"amplitude": 0.25, "order": 9, "phase": 0.8},
+    ),
+    ("rotor_inertia", 1): (lambda m: on_joint(m, 1, 0.25 * m.vdot[:, 0]), {"inertia": 0.25}),
+    ("torque_offset", 3): (lambda m: on_joint(m, 3, np.full(m.samples, 0.4)), {"offset": 0.4}),
+    ("gravity_tilt", None): (tilt, {"roll": 0.06, "pitch": -0.04}),
+}
+
+
+def run(law: Law | None, seed: int, seconds: float = 60.0, rate: float = 125.0) -> MotionLog:
+    """A log of the arm with friction, and with the law's torque on top."""
+    motion = fourier_motion(seconds, rate, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    return measured(motion, tau + (law(motion) if law else 0.0), seed)
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    """The arm as it is, with what it leaves on a clean run as its baseline."""
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    joints = tuple(
+        (
+            FrictionTerm("sign", float(fs)),
+            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
+            FrictionTerm("viscous", float(fv)),
+        )
+        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
+    )
+    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
+    baseline = score(bare, condition([run(None, seed=90)], bare.conditioning)).moving
+    return ReconstructedModel(three_axis(), (body,), FrictionLaw(joints), baseline=baseline)
+
+
+def check_parameters(found: dict, expected: dict[str, object]) -> None:
+    """Within 10 %, or three standard errors."""
+    for name, truth in expected.items():
+        value, error = (np.asarray(found[name][key], dtype=float) for key in ("value", "std_error"))
+        truth = np.asarray(truth, dtype=float)
+        allowed = np.maximum(0.1 * np.abs(truth), 3 * error)
+        assert (np.abs(value - truth) <= allowed).all(), f"{name}: {value} ± {error}, not {truth}"
+        # an error bar that is as large as the value would make every value right
+        assert (error <= np.maximum(0.1 * np.abs(truth), 0.02)).all(), f"{name}: ± {error} of {truth}"
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+def test_an_effect_is_found_with_its_parameters_and_is_gone_afterwards(
+    model: ReconstructedModel, case: tuple[str, int | None]
+) -> None:
+    law, expected = CASES[case]
+    log = run(law, seed=7)
+    diagnosis = diagnose(model, [log])
+    answer = diagnosis.to_dict()
+    assert answer["verdict"] == "effects_found"
+    (effect,) = answer["effects"]
+    assert (effect["effect"], effect["joint"]) == case
+    check_parameters(effect["parameters"], expected)
+    assert effect["share"] > 0.9
+    check_errors(answer["error"], case[1])
+    again = diagnose(diagnosis.model, [log]).to_dict()
+    assert (again["verdict"], again["effects"]) == ("no_effect", [])
+
+
+def check_errors(error: dict, joint: int | None) -> None:
+    """Before there is an error, afterwards it is down at the baseline's."""
+    before, after, floor = (np.array(error[key]) for key in ("before", "after", "noise_floor"))
+    worst = int(np.argmax(before / floor)) if joint is None else joint - 1
+    assert before[worst] > 2 * floor[worst]
+    assert (after < 1.6 * floor).all()
+    assert error["metric"] == "rmse" and error["held_out"] is True and len(error["unit"]) == 3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_clean_run_shows_no_effect(model: ReconstructedModel, seed: int) -> None:
+    answer = diagnose(model, [run(None, seed)]).to_dict()
+    assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
+    np.testing.assert_allclose(answer["error"]["before"], answer["error"]["after"])
+
+
+def test_two_effects_are_told_apart(model: ReconstructedModel) -> None:
+    def both(motion: Motion) -> np.ndarray:
+        return payload(motion) + on_joint(motion, 1, 0.6 * motion.v[:, 0])
+
+    answer = diagnose(model, [run(both, seed=5)]).to_dict()
+    assert answer["verdict"] == "effects_found"
+    assert [(e["effect"], e["joint"]) for e in answer["effects"]] == [
+        ("payload", None),
+        ("viscous_friction", 1),
+    ]
+    check_parameters(answer["effects"][0]["parameters"], {"mass": 0.45, "com": [-0.05, 0.02, -0.03]})
+    check_parameters(answer["effects"][1]["parameters"], {"coefficient": 0.6})
+    assert answer["effects"][0]["share"] > answer["effects"][1]["share"]
+
+
+def test_a_law_that_is_not_listed_is_said_to_be_unlisted(model: ReconstructedModel) -> None:
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 1, 0.5 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])
+
+    answer = diagnose(model, [run(law, seed=6)]).to_dict()
+    assert answer["verdict"] == "unlisted_effect"
+    (effect,) = answer["effects"]
+    assert (effect["effect"], effect["joint"]) == ("unlisted", 1)
+    # cos(2 q1) v2 = v2 - 2 sin(q1)^2 v2
+    terms = dict(reversed(term.split("*", 1)) for term in effect["form"].split())
+    assert terms.keys() == {"v2", "sin(q1)^2*v2"}
+    assert float(terms["v2"]) == pytest.approx(0.5, rel=0.1)
+    assert float(terms["sin(q1)^2*v2"]) == pytest.approx(-1.0, rel=0.1)
+    assert effect["rmse"]["with_form"] < 0.3 * effect["rmse"]["residual"]
+
+
+def test_several_runs_are_judged_together_and_order_does_not_matter(model: ReconstructedModel) -> None:
+    law, expected = CASES["viscous_friction", 2]
+    logs = [run(law, seed, seconds=20.0) for seed in (11, 12)]
+    for order in (logs, logs[::-1]):
+        (effect,) = diagnose(model, order).to_dict()["effects"]
+        assert (effect["effect"], effect["joint"]) == ("viscous_friction", 2)
+        check_parameters(effect["parameters"], expected)
+
+
+def test_the_answer_has_the_published_shape(model: ReconstructedModel) -> None:
+    answer = json.loads(json.dumps(diagnose(model, [run(CASES["torque_offset", 3][0], seed=8)]).to_dict()))
+    assert answer["schema"] == "armloop/diagnosis/1"
+    assert set(answer) >= {"schema", "verdict", "effects", "error"}
+    assert set(answer["error"]) >= {"metric", "held_out", "unit", "before", "after", "noise_floor"}
+    (effect,) = answer["effects"]
+    assert set(effect) >= {"effect", "joint", "parameters", "share", "alternatives"}
+    assert set(effect["parameters"]["offset"]) == {"value", "std_error", "unit"}
+    for rival in effect["alternatives"]:
+        assert set(rival) >= {"effect", "joint", "why"}
+
+
+def test_a_narrow_range_names_what_it_cannot_tell_apart(model: ReconstructedModel) -> None:
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 2, 1.5 * (motion.q[:, 1] - 1.0))
+
+    def narrow(seed: int) -> MotionLog:
+        motion = fourier_motion(60.0, 125.0, seed, size=0.1)
+        tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v) + law(motion)
+        return measured(motion, tau, seed)
+
+    diagnosis: Diagnosis = diagnose(model, [narrow(4)])
+    (effect, *_) = diagnosis.to_dict()["effects"]
+    names = {(effect["effect"], effect["joint"])} | {
+        (r["effect"], r["joint"]) for r in effect["alternatives"]
+    }
+    assert ("joint_spring", 2) in names and len(names) > 1
+    assert all(rival["why"] for rival in effect["alternatives"])

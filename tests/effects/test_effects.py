@@ -1,0 +1,334 @@
+"""Each effect's torque is its law, its columns give its parameters back, and nonsense is refused."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from synthetic import fourier_motion, three_axis
+
+from armloop.arm import Arm
+from armloop.effects import EFFECTS, Context, Effect, Estimate, effect, hypotheses
+from armloop.effects.payload import Payload
+from armloop.errors import ModelError
+from armloop.kinematics import link_motion, nominal_parameters
+from armloop.motion import Motion
+
+Law = Callable[[Motion], np.ndarray]
+
+X_TOOL = np.eye(4)
+X_TOOL[:3, :3] = Rotation.from_euler("xyz", [0.4, -0.7, 1.1]).as_matrix()
+X_TOOL[:3, 3] = [0.3, -0.05, 0.02]
+
+
+def an_arm() -> Arm:
+    """The three-axis arm with a tool that is turned and shifted against the last link."""
+    return replace(three_axis(), X_tool=X_TOOL)
+
+
+@pytest.fixture(scope="module")
+def context() -> Context:
+    motion = fourier_motion(20.0, 50.0, seed=3)
+    return Context(an_arm(), motion, nominal_parameters(an_arm()), 0.02)
+
+
+def on_joint_2(torque: Law) -> Law:
+    def law(motion: Motion) -> np.ndarray:
+        tau = np.zeros_like(motion.q)
+        tau[:, 1] = torque(motion)
+        return tau
+
+    return law
+
+
+# effect -> its law at joint 2 as published, the parameters, and the shape its columns need
+LAWS: dict[str, tuple[Law, dict[str, float], float]] = {
+    "viscous_friction": (on_joint_2(lambda m: 0.7 * m.v[:, 1]), {"coefficient": 0.7}, 0.0),
+    "coulomb_friction": (on_joint_2(lambda m: 0.3 * np.sign(m.v[:, 1])), {"level": 0.3}, 0.0),
+    "joint_spring": (
+        on_joint_2(lambda m: 2.0 * (m.q[:, 1] - 0.4)),
+        {"stiffness": 2.0, "rest": 0.4},
+        0.0,
+    ),
+    "torque_ripple": (
+        on_joint_2(lambda m: 0.2 * np.sin(11 * m.q[:, 1] - 0.9)),
+        {"amplitude": 0.2, "order": 11.0, "phase": -0.9},
+        11.0,
+    ),
+    "rotor_inertia": (on_joint_2(lambda m: 0.05 * m.vdot[:, 1]), {"inertia": 0.05}, 0.0),
+    "torque_offset": (on_joint_2(lambda m: np.full(m.samples, -0.4)), {"offset": -0.4}, 0.0),
+}
+PAYLOAD = {"mass": 0.6, "com": [0.04, -0.02, 0.05], "own_inertia": 2e-3}
+TILT = {"roll": 0.05, "pitch": -0.03}
+
+
+def build(name: str) -> Effect:
+    return effect(name, 2 if EFFECTS[name].joint_wise else None)
+
+
+def fitted(kind: Effect, context: Context, tau: np.ndarray, shape: float) -> dict[str, Estimate]:
+    """The parameters by plain least squares on the effect's columns."""
+    columns = kind.full_columns(context, shape)
+    beta = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), tau.ravel(), rcond=None)[0]
+    x = kind.start(beta)
+    return kind.estimates(context.arm, x, np.zeros((len(x), len(x))), shape)
+
+
+def test_the_published_effects_are_there():
+    assert set(EFFECTS) == {*LAWS, "payload", "gravity_tilt"}
+    assert all(EFFECTS[name].joint_wise for name in LAWS)
+    assert not EFFECTS["payload"].joint_wise and not EFFECTS["gravity_tilt"].joint_wise
+    assert [name for name, kind in EFFECTS.items() if kind.sensor] == ["torque_offset"]
+    labels = [h.label() for h in hypotheses(an_arm())]
+    assert len(labels) == len(set(labels)) == 6 * 3 + 2
+    assert "viscous_friction at joint 3" in labels and "payload" in labels
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_torque_is_the_published_law(name, context):
+    law, parameters, _ = LAWS[name]
+    np.testing.assert_allclose(build(name).torque(context, parameters), law(context.motion), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_columns_give_the_parameters_back(name, context):
+    law, parameters, shape = LAWS[name]
+    found = fitted(build(name), context, law(context.motion), shape)
+    assert set(found) == set(parameters)
+    for key, value in parameters.items():
+        assert found[key].value == pytest.approx(value, rel=1e-9), key
+
+
+def potential_energy(
+    arm: Arm, q: np.ndarray, mass: float, com_link: np.ndarray, gravity: np.ndarray
+) -> float:
+    """Of a point mass on the last link, by walking along the chain with rotation vectors."""
+    R, p = np.eye(3), np.zeros(3)
+    for i in range(arm.n):
+        p = p + R @ arm.X_PF[i, :3, 3]
+        R = R @ arm.X_PF[i, :3, :3] @ Rotation.from_rotvec(q[i] * arm.axis[i]).as_matrix()
+    return float(-mass * gravity @ (p + R @ com_link))
+
+
+def by_differences(f: Callable[[np.ndarray], float], q: np.ndarray) -> np.ndarray:
+    step = 1e-6 * np.eye(len(q))
+    return np.array([(f(q + d) - f(q - d)) / 2e-6 for d in step])
+
+
+def test_a_payload_at_rest_is_the_slope_of_its_potential_energy_and_the_tool_frame_counts():
+    arm = an_arm()
+    com_link = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+    for q in np.random.default_rng(0).uniform(-1.5, 1.5, (5, 3)):
+        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
+        expected = by_differences(
+            lambda q: potential_energy(arm, q, PAYLOAD["mass"], com_link, arm.gravity), q
+        )
+        np.testing.assert_allclose(Payload().torque(Context(arm, rest), PAYLOAD)[0], expected, atol=1e-7)
+
+
+def test_a_payload_in_motion_is_mass_times_acceleration():
+    # power balance: v·tau = d/dt of the kinetic energy, which needs no regressor
+    arm = an_arm()
+    motion = fourier_motion(1.0, 1000.0, seed=8)
+    com = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+    without_gravity = replace(arm, gravity=np.zeros(3))
+    tau = Payload().torque(Context(without_gravity, motion), PAYLOAD)
+    w = link_motion(arm, motion.q, motion.v, motion.vdot).w[-1]
+    step = 1e-6
+
+    def centre(q: np.ndarray) -> np.ndarray:
+        return np.array([potential_energy(arm, q, 1.0, com, -e) for e in np.eye(3)])
+
+    speed = np.array(
+        [
+            (centre(q + step * v) - centre(q - step * v)) / (2 * step)
+            for q, v in zip(motion.q, motion.v, strict=True)
+        ]
+    )
+    energy = 0.5 * PAYLOAD["mass"] * (speed**2).sum(axis=1) + 0.5 * PAYLOAD["own_inertia"] * (w**2).sum(
+        axis=1
+    )
+    power = (tau * motion.v).sum(axis=1)
+    rate = np.gradient(energy, 1e-3)
+    np.testing.assert_allclose(power[5:-5], rate[5:-5], atol=1e-4 * np.abs(rate).max())
+
+
+def test_a_payload_is_found_from_its_columns(context):
+    tau = Payload().torque(context, PAYLOAD)
+    x = np.array([PAYLOAD["mass"], *(PAYLOAD["mass"] * com_in_link()), PAYLOAD["own_inertia"]])
+    np.testing.assert_allclose(Payload().columns(context, 0.0) @ Payload().embed(x)[0], tau, atol=1e-10)
+    found = Payload().estimates(context.arm, x, np.zeros((5, 5)), 0.0)
+    for key, value in PAYLOAD.items():
+        np.testing.assert_allclose(found[key].value, value, rtol=1e-9, err_msg=key)
+    # what the ten columns reveal without any constraint: mass and centre as far as the motion shows them
+    start = fitted(Payload(), context, tau, 0.0)
+    again = Payload().torque(context, {k: e.value for k, e in start.items()})
+    assert np.abs(again - tau).max() < 0.2 * np.abs(tau).max()
+
+
+def com_in_link() -> np.ndarray:
+    return X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_slope_of_the_payloads_constraint_is_that_of_finite_differences(seed):
+    rng = np.random.default_rng(seed)
+    x = np.array([rng.uniform(0.3, 4), *rng.uniform(-0.4, 0.4, 3), rng.uniform(1e-3, 0.05)])
+    _, J = Payload().embed(x)
+    for k in range(5):
+        h = 1e-6 * np.eye(5)[k]
+        slope = (Payload().embed(x + h)[0] - Payload().embed(x - h)[0]) / 2e-6
+        np.testing.assert_allclose(J[:, k], slope, atol=1e-7)
+
+
+def test_a_payload_is_always_a_possible_body():
+    rng = np.random.default_rng(5)
+    for x in rng.normal(size=(20, 5)):
+        beta, _ = Payload().embed(x)
+        mass, moment = beta[0], beta[1:4]
+        tensor = np.array(
+            [[beta[4], beta[7], beta[8]], [beta[7], beta[5], beta[9]], [beta[8], beta[9], beta[6]]]
+        )
+        c = moment / mass
+        about_centre = np.linalg.eigvalsh(tensor - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+        assert mass > 0 and about_centre.min() > -1e-9 * np.abs(tensor).max()
+
+
+def test_a_tilt_at_rest_is_the_slope_of_the_potential_energy_under_turned_gravity():
+    base = an_arm()
+    # rolled about the base's x axis, then pitched about the level y axis
+    R_WB = Rotation.from_euler("xy", [TILT["roll"], TILT["pitch"]]).as_matrix()
+    only_last = np.zeros(30)
+    mass, com = 1.3, np.array([0.1, -0.2, 0.05])
+    only_last[20:24] = [mass, *(mass * com)]
+    for q in np.random.default_rng(1).uniform(-1.5, 1.5, (4, 3)):
+        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
+        level, turned = (
+            by_differences(lambda q, g=g: potential_energy(base, q, mass, com, g), q)
+            for g in (base.gravity, R_WB.T @ base.gravity)
+        )
+        got = effect("gravity_tilt", None).torque(Context(base, rest, only_last), TILT)[0]
+        np.testing.assert_allclose(got, turned - level, atol=1e-7)
+
+
+def test_a_tilt_is_found_from_its_columns(context):
+    tilt = effect("gravity_tilt", None)
+    found = fitted(tilt, context, tilt.torque(context, TILT), 0.0)
+    for key, value in TILT.items():
+        assert found[key].value == pytest.approx(value, rel=0.03)  # columns are the slope at level
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_torque_is_columns_times_coefficients(name, context):
+    kind = build(name)
+    rng = np.random.default_rng(2)
+    shape = float(next(iter(kind.shapes(context))))
+    size = kind.full_columns(context, shape).shape[2]
+    beta = 1e-3 * rng.uniform(0.5, 1.0, size) if name == "gravity_tilt" else rng.uniform(0.5, 1.0, size)
+    x = kind.start(beta)
+    beta = kind.embed(x)[0]
+    found = kind.estimates(context.arm, x, np.zeros((len(x), len(x))), shape)
+    tau = kind.torque(context, {key: e.value for key, e in found.items()})
+    expected = kind.full_columns(context, shape) @ beta
+    np.testing.assert_allclose(
+        tau, expected, atol=2e-3 * np.abs(expected).max() if name == "gravity_tilt" else 1e-10
+    )
+    assert kind.complexity == len(x) + (name == "torque_ripple")  # the order of a ripple is free, too
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_standard_errors_follow_from_the_covariance(name, context):
+    kind = build(name)
+    rng = np.random.default_rng(6)
+    x = {"payload": np.array([0.8, 0.1, -0.05, 0.07, 0.01])}.get(name, rng.uniform(0.5, 1.0, kind.complexity))
+    shape = 7.0 if name == "torque_ripple" else 0.0
+    x = x[:2] if name == "torque_ripple" else x
+    root = 1e-3 * rng.normal(size=(len(x), len(x)))
+    covariance = root @ root.T
+
+    def values(x: np.ndarray) -> dict[str, np.ndarray]:
+        found = kind.estimates(context.arm, x, covariance, shape)
+        return {key: np.atleast_1d(np.asarray(e.value, dtype=float)) for key, e in found.items()}
+
+    steps = 1e-6 * np.eye(len(x))
+    for key, estimate in kind.estimates(context.arm, x, covariance, shape).items():
+        J = np.column_stack([(values(x + h)[key] - values(x - h)[key]) / 2e-6 for h in steps])
+        expected = np.sqrt(np.diag(J @ covariance @ J.T))
+        np.testing.assert_allclose(
+            np.atleast_1d(estimate.std_error), expected, rtol=1e-4, atol=1e-12, err_msg=key
+        )
+        assert estimate.unit
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "possible"),
+    [
+        ("payload", {"mass": 0.5, "com": [0.05, 0, 0]}, True),
+        ("payload", {"mass": -0.5, "com": [0.05, 0, 0]}, False),
+        ("payload", {"mass": 0.5, "com": [2.0, 0, 0]}, False),
+        ("rotor_inertia", {"inertia": 0.1}, True),
+        ("rotor_inertia", {"inertia": -0.1}, False),
+        ("joint_spring", {"stiffness": 1.0, "rest": 0.5}, True),
+        ("joint_spring", {"stiffness": -1.0, "rest": 0.5}, False),
+        ("joint_spring", {"stiffness": 1.0, "rest": -9.0}, False),
+        ("gravity_tilt", {"roll": 0.2, "pitch": -0.2}, True),
+        ("gravity_tilt", {"roll": 0.7, "pitch": 0.0}, False),
+        ("gravity_tilt", {"roll": 0.0, "pitch": -0.7}, False),
+        ("coulomb_friction", {"level": -0.3}, True),  # friction may have fallen since the model was made
+        ("viscous_friction", {"coefficient": -0.3}, True),
+        ("torque_offset", {"offset": -0.3}, True),
+    ],
+)
+def test_bounds_of_what_is_possible(name, parameters, possible):
+    estimates = {key: Estimate(value, 0.0, "") for key, value in parameters.items()}
+    assert build(name).plausible(an_arm(), estimates) is possible
+
+
+def test_a_ripple_is_sought_above_the_harmonics_of_gravity_and_on_turning_joints_only(context):
+    orders = list(effect("torque_ripple", 2).shapes(context))
+    assert orders[0] == 4.0 and len(orders) > 15 and all(order == round(order) for order in orders)
+    sliding = tuple(replace(joint, kind="prismatic") for joint in context.arm.joints)
+    assert not effect("torque_ripple", 2).shapes(replace(context, arm=replace(context.arm, joints=sliding)))
+
+
+def test_units_are_those_of_the_joint():
+    arm = an_arm()
+    sliding = replace(arm, joints=tuple(replace(joint, kind="prismatic") for joint in arm.joints))
+    for name, key, turning_unit, sliding_unit in (
+        ("viscous_friction", "coefficient", "N*m*s/rad", "N*s/m"),
+        ("coulomb_friction", "level", "N*m", "N"),
+        ("joint_spring", "stiffness", "N*m/rad", "N/m"),
+        ("joint_spring", "rest", "rad", "m"),
+        ("torque_offset", "offset", "N*m", "N"),
+        ("rotor_inertia", "inertia", "kg*m^2", "kg"),
+    ):
+        kind = build(name)
+        x, cov = np.ones(kind.complexity), np.zeros((kind.complexity,) * 2)
+        units = [kind.estimates(a, x, cov, 0.0)[key].unit for a in (arm, sliding)]
+        assert units == [turning_unit, sliding_unit], name
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_says_in_words_what_was_found(name, context):
+    kind = build(name)
+    parameters = LAWS[name][1] if name in LAWS else {"payload": PAYLOAD, "gravity_tilt": TILT}[name]
+    estimates = {k: Estimate(v, [0.01] * 3 if k == "com" else 0.01, "u") for k, v in parameters.items()}
+    words = kind.sentence(estimates)
+    assert "\n" not in words and len(words) > 20
+    if kind.joint_wise:
+        assert "joint 2" in words
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "expected"),
+    [
+        ("magic", None, "unknown effect 'magic'"),
+        ("payload", 3, "must be null"),
+        ("viscous_friction", None, "must be a number"),
+        ("viscous_friction", "2", "must be a number"),
+    ],
+)
+def test_effects_that_are_none_are_refused(name, joint, expected):
+    with pytest.raises(ModelError, match=expected):
+        effect(name, joint)
