@@ -58,9 +58,10 @@ class LoopResult(Protocol):
     """What a run of the loop hands over.
 
     ``logs`` are those the model was made from, by condition; ``clusters`` of their conditioned samples;
-    ``tracking`` by controller; ``undeclared`` holds effect, joint and parameters of what was hidden in the plant,
-    revealed after the verdict, ``right`` whether the verdict met it; ``tracking_before`` and ``tracking_after``
-    are PID + Step III on the changed plant with the first and with the augmented model; ``seconds`` per stage.
+    ``tracking`` by controller; ``undeclared`` holds effect, joint and parameters of what was hidden in the
+    plant, revealed after the verdict, ``right`` whether the verdict met it; ``tracking_before`` and
+    ``tracking_after`` are PID + Step III on the changed plant with the first and with the augmented model;
+    ``seconds`` per stage.
     """
 
     @property
@@ -128,7 +129,7 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
 
 
 def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
-    """The loop as a ring of eight stages with this run's numbers; for a file, save it on a light background."""
+    """The loop as a ring of eight stages with this run's numbers; save it on a light background."""
     diagnosis, tracking = result.diagnosis, dict(result.tracking)
     samples = varying or _varying(result)
     model = result.reconstruction.model
@@ -150,7 +151,8 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
     )
     colors = controller_colors(list(tracking))
     etas = {name: mean_eta(run) for name, run in tracking.items()}
-    best, worst = min(etas.values()), max(etas.values())
+    by_eta = sorted(etas, key=lambda name: etas[name])
+    best, worst = etas[by_eta[0]], etas[by_eta[-1]]
     u_eta = result.tracking_after.unit[0]
     eta_before, eta_after = mean_eta(result.tracking_before), mean_eta(result.tracking_after)
     q = samples.motion.q[part]
@@ -174,8 +176,7 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
         Stage(
             "Control",
             "η " + angle(f"{number(worst, 2)} → {number(best, 2)}", u_eta),
-            f"{_short(max(etas, key=lambda k: etas[k]))} to {_short(min(etas, key=lambda k: etas[k]))}, "
-            "mean of the joints",
+            f"{_short(by_eta[-1])} to {_short(by_eta[0])}, mean of the joints",
             bars(list(etas.values()), [colors[name] for name in etas], [_short(name) for name in etas]),
         ),
         Stage(

@@ -172,8 +172,12 @@ def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not
     errors = diagnosis.errors()
     relative = errors["nrmse"]
     rows = [
-        [f"{j + 1}  {joint.name}", unit(errors["unit"][j]), errors["before"][j], errors["after"][j]]
-        + [errors["noise_floor"][j], percent(relative["before"][j]), percent(relative["after"][j])]
+        [
+            f"{j + 1}  {joint.name}",
+            unit(errors["unit"][j]),
+            *(errors[key][j] for key in ("before", "after", "noise_floor")),
+            *(percent(relative[key][j]) for key in ("before", "after")),
+        ]
         for j, joint in enumerate(diagnosis.model.arm.joints)
     ]
     headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]

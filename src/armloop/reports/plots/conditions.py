@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from armloop.conditions import Clusters, Condition
-from armloop.reports.plots.style import BLUE, CONDITIONS, INK, SURFACE, every, figure, legend, polish
+from armloop.reports.plots.style import BLUE, CONDITIONS, INK, SURFACE, every, figure, legend, panels, polish
 from armloop.reports.words import counted
 
 _MOST = 6000
@@ -14,8 +14,8 @@ _MOST = 6000
 
 def clusters_figure(clusters: Clusters) -> Figure:
     """Left the samples, coloured by condition, with the cluster centres; right the elbow of Eq. (9)."""
-    made = figure(10, 3.9)
-    plane, elbow = made.subplots(1, 2, gridspec_kw={"width_ratios": [1.7, 1]})
+    made = figure(10, 4.1)
+    plane, elbow = panels(made, 1, 2, width_ratios=[1.7, 1])[0]
     for kind in Condition:
         members = clusters.indicator[clusters.condition == kind]
         shown = members[every(len(members), _MOST // 3)]
@@ -28,7 +28,7 @@ def clusters_figure(clusters: Clusters) -> Figure:
     )
     polish(plane, "activation of velocity", "activation of acceleration", "Conditions of the samples")
     plane.margins(0.06)
-    legend(plane, 1, loc="best")
+    legend(made, 3)
     counts = np.arange(1, len(clusters.wcss) + 1)
     elbow.plot(counts, clusters.wcss, color=BLUE, linewidth=2, marker="o", markersize=5)
     elbow.plot(

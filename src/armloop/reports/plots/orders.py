@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from armloop.reconstruction import StepReport
-from armloop.reports.plots.style import BLUE, INK, MUTED, figure, polish
+from armloop.reports.plots.style import BLUE, INK, MUTED, figure, panels, polish
 from armloop.reports.words import percent
 
 _ROMAN = {1: "I", 2: "II", 3: "III"}
@@ -24,19 +24,19 @@ def orders_figure(reports: Sequence[StepReport], baseline: Sequence[StepReport] 
 
     Steps regressed together share one search and one panel; ``baseline`` adds the one-shot method's.
     """
-    panels: dict[str, tuple[str, StepReport]] = {}
+    searches: dict[str, tuple[str, StepReport]] = {}
     for report in reports:
         if report.trials:
             key = str(report.trials)
             name = (
-                f"{panels[key][0]} + {_ROMAN[report.step]}"
-                if key in panels
+                f"{searches[key][0]} + {_ROMAN[report.step]}"
+                if key in searches
                 else f"Step {_ROMAN[report.step]}"
             )
-            panels[key] = (name, report)
-    shown = [*panels.values(), *(("One-shot SINDy", report) for report in baseline[:1] if report.trials)]
+            searches[key] = (name, report)
+    shown = [*searches.values(), *(("One-shot SINDy", report) for report in baseline[:1] if report.trials)]
     made = figure(max(4.6, 3.3 * len(shown)), 3.3)
-    row = made.subplots(1, len(shown), squeeze=False)[0]
+    row = panels(made, 1, len(shown), legend_row=False)[0]
     for axes, (name, report) in zip(row, shown, strict=True):
         labels = [f"({orders[0]}, {orders[1]})" for orders, _ in report.trials]
         errors = [error for _, error in report.trials]

@@ -16,6 +16,7 @@ from armloop.reports.plots.style import (
     every,
     figure,
     legend,
+    panels,
     polish,
     thin,
     with_gaps,
@@ -37,7 +38,7 @@ def residual_time_figure(diagnosis: Diagnosis, most_seconds: float = 60.0) -> Fi
     shown = time <= most_seconds
     n = len(joints)
     made = figure(10, (1.5 if n < 5 else 1.2) * n + 0.7)
-    column = made.subplots(n, 1, sharex=True, squeeze=False)[:, 0]
+    column = panels(made, n, 1, sharex=True)[:, 0]
     for j, (axes, joint) in enumerate(zip(column, joints, strict=True)):
         _band(axes, float(scale[j]))
         for values, color, label in _series(diagnosis, before, after):
@@ -52,11 +53,11 @@ def residual_time_figure(diagnosis: Diagnosis, most_seconds: float = 60.0) -> Fi
 
 
 def residual_shape_figure(diagnosis: Diagnosis) -> Figure:
-    """One row per joint: the residual against position and velocity (dots, and means of bins), and its spectrum."""
+    """One row per joint: the residual against position and velocity (dots, bins' means), and its spectrum."""
     before, after = held_out_residuals(diagnosis)
     motion, scale, arm = diagnosis.samples.motion, diagnosis.evidence.scale, diagnosis.model.arm
     made = figure(10.5, (2.0 if arm.n < 5 else 1.55) * arm.n + 0.7)
-    grid = made.subplots(arm.n, 3, squeeze=False)
+    grid = panels(made, arm.n, 3)
     for j, joint in enumerate(arm.joints):
         last = j == arm.n - 1
         for k, x in enumerate((motion.q[:, j], motion.v[:, j])):
@@ -74,7 +75,7 @@ def residual_shape_figure(diagnosis: Diagnosis) -> Figure:
         for values, color, label in _series(diagnosis, before, after):
             _spectrum(axes, diagnosis, values[:, j], color, label)
         if diagnosis.samples.cutoff_hz > 0:
-            # what the baseline's residual would show, were it spread evenly over the band that passes the filter
+            # what the baseline's residual would show, were it spread evenly below the filter's corner
             level = float(scale[j]) / np.sqrt(diagnosis.samples.cutoff_hz)
             axes.axhspan(level / 2, 2 * level, color=BASELINE, alpha=0.22, linewidth=0)
         polish(axes, "frequency [Hz]" if last else "", f"[{unit(joint.torque_unit)}/√Hz]")

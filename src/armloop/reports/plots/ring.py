@@ -185,8 +185,8 @@ def lines(
 ) -> Callable[[Axes], None]:
     """Small lines over one another.
 
-    ``band`` shades ±band, ``limit`` fixes the height to ±limit, ``first_wide`` draws the first line wide and pale,
-    so that one that agrees with it can be seen upon it.
+    ``band`` shades ±band, ``limit`` fixes the height to ±limit, ``first_wide`` draws the first line wide and
+    pale, so that one that agrees with it can be seen upon it.
     """
 
     def draw(axes: Axes) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from armloop.diagnosis import Diagnosis
-from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, polish
+from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, panels, polish
 from armloop.reports.words import effect_label, percent
 
 _MOST_RIVALS = 4
@@ -18,8 +18,8 @@ def shares_figure(diagnosis: Diagnosis) -> Figure:
         bars.append((effect_label(found.effect), found.share, True))
         rivals = sorted(found.rivals, key=lambda rival: -rival[1])[:_MOST_RIVALS]
         bars += [(f"alike: {effect_label(effect)}", share, False) for effect, share in rivals]
-    made = figure(8.5, 0.9 + 0.42 * max(1, len(bars)))
-    axes = made.subplots()
+    made = figure(9.5, 1.0 + 0.42 * max(1, len(bars)))
+    axes = panels(made, left=2.9, legend_row=False)[0, 0]
     for k, (_, share, real) in enumerate(bars):
         axes.barh(k, 100 * share, 0.62 if real else 0.34, color=BLUE if real else GREY)
         axes.annotate(

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
-from armloop.reports.plots.style import MUTED, STEPS, figure, legend, polish, thin
+from armloop.reports.plots.style import MUTED, STEPS, figure, legend, panels, polish, thin
 from armloop.reports.words import unit
 from armloop.signals import smooth
 
@@ -23,7 +23,7 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
     predicted = {step: smooth(samples, model.predict(samples.motion, step)) for step in STEPS}
     n = model.arm.n
     made = figure(10, 1.75 * n + 0.7)
-    column = made.subplots(n, 1, sharex=True, squeeze=False)[:, 0]
+    column = panels(made, n, 1, sharex=True)[:, 0]
     for j, (axes, joint) in enumerate(zip(column, model.arm.joints, strict=True)):
         axes.plot(
             *thin(time, samples.tau[shown, j]),

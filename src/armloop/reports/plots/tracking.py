@@ -17,6 +17,7 @@ from armloop.reports.plots.style import (
     controller_colors,
     figure,
     legend,
+    panels,
     polish,
     thin,
 )
@@ -45,10 +46,10 @@ def tracking_figure(
     colors = colors or controller_colors(list(results))
     if n < _MANY_JOINTS:
         made = figure(max(5.5, 3.5 * n), 5.2)
-        grid = made.subplots(2, n, sharex=True, squeeze=False, gridspec_kw={"height_ratios": [1.25, 1]})
+        grid = panels(made, 2, n, sharex=True, height_ratios=[1.25, 1])
     else:
         made = figure(10.5, 1.7 * n)
-        grid = made.subplots(n, 2, sharex=True, squeeze=False).T
+        grid = panels(made, n, 2, sharex=True).T
     for j, unit in enumerate(first.unit):
         scale = np.rad2deg(1.0) if unit == "deg" else 1e3
         follow, error = grid[0, j], grid[1, j]
@@ -90,9 +91,7 @@ def eta_figure(
     parts: list[list[int]] = [
         [j for j in range(n) if first.unit[j] == unit] for unit in dict.fromkeys(first.unit)
     ]
-    row = made.subplots(
-        1, len(parts), squeeze=False, gridspec_kw={"width_ratios": [len(part) for part in parts]}
-    )[0]
+    row = panels(made, 1, len(parts), width_ratios=[len(part) for part in parts])[0]
     for axes, joints in zip(row, parts, strict=True):
         _bars(axes, joints, results, names or {}, colors, paper)
         polish(axes, "", f"mean absolute error η [{first.unit[joints[0]]}]", grid="y")
