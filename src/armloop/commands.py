@@ -107,7 +107,7 @@ def cluster(options: argparse.Namespace) -> None:
 
 def collect(options: argparse.Namespace) -> None:
     """Simulate a data collection."""
-    from armloop.collecting import collect_logs
+    from armloop.loop import collect_logs
 
     folder = _out_folder(options.out)
     logs = collect_logs(options.arm, options.plan, options.seed, _progress(options))
@@ -213,7 +213,7 @@ def track(options: argparse.Namespace) -> None:
     """Compare controllers in closed loop."""
     from armloop.drake_systems.scenarios import load_tracking
     from armloop.reports.tables import eta_table
-    from armloop.tracking_run import run_scenario
+    from armloop.loop import run_scenario
 
     folder = _out_folder(options.out) if options.out else None
     scenario = load_tracking(options.scenario)

@@ -12,6 +12,7 @@ from armloop.diagnosis.fit import Fit, fit
 from armloop.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.progress import Progress
+from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,9 @@ SIGNIFICANCE = 3.0
 #: … and, on the joints it acts on, by this part of the energy the model leaves on its own baseline: what is
 #: smaller cannot be told from the model's own shortcomings.
 BASELINE_SHARE = 0.35
+#: A further effect must remove at least this part of what could be explained at first: what a large effect leaves
+#: because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for small ones.
+LEAST_SHARE = 0.01
 #: Fits whose held-out error is within this part of the explained energy of the best count as equals.
 EQUAL_SHARE = 0.03
 _MOST_EFFECTS = 4
@@ -72,7 +76,9 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
             if any(f.effect.name == effect.name and f.effect.joint == effect.joint for f in found):
                 continue
             trial = _trial(evidence, residual, current, effect)
-            if trial is not None and _worth(current, trial, rows_per_joint):
+            if trial is None or not _worth(current, trial, rows_per_joint):
+                continue
+            if _gain(current, trial) >= LEAST_SHARE * explainable:
                 trials.append(trial)
         if not trials:
             break
@@ -109,11 +115,13 @@ def _best_shape(evidence: Evidence, residual: Array, current: Fit, effect: Effec
     left = np.array(residual[:, j])
     rows = evidence.rows[:, j]
     left[rows] = current.held_out[current.stacked.joint == j] * evidence.scale[j]
-    explained = []
-    for shape in shapes:
-        X = evidence.columns(effect, shape)[rows, j]
-        beta = np.linalg.lstsq(X, left[rows], rcond=None)[0]
-        explained.append(float(left[rows] @ X @ beta))
+    each = [effect.columns(evidence.context, shape) for shape in shapes]
+    X = smooth(evidence.samples, np.hstack(each))[rows]
+    width = each[0].shape[1]
+    X = X.reshape(len(X), len(shapes), width)
+    G = np.einsum("ksp,ksr->spr", X, X) + 1e-12 * len(X) * np.eye(width)
+    b = np.einsum("ksp,k->sp", X, left[rows])
+    explained = np.einsum("sp,sp->s", b, np.linalg.solve(G, b[:, :, None])[:, :, 0])
     return shapes[int(np.argmax(explained))]
 
 

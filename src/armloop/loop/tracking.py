@@ -1,0 +1,82 @@
+"""A tracking scenario from start to end: models, runs, and the files a user looks at."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from armloop.drake_systems.collection import collect
+from armloop.drake_systems.loop_analysis import loop_margins
+from armloop.drake_systems.scenarios import TrackingScenario, load_plan
+from armloop.drake_systems.tracking import TrackingResult, run_tracking
+from armloop.files import replacing, write_text
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress
+from armloop.reconstruction import reconstruct
+
+SCHEMA = "armloop/tracking/1"
+
+
+def run_scenario(
+    scenario: TrackingScenario,
+    models: Mapping[str, ReconstructedModel],
+    folder: Path | None,
+    progress: Progress,
+) -> tuple[dict[str, Any], dict[str, TrackingResult]]:
+    """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
+
+    Without any model one is reconstructed first, from data collected on the scenario's own arm.
+
+    Returns:
+        The content of ``tracking.json`` and the results by controller.
+    """
+    chosen = dict(models)
+    if not chosen:
+        progress("no --model given: collecting data on the scenario's arm and reconstructing one")
+        plant = scenario.plant
+        logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed)
+        chosen["model"] = reconstruct(list(logs.values()), plant.arm, progress=progress).model
+    progress(f"tracking {scenario.reference.duration:g} s with each controller")
+    results = run_tracking(scenario, chosen)
+    answer = tracking_answer(scenario, results)
+    if folder is not None:
+        from armloop.drake_systems.replay import write_replay
+        from armloop.reports.plots import tracking_figure
+
+        progress("drawing and recording the replay")
+        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
+        with replacing(folder / "tracking.png") as draft:
+            tracking_figure(results).savefig(draft, format="png", dpi=110)
+        write_replay(folder / "replay.html", scenario.plant.arm, results)
+        if not models:
+            chosen["model"].save(folder / "model.json")
+    return answer, results
+
+
+def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
+    """The content of ``tracking.json``: η per joint and controller, and the loop's margins at rest."""
+    first = next(iter(results.values()))
+    plant = scenario.plant
+    q0 = scenario.reference.evaluate([0.0])[0][0]
+    margins = loop_margins(plant.arm, plant.config.friction, scenario.gains, q0, plant.config.time_step)
+    return {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "arm": plant.arm.name,
+        "scored_s": list(scenario.score),
+        "unit": list(first.unit),
+        "controllers": {
+            name: {"eta_deg": r.eta.tolist(), "rms": r.rms.tolist(), "max": r.largest.tolist()}
+            for name, r in results.items()
+        },
+        "loop": [
+            {
+                "phase_margin_deg": m.phase_margin,
+                "bandwidth_rad_s": m.bandwidth,
+                "sensitivity_peak": m.sensitivity_peak,
+            }
+            for m in margins
+        ],
+    }
