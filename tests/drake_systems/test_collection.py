@@ -75,10 +75,10 @@ def test_collection_is_repeatable_tells_its_progress_and_can_be_written(tmp_path
     plan = dataclasses.replace(TINY, static_poses=1, velocity_segments=2, trajectories=0)
     seen = []
     logs = collect(plant.arm, plant.config, plan, 1, lambda what, done: seen.append((what, done)))
-    assert [what for what, _ in seen] == ["static"] * 2 + ["constant_velocity"] * 2
+    assert [what for what, _ in seen] == ["constant_velocity"] * 2 + ["static"] * 2
     done = [part for _, part in seen]
     assert done == sorted(done) and done[-1] == pytest.approx(1.0)
-    again = collect(plant.arm, plant.config, plan, 1)
+    again = collect(plant.arm, plant.config, plan, 1, processes=2)
     assert np.array_equal(logs["static"].tau, again["static"].tau)
     assert not np.array_equal(logs["static"].tau, collect(plant.arm, plant.config, plan, 2)["static"].tau)
     write_log(tmp_path / "static.csv", logs["static"])

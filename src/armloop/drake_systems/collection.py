@@ -6,7 +6,9 @@ segments the arm is put to the next start instead of being driven there: nothing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -81,17 +83,66 @@ class CollectionPlan:
 
 
 def collect(
-    arm: Arm, config: PlantConfig, plan: CollectionPlan, seed: int, progress: Progress = silent
+    arm: Arm,
+    config: PlantConfig,
+    plan: CollectionPlan,
+    seed: int,
+    progress: Progress = silent,
+    *,
+    processes: int = 1,
 ) -> dict[str, MotionLog]:
     """Collect `static`, `constant_velocity` and `varying` logs from the simulated arm.
 
     Only the settled part of each segment is logged; as the time before it passes, each segment is a run of
-    its own. The same seed gives the same logs.
+    its own. The same seed gives the same logs, with any number of `processes` (forked, each with its plant).
     """
-    coarse, fine = (
-        SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=step)
-        for step in (plan.segment_time_step, config.time_step)
+    crew = _Crew(arm, config, plan.rate, _parts(arm, config, plan, seed))
+    # The longest first: no process is left alone with one at the end.
+    jobs = sorted(
+        (
+            (part, index)
+            for part, content in enumerate(crew.parts)
+            for index in range(len(content.references))
+        ),
+        key=lambda job: (-crew.duration(job), job),
     )
+    total = sum(map(crew.duration, jobs))
+    recordings: dict[_Job, Recording] = {}
+    done = 0.0
+    with ExitStack() as stack:
+        record: Iterator[Recording] = map(crew.record, jobs)
+        if processes > 1:
+            fork = multiprocessing.get_context("fork")
+            pool = stack.enter_context(fork.Pool(processes, _inherit, (crew,)))
+            record = pool.imap(_record_inherited, jobs)
+        for job, recording in zip(jobs, record, strict=True):
+            recordings[job] = recording
+            done += crew.duration(job)
+            progress(crew.parts[job[0]].name, done / total)
+    noise = np.random.default_rng(seed)
+    return {
+        part.name: _as_log(
+            part.name, [recordings[k, i] for i in range(len(part.references))], config.instruments, noise
+        )
+        for k, part in enumerate(crew.parts)
+        if part.references
+    }
+
+
+_Job = tuple[int, int]  # a part and one of its references
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One condition of a collection."""
+
+    name: str
+    references: Sequence[Reference]
+    settle: float
+    time_step: float
+
+
+def _parts(arm: Arm, config: PlantConfig, plan: CollectionPlan, seed: int) -> list[_Part]:
     creep = 0.0 if plan.dwell else 1.0
     static = static_segments(
         config.ranges,
@@ -111,24 +162,49 @@ def collect(
         fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k)
         for k in range(plan.trajectories)
     ]
-    parts: list[tuple[str, SpeedModeArm, Sequence[Reference], float]] = [
-        ("static", coarse, static, plan.static_settle),
-        ("constant_velocity", coarse, constant, plan.velocity_settle),
-        ("varying", fine, varying, 0.0),
+    return [
+        _Part("static", static, plan.static_settle, plan.segment_time_step),
+        _Part("constant_velocity", constant, plan.velocity_settle, plan.segment_time_step),
+        _Part("varying", varying, 0.0, config.time_step),
     ]
-    total = sum(reference.duration for _, _, references, _ in parts for reference in references)
-    noise = np.random.default_rng(seed)
-    logs: dict[str, MotionLog] = {}
-    done = 0.0
-    for name, rig, references, settle in parts:
-        recordings = []
-        for reference in references:
-            recordings.append(rig.follow(reference, rate=plan.rate, settle=settle))
-            done += reference.duration
-            progress(name, done / total)
-        if recordings:
-            logs[name] = _as_log(name, recordings, config.instruments, noise)
-    return logs
+
+
+class _Crew:
+    """Simulated arms, one per time step, built when needed: diagrams cannot be sent to another process."""
+
+    def __init__(self, arm: Arm, config: PlantConfig, rate: float, parts: list[_Part]) -> None:
+        self.parts = parts
+        self._arm, self._config, self._rate = arm, config, rate
+        self._rigs: dict[float, SpeedModeArm] = {}
+
+    def duration(self, job: _Job) -> float:
+        return self.parts[job[0]].references[job[1]].duration
+
+    def record(self, job: _Job) -> Recording:
+        part = self.parts[job[0]]
+        rig = self._rigs.get(part.time_step)
+        if rig is None:
+            rig = SpeedModeArm(
+                self._arm,
+                self._config.friction,
+                instruments=self._config.instruments,
+                time_step=part.time_step,
+            )
+            self._rigs[part.time_step] = rig
+        return rig.follow(part.references[job[1]], rate=self._rate, settle=part.settle)
+
+
+_inherited: _Crew
+
+
+def _inherit(crew: _Crew) -> None:
+    # Handed over by the fork itself, so that nothing needs to be picklable on the way in.
+    global _inherited
+    _inherited = crew
+
+
+def _record_inherited(job: _Job) -> Recording:
+    return _inherited.record(job)
 
 
 def measure_run(

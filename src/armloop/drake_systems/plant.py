@@ -93,7 +93,8 @@ class ArmPlant(Diagram):
     M(q) vdot + C(q, v) v = tau_g(q) + tau - f(v) + effects, with f of Eq. (34), sticking below f_s.
 
     Torque mode (no servo). Input port `tau` (n,): drive torques, clamped to the arm's effort limits.
-    Output ports `state` (2n,): true q, then v; `tau_drive` (n,): the drives' torques after the clamp.
+    Output ports `state` (2n,): true q, then v; `tau_drive` (n,): the drives' torques in the
+    step that starts now, after the clamp.
     Speed mode (servo). Input port `desired_state` (2n,): q_d, then v_d at the end of the coming step.
     Output port `state`. The drives' torques follow from `servo_torque`.
     All input ports must be connected. Discrete with period `time_step`.
@@ -128,6 +129,8 @@ class ArmPlant(Diagram):
         self.plant: MultibodyPlant = builder.AddNamedSystem("plant", MultibodyPlant(time_step))
         add_links(self.plant, arm, self.effects)
         slots = self._add_actuators(servo)
+        # A seventh faster, and `Linearize` accepts the plant.
+        self.plant.SetUseSampledOutputPorts(False)
         self.plant.Finalize()
         self._connect(builder, slots, servo)
         builder.BuildInto(self)

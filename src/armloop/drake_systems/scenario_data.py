@@ -37,7 +37,7 @@ class PlantData:
 
     arm: str = ""  # built-in name, or the path of a URDF, from the scenario's folder
     friction: list[FrictionData] = field(default_factory=list)  # one per joint, base to tip
-    ranges: Optional[RangesData] = None  # noqa: UP045 -- from the limits when absent
+    ranges: Optional[RangesData] = None  # from the limits when absent
     time_step: float = 0.001  # s, of the plant and of the controllers
     encoder_counts: int = 524288  # per revolution; 0 for ideal encoders
     prismatic_lead: float = 0.02  # m per revolution of a sliding joint's screw
