@@ -54,7 +54,9 @@ def test_pointwise_is_the_vectorised_prediction(name, step, tmp_path):
 
 def test_a_sensor_effect_is_predicted_but_not_supplied():
     model = model_with("viscous_friction")
-    faulty = model.with_effects([AddedEffect(effect("torque_offset", 1), {"offset": Estimate(0.5, 0.0, "N*m")})])
+    faulty = model.with_effects(
+        [AddedEffect(effect("torque_offset", 1), {"offset": Estimate(0.5, 0.0, "N*m")})]
+    )
     q = np.array([0.1, 0.2, 0.3])
     motion = Motion(np.zeros(1), q[None], q[None], q[None], np.array([0]))
     assert faulty.predict(motion)[0, 0] == pytest.approx(model.predict(motion)[0, 0] + 0.5)

@@ -137,7 +137,9 @@ class Arm:
                 "X_tool": (4, 4),
                 "gravity": (3,),
             }
-            arrays = {key: np.array(data[key], dtype=float).reshape(shape) for key, shape in shapes.items()}
+            arrays: dict[str, Any] = {
+                key: np.array(data[key], dtype=float).reshape(shape) for key, shape in shapes.items()
+            }
             arm = Arm(name=str(data["name"]), joints=joints, **arrays)
         except (KeyError, TypeError, ValueError) as error:
             raise ArmError(f"the arm description is incomplete or misshapen: {error}") from error
@@ -148,7 +150,9 @@ class Arm:
     def require_same(self, other: Arm, what: str) -> None:
         """Raise ``ArmError`` unless ``other`` has this arm's joints and geometry."""
         if self.n != other.n:
-            raise ArmError(f"{what}: made for {self.name} with {self.n} joints, not for {other.name} with {other.n}")
+            raise ArmError(
+                f"{what}: made for {self.name} with {self.n} joints, not for {other.name} with {other.n}"
+            )
         if self.fingerprint() != other.fingerprint():
             raise ArmError(
                 f"{what}: made for {self.name} ({self.fingerprint()}), but {other.name} has other "

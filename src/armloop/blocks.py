@@ -29,4 +29,4 @@ def folds(motion: Motion, count: int, seconds: float) -> NDArray[np.intp]:
 def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray[np.float64]:
     """(B,) sums of values (N,) over the blocks that occur, in order."""
     _, index = np.unique(blocks, return_inverse=True)
-    return np.bincount(index, weights=values)
+    return np.asarray(np.bincount(index, weights=values), dtype=float)

@@ -29,7 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status."""
     try:
         options = build_parser().parse_args(arguments)
-        command: Callable[[argparse.Namespace], None] = getattr(import_module("armloop.commands"), options.command)
+        command: Callable[[argparse.Namespace], None] = getattr(
+            import_module("armloop.commands"), options.command
+        )
         command(options)
     except InputError as error:
         print(f"armloop: {error}", file=sys.stderr)
@@ -77,8 +79,12 @@ def _loop(commands: argparse._SubParsersAction[_Parser]) -> None:
         "the main job: collect, reconstruct, track, measure again, find the undeclared effect, add it, track again",
         "armloop loop --out out/loop",
     )
-    p.add_argument("--out", default="out/loop", help="folder for report.html, loop.json, logs, models (%(default)s)")
-    p.add_argument("--seed", type=int, default=1, help="draws the data and the undeclared effect (%(default)s)")
+    p.add_argument(
+        "--out", default="out/loop", help="folder for report.html, loop.json, logs, models (%(default)s)"
+    )
+    p.add_argument(
+        "--seed", type=int, default=1, help="draws the data and the undeclared effect (%(default)s)"
+    )
 
 
 def _collect(commands: argparse._SubParsersAction[_Parser]) -> None:
@@ -105,7 +111,10 @@ def _logs(p: _Parser) -> None:
 
 def _recorded(p: _Parser, default: str) -> None:
     p.add_argument(
-        "--tau-unit", choices=("N*m", "A"), default=None, help=f"what the columns tau hold (default: {default})"
+        "--tau-unit",
+        choices=("N*m", "A"),
+        default=None,
+        help=f"what the columns tau hold (default: {default})",
     )
     p.add_argument(
         "--drive-gains",
@@ -147,7 +156,9 @@ def _reconstruct(commands: argparse._SubParsersAction[_Parser]) -> None:
     _logs(p)
     p.add_argument("--arm", required=True, help=_ARM_HELP)
     p.add_argument("--out", required=True, help="the model file, JSON")
-    p.add_argument("--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)")
+    p.add_argument(
+        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+    )
     p.add_argument(
         "--library",
         default=None,
@@ -161,7 +172,9 @@ def _reconstruct(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     p.add_argument("--penalty", type=float, default=1e-3, help="λ of --estimator lasso (%(default)s)")
     p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
-    p.add_argument("--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)")
+    p.add_argument(
+        "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
+    )
     p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
     _recorded(p, "N*m")
     _json(p)
@@ -190,7 +203,9 @@ def _diagnose(commands: argparse._SubParsersAction[_Parser]) -> None:
     )
     p.add_argument("model", metavar="MODEL.json")
     _logs(p)
-    p.add_argument("--out", required=True, help="folder for diagnosis.json, model.json (augmented), report.html")
+    p.add_argument(
+        "--out", required=True, help="folder for diagnosis.json, model.json (augmented), report.html"
+    )
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
     _recorded(p, "as the model's training logs")
     _json(p)
@@ -203,7 +218,9 @@ def _track(commands: argparse._SubParsersAction[_Parser]) -> None:
         "compare controllers in closed loop in Drake: mean absolute tracking error per joint",
         "armloop track three_axis_tracking --model step1=model.json --model step3=model.json --out out/track",
     )
-    p.add_argument("scenario", metavar="SCENARIO", help="a built-in scenario (three_axis_tracking) or a YAML file")
+    p.add_argument(
+        "scenario", metavar="SCENARIO", help="a built-in scenario (three_axis_tracking) or a YAML file"
+    )
     p.add_argument(
         "--model",
         action="append",

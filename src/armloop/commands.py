@@ -59,7 +59,9 @@ def _recorded(options: argparse.Namespace, default: dict[str, Any]) -> dict[str,
     gains = _gains(options.drive_gains)
     unit = options.tau_unit
     if gains is not None and unit == "N*m":
-        raise InputError("--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already")
+        raise InputError(
+            "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
+        )
     if gains is None and unit is None:
         return default
     if gains is not None:
@@ -69,7 +71,8 @@ def _recorded(options: argparse.Namespace, default: dict[str, Any]) -> dict[str,
 
 def _read(paths: list[str], joints: int | None, recorded: dict[str, Any]) -> list[MotionLog]:
     return [
-        read_log(path, joints=joints, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"]) for path in paths
+        read_log(path, joints=joints, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"])
+        for path in paths
     ]
 
 
@@ -99,7 +102,9 @@ def cluster(options: argparse.Namespace) -> None:
             }
         )
         return
-    rows = [[name, count, f"{count / samples.motion.samples:.1%}"] for name, count in clusters.counts().items()]
+    rows = [
+        [name, count, f"{count / samples.motion.samples:.1%}"] for name, count in clusters.counts().items()
+    ]
     print(table(["condition", "samples", "share"], rows))
     print("\nwithin-cluster sum for 1, 2, … clusters: " + ", ".join(f"{w:.4g}" for w in clusters.wcss))
     print(f"the elbow suggests {clusters.elbow} clusters; k-means took {clusters.iterations} iterations")
@@ -212,8 +217,8 @@ def diagnose(options: argparse.Namespace) -> None:
 def track(options: argparse.Namespace) -> None:
     """Compare controllers in closed loop."""
     from armloop.drake_systems.scenarios import load_tracking
-    from armloop.reports.tables import eta_table
     from armloop.loop import run_scenario
+    from armloop.reports.tables import eta_table
 
     folder = _out_folder(options.out) if options.out else None
     scenario = load_tracking(options.scenario)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.errors import ModelError
 from armloop.library.double_feature_set import Factors, product_name, products
-from armloop.library.rigid_body import BaseParameters, full_columns
+from armloop.library.rigid_body import full_columns
 from armloop.motion import Motion
 
 Array = NDArray[np.float64]
@@ -145,9 +145,13 @@ class RigidBody:
     def from_dict(data: dict[str, Any], arm: Arm) -> RigidBody:
         parameters = np.array(data["parameters"], dtype=float)
         if parameters.shape not in ((10 * arm.n,), (11 * arm.n,)):
-            raise ModelError(f"rigid_body: {parameters.size} parameters, {arm.n} links need {10 * arm.n} or {11 * arm.n}")
+            raise ModelError(
+                f"rigid_body: {parameters.size} parameters, {arm.n} links need {10 * arm.n} or {11 * arm.n}"
+            )
         base = data["base_parameters"]
         return RigidBody(parameters, tuple(base), np.array(list(base.values()), dtype=float))
 
 
-COMPONENTS: dict[str, type[SparseTerms] | type[RigidBody]] = {kind.kind: kind for kind in (SparseTerms, RigidBody)}
+COMPONENTS: dict[str, type[SparseTerms] | type[RigidBody]] = {
+    kind.kind: kind for kind in (SparseTerms, RigidBody)
+}

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.components import COMPONENTS, Component
 from armloop.effects import Context, Effect, Estimate, effect
+from armloop.effects.base import Pointwise as EffectPointwise
 from armloop.errors import ArmError, ModelError
 from armloop.files import write_text
 from armloop.kinematics import nominal_parameters, regressor
@@ -44,6 +45,10 @@ class AddedEffect:
         """(N, n) torque of the effect."""
         return self.effect.torque(context, {key: e.value for key, e in self.parameters.items()})
 
+    def pointwise(self, arm: Arm, inertial: Array | None) -> EffectPointwise:
+        """The effect's torque for one sample at a time."""
+        return self.effect.pointwise(arm, {key: e.value for key, e in self.parameters.items()}, inertial)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as in ``diagnosis.json``."""
         return {
@@ -57,7 +62,10 @@ class AddedEffect:
         """Rebuild from :meth:`to_dict`."""
         return AddedEffect(
             effect(data["effect"], data["joint"]),
-            {key: Estimate(e["value"], e["std_error"], str(e["unit"])) for key, e in data["parameters"].items()},
+            {
+                key: Estimate(e["value"], e["std_error"], str(e["unit"]))
+                for key, e in data["parameters"].items()
+            },
         )
 
 
@@ -108,7 +116,9 @@ class ReconstructedModel:
         torques = [(added.effect, added.torque(context)) for added in self.effects]
         load = rigid + sum((tau for kind, tau in torques if kind.load), np.zeros_like(rigid))
         tau = rigid + self.friction.torque(motion, step, load)
-        return tau + sum((extra for kind, extra in torques if sensors or not kind.sensor), np.zeros_like(rigid))
+        return tau + sum(
+            (extra for kind, extra in torques if sensors or not kind.sensor), np.zeros_like(rigid)
+        )
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
@@ -140,7 +150,10 @@ class ReconstructedModel:
         Friction with memory acts as if fully slid: a single sample has no history.
         """
         if step not in self._pointwise:
-            self._pointwise[step] = pointwise(self, step)
+            added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
+            inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
+            effects = [(a.effect.load, a.pointwise(self.arm, inertial)) for a in added]
+            self._pointwise[step] = pointwise(self.arm, self.components, self.friction, effects, step)
         return self._pointwise[step](q, v, vdot)
 
     @cached_property
@@ -161,7 +174,8 @@ class ReconstructedModel:
             terms += [(t.step, t.coefficient, t.name(j + 1)) for t in self.friction.terms[j]]
             terms.sort(key=lambda term: term[0])
             body = " ".join(
-                f"{'-' if c < 0 else '+'} {abs(c):.4g}{'' if name == '1' else '*' + name}" for _, c, name in terms
+                f"{'-' if c < 0 else '+'} {abs(c):.4g}{'' if name == '1' else '*' + name}"
+                for _, c, name in terms
             )
             lines.append(f"tau{j + 1} = {body.removeprefix('+ ') or '0'}")
         return lines
@@ -187,7 +201,9 @@ class ReconstructedModel:
 
     def _check(self, motion: Motion) -> None:
         if motion.joints != self.arm.n:
-            raise ModelError(f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}")
+            raise ModelError(
+                f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
+            )
 
 
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
@@ -242,7 +258,8 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
         history=dict(data["history"]),
     )
-    probe = Motion(np.zeros(1), *np.full((3, 1, arm.n), 0.5), np.array([0]))
+    half = np.full((1, arm.n), 0.5)
+    probe = Motion(np.zeros(1), half, half, half, np.array([0]))
     if not np.isfinite(model.predict(probe)).all():
         raise ModelError("a coefficient is not a finite number")
     return model

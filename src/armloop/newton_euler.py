@@ -85,8 +85,16 @@ def _wrench(body: tuple[float, ...], w: Vector, wdot: Vector, a: Vector) -> tupl
     mass, mx, my, mz, xx, yy, zz, xy, xz, yz = body
     c: Vector = (mx, my, mz)
     swing, spin = _cross(wdot, c), _cross(w, _cross(w, c))
-    force = (mass * a[0] + swing[0] + spin[0], mass * a[1] + swing[1] + spin[1], mass * a[2] + swing[2] + spin[2])
-    L = (xx * w[0] + xy * w[1] + xz * w[2], xy * w[0] + yy * w[1] + yz * w[2], xz * w[0] + yz * w[1] + zz * w[2])
+    force = (
+        mass * a[0] + swing[0] + spin[0],
+        mass * a[1] + swing[1] + spin[1],
+        mass * a[2] + swing[2] + spin[2],
+    )
+    L = (
+        xx * w[0] + xy * w[1] + xz * w[2],
+        xy * w[0] + yy * w[1] + yz * w[2],
+        xz * w[0] + yz * w[1] + zz * w[2],
+    )
     gyro, lift = _cross(w, L), _cross(c, a)
     moment = (
         xx * wdot[0] + xy * wdot[1] + xz * wdot[2] + gyro[0] + lift[0],
@@ -110,7 +118,7 @@ def _rotation(axis: Vector, angle: float) -> tuple[Vector, Vector, Vector]:
 def _product(A: tuple[Vector, ...], B: tuple[Vector, ...]) -> tuple[Vector, Vector, Vector]:
     columns = list(zip(*B, strict=True))
     rows = [tuple(r[0] * c[0] + r[1] * c[1] + r[2] * c[2] for c in columns) for r in A]
-    return rows[0], rows[1], rows[2]  # type: ignore[return-value]
+    return rows[0], rows[1], rows[2]
 
 
 def _times(A: tuple[Vector, ...], x: Vector) -> Vector:

@@ -7,38 +7,40 @@ gather; friction is plain arithmetic; rigid bodies go through the recursive Newt
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.components import RigidBody, SparseTerms
+from armloop.arm import Arm
+from armloop.components import Component, RigidBody, SparseTerms
+from armloop.effects.base import Pointwise as EffectPointwise
+from armloop.library.friction import FrictionLaw
 from armloop.newton_euler import inverse_dynamics
-
-if TYPE_CHECKING:
-    from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 Pointwise = Callable[[Array, Array, Array], Array]
 
 
-def pointwise(model: ReconstructedModel, step: int) -> Pointwise:
+def pointwise(
+    arm: Arm,
+    components: Sequence[Component],
+    friction: FrictionLaw,
+    effects: Sequence[tuple[bool, EffectPointwise]],
+    step: int,
+) -> Pointwise:
     """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
-    Sensor effects are left out, and friction with memory acts as if fully slid: one sample has no past.
+    Args:
+        effects: each with whether its torque loads the joint, so that friction grows with it.
+
+    Friction with memory acts as if fully slid: one sample has no past.
     """
-    terms = _merged(model, step)
-    bodies = [_body(model, c, step) for c in model.components if isinstance(c, RigidBody)]
-    friction = [
-        [(term.coefficient, _LAWS[term.kind], term.parameter, term.by_load) for term in joint if term.step <= step]
-        for joint in model.friction.terms
-    ]
-    added = [a for a in model.effects if step >= 3 and not a.effect.sensor]
-    inertial = model.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
-    effects = [
-        (a.effect.load, a.effect.pointwise(model.arm, {k: e.value for k, e in a.parameters.items()}, inertial))
-        for a in added
+    terms = _merged(arm.n, components, step)
+    bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
+    laws_of = [
+        [(t.coefficient, _LAWS[t.kind], t.parameter, t.by_load) for t in joint if t.step <= step]
+        for joint in friction.terms
     ]
 
     def torque(q: Array, v: Array, vdot: Array) -> Array:
@@ -51,7 +53,7 @@ def pointwise(model: ReconstructedModel, step: int) -> Pointwise:
             tau += extra
             if is_load:
                 load += extra
-        for j, laws in enumerate(friction):
+        for j, laws in enumerate(laws_of):
             speed = float(v[j])
             sign = (speed > 0) - (speed < 0)
             for coefficient, law, parameter, by_load in laws:
@@ -62,9 +64,9 @@ def pointwise(model: ReconstructedModel, step: int) -> Pointwise:
     return torque
 
 
-def _body(model: ReconstructedModel, body: RigidBody, step: int) -> Pointwise:
-    n = model.arm.n
-    dynamics = inverse_dynamics(model.arm, body.parameters[: 10 * n])
+def _body(arm: Arm, body: RigidBody, step: int) -> Pointwise:
+    n = arm.n
+    dynamics = inverse_dynamics(arm, body.parameters[: 10 * n])
     rotors = body.parameters[10 * n :] if len(body.parameters) == 11 * n else np.zeros(n)
     still = np.zeros(n)
 
@@ -75,9 +77,8 @@ def _body(model: ReconstructedModel, body: RigidBody, step: int) -> Pointwise:
     return torque
 
 
-def _merged(model: ReconstructedModel, step: int) -> Pointwise:
-    n = model.arm.n
-    parts = [c for c in model.components if isinstance(c, SparseTerms) and c.step <= step and len(c.index)]
+def _merged(n: int, components: Sequence[Component], step: int) -> Pointwise:
+    parts = [c for c in components if isinstance(c, SparseTerms) and c.step <= step and len(c.index)]
     if not parts:
         return lambda q, v, vdot: np.zeros(n)
     width = max(part.index.shape[1] for part in parts)

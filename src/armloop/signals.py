@@ -161,9 +161,12 @@ def _velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
 def _as_they_are(logs: Sequence[MotionLog]) -> Samples:
     for log in logs:
         if log.vdot is None:
-            raise LogError(f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}")
+            raise LogError(
+                f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}"
+            )
     time, q, v, vdot, tau = (
-        np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("time", "q", "v", "vdot", "tau")
+        np.concatenate([np.asarray(getattr(log, key)) for log in logs])
+        for key in ("time", "q", "v", "vdot", "tau")
     )
     starts = np.cumsum([0] + [len(log.time) for log in logs[:-1]])
     return Samples(Motion(time, q, v, vdot, starts), tau, np.ones_like(q, dtype=bool), 1.0)

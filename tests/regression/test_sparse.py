@@ -35,7 +35,7 @@ def test_forced_columns_stay():
 
 
 def test_lasso_alone_keeps_more_than_the_default():
-    X, y, truth = planted(2, noise=0.02)
+    X, y, _ = planted(2, noise=0.02)
     moments = Moments.of(X, y)
     none = np.zeros(0, dtype=int)
     plain = Sparse(estimator="lasso", penalty=1e-3).support(moments, none)

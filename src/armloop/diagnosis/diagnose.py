@@ -83,7 +83,12 @@ class Diagnosis:
                     "share": found.share,
                     "words": added.effect.sentence(added.parameters),
                     "alternatives": [
-                        {"effect": rival.name, "joint": rival.joint, "share": share, "why": why_alike(added.effect, rival)}
+                        {
+                            "effect": rival.name,
+                            "joint": rival.joint,
+                            "share": share,
+                            "why": why_alike(added.effect, rival),
+                        }
                         for rival, share in found.rivals
                     ],
                 }
@@ -112,7 +117,9 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     """
     for log in logs:
         if log.joints != model.arm.n:
-            raise InputError(f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}")
+            raise InputError(
+                f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
+            )
     progress("conditioning the run like the model's training logs")
     samples = condition(logs, model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))

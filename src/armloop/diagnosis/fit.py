@@ -68,7 +68,9 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), held_out, stacked)
 
 
-def solve(moments: Moments, effects: Sequence[Effect], sizes: Sequence[int]) -> tuple[Array, list[Array], Array]:
+def solve(
+    moments: Moments, effects: Sequence[Effect], sizes: Sequence[int]
+) -> tuple[Array, list[Array], Array]:
     """Least squares over the effects' free parameters by Gauss-Newton (one step where all are linear).
 
     Returns:

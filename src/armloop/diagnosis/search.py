@@ -90,7 +90,9 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
             if trial is not best and _gain(current, trial) >= (1 - 2 * EQUAL_SHARE) * gain
         ]
         found.append(Found(best.effects[-1], best.shapes[-1], gain / explainable, rivals))
-        progress(f"found {best.effects[-1].label()}: removes {gain / explainable:.0%} of what can be explained")
+        progress(
+            f"found {best.effects[-1].label()}: removes {gain / explainable:.0%} of what can be explained"
+        )
         current = best
     after = _refit(evidence, current)
     return Outcome(found, before, after, residual)
@@ -108,7 +110,9 @@ def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) ->
     return trial
 
 
-def _best_shape(evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]) -> float:
+def _best_shape(
+    evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]
+) -> float:
     """The shape whose columns explain most of what the current effects leave on the effect's joint."""
     assert effect.joint is not None
     j = effect.joint - 1
@@ -136,7 +140,9 @@ def _worth(current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
     if gains.sum() <= SIGNIFICANCE * spread:
         return False
     joints = current.stacked.joint
-    by_joint = np.bincount(joints, weights=current.held_out**2 - trial.held_out**2, minlength=len(rows_per_joint))
+    by_joint = np.bincount(
+        joints, weights=current.held_out**2 - trial.held_out**2, minlength=len(rows_per_joint)
+    )
     return bool((by_joint > BASELINE_SHARE * rows_per_joint).any())
 
 

@@ -76,11 +76,15 @@ def _law(evidence: Evidence, after: Fit, j: int) -> tuple[str, float]:
     y = after.held_out[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
     motion = evidence.samples.motion
-    part = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
+    moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
     library = DoubleFeatureSet(tuple(bool(r) for r in evidence.model.arm.revolute), 2, 2, "velocity")
-    X, direction = library.columns(part), np.sign(part.v[:, [j]])
+    X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
     X = np.hstack([X, X[:, library.order() <= 1] * direction])
-    signed = [f"{name}*sign(v{j + 1})" for name, order in zip(library.names, library.order(), strict=True) if order <= 1]
+    signed = [
+        f"{name}*sign(v{j + 1})"
+        for name, order in zip(library.names, library.order(), strict=True)
+        if order <= 1
+    ]
     names = [*library.names, *signed]
     fold = after.stacked.fold[mine]
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]

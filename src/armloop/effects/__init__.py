@@ -44,7 +44,9 @@ def effect(name: Any, joint: Any) -> Effect:
         raise ModelError(f"unknown effect {name!r}; there are: {', '.join(EFFECTS)}")
     kind = EFFECTS[name]
     if kind.joint_wise != isinstance(joint, int):
-        raise ModelError(f"effect {name!r}: joint must be {'a number' if kind.joint_wise else 'null'}, not {joint!r}")
+        raise ModelError(
+            f"effect {name!r}: joint must be {'a number' if kind.joint_wise else 'null'}, not {joint!r}"
+        )
     return kind(joint)
 
 

@@ -37,8 +37,14 @@ class GravityTilt(Effect):
     def columns(self, context: Context, shape: float) -> Array:
         g, d = context.arm.gravity, self.step
         sides = [
-            (self._gravity_torque(context, tilted_gravity(g, d, 0)), self._gravity_torque(context, tilted_gravity(g, -d, 0))),
-            (self._gravity_torque(context, tilted_gravity(g, 0, d)), self._gravity_torque(context, tilted_gravity(g, 0, -d))),
+            (
+                self._gravity_torque(context, tilted_gravity(g, d, 0)),
+                self._gravity_torque(context, tilted_gravity(g, -d, 0)),
+            ),
+            (
+                self._gravity_torque(context, tilted_gravity(g, 0, d)),
+                self._gravity_torque(context, tilted_gravity(g, 0, -d)),
+            ),
         ]
         return np.stack([(plus - minus) / (2 * d) for plus, minus in sides], axis=2)
 

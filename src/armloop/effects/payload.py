@@ -65,7 +65,9 @@ class Payload(Effect):
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return {
             "mass": Estimate(mass, float(errors[0]), "kg"),
-            "com": Estimate((R.T @ (com - p)).tolist(), np.sqrt(np.maximum(np.diag(com_cov), 0)).tolist(), "m"),
+            "com": Estimate(
+                (R.T @ (com - p)).tolist(), np.sqrt(np.maximum(np.diag(com_cov), 0)).tolist(), "m"
+            ),
             "own_inertia": Estimate(max(float(x[4]), 0.0), float(errors[4]), "kg*m^2"),
         }
 

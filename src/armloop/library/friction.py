@@ -126,7 +126,12 @@ class FrictionLaw:
         """JSON-ready values, one list of terms per joint."""
         return [
             [
-                {"kind": t.kind, "name": t.name(j + 1), "coefficient": t.coefficient, "parameter": t.parameter}
+                {
+                    "kind": t.kind,
+                    "name": t.name(j + 1),
+                    "coefficient": t.coefficient,
+                    "parameter": t.parameter,
+                }
                 for t in terms
             ]
             for j, terms in enumerate(self.terms)
@@ -138,7 +143,10 @@ class FrictionLaw:
         try:
             return FrictionLaw(
                 tuple(
-                    tuple(FrictionTerm(t["kind"], float(t["coefficient"]), float(t.get("parameter", 0))) for t in joint)
+                    tuple(
+                        FrictionTerm(t["kind"], float(t["coefficient"]), float(t.get("parameter", 0)))
+                        for t in joint
+                    )
                     for joint in data
                 )
             )

@@ -84,7 +84,9 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         for name, log in logs.items():
             write_log(folder / "logs" / f"{name}.csv", log)
     with _Workers() as workers:
-        with _Clock(seconds, "reconstruct", progress, "2/6 reconstruct: three steps, each inheriting the last"):
+        with _Clock(
+            seconds, "reconstruct", progress, "2/6 reconstruct: three steps, each inheriting the last"
+        ):
             sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
             one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
             reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise")
@@ -101,11 +103,17 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             tracking = {name: run.result() for name, run in zip(scenario.controllers, runs, strict=True)}
             baseline = one_shot.result()
         print(eta_table(tracking, paper=True), end="\n\n", flush=True)
-        with _Clock(seconds, "diagnose", progress, "4/6 measured again: tracing the residual of the second run"):
+        with _Clock(
+            seconds, "diagnose", progress, "4/6 measured again: tracing the residual of the second run"
+        ):
             diagnosis = _diagnose(folder, progress)
         print(diagnosis_table(diagnosis), end="\n\n", flush=True)
-        with _Clock(seconds, "track_again", progress, "5/6 control better: tracking with the augmented model"):
-            after_run = workers.submit(track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared])
+        with _Clock(
+            seconds, "track_again", progress, "5/6 control better: tracking with the augmented model"
+        ):
+            after_run = workers.submit(
+                track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared]
+            )
             write_replay(folder / "replay.html", plant.arm, tracking)
             before, after = before_run.result(), after_run.result()
     right = _is_right(diagnosis, undeclared)
@@ -127,7 +135,10 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     )
     again = {"before (model as collected)": before, "after (augmented model)": after}
     print(eta_table(again, paper=False))
-    print(f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}", flush=True)
+    print(
+        f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}",
+        flush=True,
+    )
     with _Clock(seconds, "report", progress, "6/6 writing the report"):
         write_text(folder / "loop.json", json.dumps(loop_answer(result, scenario), indent=1) + "\n")
         write_text(folder / "report.html", loop_report(result))
@@ -205,7 +216,9 @@ def _one_thread() -> None:
 class _Clock:
     """Announce a stage and keep its wall time."""
 
-    def __init__(self, seconds: dict[str, float], stage: str, progress: Callable[[str], None], words: str) -> None:
+    def __init__(
+        self, seconds: dict[str, float], stage: str, progress: Callable[[str], None], words: str
+    ) -> None:
         self._seconds, self._stage, self._start = seconds, stage, 0.0
         progress(words)
 

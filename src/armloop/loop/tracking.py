@@ -60,7 +60,9 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
     first = next(iter(results.values()))
     plant = scenario.plant
     q0 = scenario.reference.evaluate([0.0])[0][0]
-    margins = loop_margins(plant.arm, plant.config.friction, scenario.gains, q0, plant.config.time_step)
+    margins = loop_margins(
+        plant.arm, plant.config.friction, scenario.gains, q0, period=plant.config.time_step
+    )
     return {
         "schema": SCHEMA,
         "scenario": scenario.name,

@@ -45,7 +45,10 @@ def draw(arm: Arm, seed: int) -> UndeclaredEffect:
     parameters: dict[str, dict[str, Any]] = {
         "viscous_friction": {"coefficient": level * size / speed},
         "coulomb_friction": {"level": level * size},
-        "joint_spring": {"stiffness": 2 * level * size / speed, "rest": float(rng.uniform(-0.5, 0.5)) * 2 * speed},
+        "joint_spring": {
+            "stiffness": 2 * level * size / speed,
+            "rest": float(rng.uniform(-0.5, 0.5)) * 2 * speed,
+        },
         "torque_ripple": {
             "amplitude": level * size,
             "order": float(rng.integers(5, 21)),

@@ -49,7 +49,9 @@ _POSTURES = 60
 _SLACK = 1e-9
 
 
-def rigid_body(arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress) -> Found:
+def rigid_body(
+    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
+) -> Found:
     """Regress base parameters and friction on all moving samples at once.
 
     Two passes: the torque that passes a joint, on which its friction depends, is known after the first.
@@ -93,9 +95,13 @@ def rigid_body(arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options:
     for step in (1, 2, 3):
         counts = [len(body.terms(arm, j)) + sum(t.step <= step for t in friction[j]) for j in range(arm.n)]
         reports.append(StepReport(step, None, len(theta), base.count, counts, samples_per_joint))
-    notes = ["the steps share one set of parameters: they were regressed together and are told apart on prediction"]
+    notes = [
+        "the steps share one set of parameters: they were regressed together and are told apart on prediction"
+    ]
     if active:
-        notes.append(f"{active} constraints were needed to keep M(q) positive definite and friction from driving")
+        notes.append(
+            f"{active} constraints were needed to keep M(q) positive definite and friction from driving"
+        )
     return Found(arm, [body], friction, reports, notes, {"inertial": body.parameters[: 10 * arm.n].tolist()})
 
 
@@ -109,10 +115,14 @@ class _Solution:
 
 
 def _solve(
-    samples: Samples, columns: Array, laws: list[list[FrictionTerm]], rows: NDArray[np.bool_], load: Array | None
+    samples: Samples,
+    columns: Array,
+    laws: list[list[FrictionTerm]],
+    rows: NDArray[np.bool_],
+    load: Array | None,
 ) -> _Solution:
     """Coefficients of the base parameters, then of each joint's friction terms, by reweighted least squares."""
-    n, r = samples.motion.joints, columns.shape[2]
+    r = columns.shape[2]
     total = r + sum(len(law) for law in laws)
     parts: list[tuple[NDArray[np.intp], Moments]] = []
     start = r
@@ -149,7 +159,11 @@ def _physical_cuts(arm: Arm, motion: Motion, base: BaseParameters, laws: list[li
     weightless = replace(arm, gravity=np.zeros(3))
     accelerated = Motion(np.arange(float(len(q))), q, still, unit, np.array([0]))
     # mass[k, i, j] (r,) is entry (i, j) of M at posture k per unit of each base parameter.
-    mass = base.columns(weightless, accelerated).reshape(_POSTURES, arm.n, arm.n, base.count).transpose(0, 2, 1, 3)
+    mass = (
+        base.columns(weightless, accelerated)
+        .reshape(_POSTURES, arm.n, arm.n, base.count)
+        .transpose(0, 2, 1, 3)
+    )
     total = base.count + sum(len(law) for law in laws)
     friction = np.vstack(_friction_rows(motion, laws, base.count, total))
 

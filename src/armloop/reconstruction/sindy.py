@@ -28,7 +28,9 @@ _THRESHOLDS = (1e-3, 3e-3, 1e-2, 3e-2)
 _MOST_SAMPLES = 4000
 
 
-def sindy(arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress) -> Found:
+def sindy(
+    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
+) -> Found:
     """Regress the one-shot library with pysindy's STLSQ; threshold and order N1 by held-out error.
 
     The joints' own friction columns, sign(v) and v, are offered to it as they are to the stepwise method.

@@ -183,7 +183,7 @@ def regress_step(
         ExcitationError: too few samples for a joint.
     """
     candidates = _candidates(revolute, plan)
-    used = rows.any(axis=1)
+    used: Mask = np.any(rows, axis=1)
     X_all = products(Factors(samples.motion.joints).evaluate(_rows(samples.motion, used)), candidates.index)
     joints = []
     for j in range(samples.motion.joints):
@@ -206,10 +206,11 @@ def regress_step(
             int(np.count_nonzero(found.coefficients[:, j])) + sum(t.step == part.step for t in friction[j])
             for j in range(len(joints))
         ]
-        sizes = [DoubleFeatureSet(revolute, orders[0], N2, part.second, reduced).size for reduced in (False, True)]
-        reports.append(
-            StepReport(part.step, [orders[0], N2], *sizes, counts, [len(joint.y) for joint in joints], trials)
+        full, reduced = (
+            DoubleFeatureSet(revolute, orders[0], N2, part.second, r).size for r in (False, True)
         )
+        samples_used = [len(joint.y) for joint in joints]
+        reports.append(StepReport(part.step, [orders[0], N2], full, reduced, counts, samples_used, trials))
     return terms, friction, reports
 
 

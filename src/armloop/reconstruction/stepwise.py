@@ -20,7 +20,9 @@ from armloop.reconstruction.step import Part, StepPlan, regress_step
 _PURITY = 0.1
 
 
-def stepwise(arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress) -> Found:
+def stepwise(
+    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
+) -> Found:
     """Reconstruct in three steps (Sect. 3.2, 3.3).
 
     Args:

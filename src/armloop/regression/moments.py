@@ -70,7 +70,9 @@ class Moments:
         scale = 1 / np.sqrt(np.maximum(np.diag(self.G)[support], 1e-300))
         S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
         L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
-        H = solve_triangular(L, scale[:, None] * self.G[np.ix_(support, others)], lower=True, check_finite=False)
+        H = solve_triangular(
+            L, scale[:, None] * self.G[np.ix_(support, others)], lower=True, check_finite=False
+        )
         h = solve_triangular(L, scale * self.b[support], lower=True, check_finite=False)
         own = size - np.einsum("kp,kp->p", H, H)
         gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, 1e-300), 0.0)

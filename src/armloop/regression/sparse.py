@@ -125,7 +125,9 @@ def _lasso(problem: Moments, penalty: float) -> Index:
 class _Search:
     """Best support by the extended Bayesian criterion: Lasso path, then add, drop and swap moves."""
 
-    def __init__(self, problem: Moments, gamma: float, max_terms: int, correlation: float, floor: float) -> None:
+    def __init__(
+        self, problem: Moments, gamma: float, max_terms: int, correlation: float, floor: float
+    ) -> None:
         self.problem = problem
         self.count = max(problem.count / correlation, 2.0)
         self.cost_per_term = np.log(self.count) + 2 * gamma * np.log(len(problem.b))
