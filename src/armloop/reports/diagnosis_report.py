@@ -77,17 +77,17 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
 
 def diagnosis_report(diagnosis: Diagnosis, model: ReconstructedModel, log_names: Sequence[str]) -> str:
     """One HTML page on a diagnosis; ``model`` is the model before, without the effects."""
-    before_after = Section(
-        "The models",
-        [
-            f"The model of {model.arm.name} was made with the method "
-            f"{model.history.get('method', 'unknown')} from "
-            f"{counted(len(model.history.get('logs', [])), 'log')}. The augmented model adds "
-            f"{counted(len(diagnosis.outcome.found), 'effect')} to it and goes wherever the model goes: "
+    count = len(diagnosis.outcome.found)
+    text = [
+        f"The model of {model.arm.name} was made with the method {model.history.get('method', 'unknown')} "
+        f"from {counted(len(model.history.get('logs', [])), 'log')}."
+    ]
+    if count:
+        text.append(
+            f"The augmented model adds {counted(count, 'effect')} to it and goes wherever a model goes: "
             "prediction, evaluation and feedforward control."
-        ],
-        formulas=[("The model as formulas, one per joint", formulas(model))],
-    )
+        )
+    models = Section("The model", text, formulas=[("The model as formulas, one per joint", formulas(model))])
     lead = (
         f"A run of {model.arm.name} that the model could not explain, and what it takes to explain it."
         if diagnosis.verdict != "no_effect"
@@ -97,7 +97,7 @@ def diagnosis_report(diagnosis: Diagnosis, model: ReconstructedModel, log_names:
         Report(
             f"Diagnosis: {headline(diagnosis)}",
             lead,
-            [*diagnosis_sections(diagnosis, log_names), before_after],
+            [*diagnosis_sections(diagnosis, log_names), models],
             diagnosis_cards(diagnosis),
         )
     )

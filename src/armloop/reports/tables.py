@@ -9,10 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.arm import Arm
-from armloop.diagnosis import Diagnosis
-from armloop.model import ReconstructedModel
-from armloop.reconstruction import StepReport
 from armloop.reports import paper as published
 from armloop.reports.words import (
     MISSING,
@@ -24,10 +20,14 @@ from armloop.reports.words import (
     unit,
     with_error,
 )
-from armloop.scoring import Score
 
-if TYPE_CHECKING:  # the class lives among Drake's systems, which a terminal must not have to load
+if TYPE_CHECKING:  # what makes the results need not be loaded to print them
+    from armloop.arm import Arm
+    from armloop.diagnosis import Diagnosis
     from armloop.drake_systems.tracking import TrackingResult
+    from armloop.model import ReconstructedModel
+    from armloop.reconstruction import StepReport
+    from armloop.scoring import Score
 
 
 @dataclass(frozen=True)

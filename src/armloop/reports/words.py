@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.effects import Effect
+if TYPE_CHECKING:
+    from armloop.effects import Effect
 
 MISSING = "–"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.signal import welch
 
@@ -79,6 +80,10 @@ def residual_shape_figure(diagnosis: Diagnosis) -> Figure:
             level = float(scale[j]) / np.sqrt(diagnosis.samples.cutoff_hz)
             axes.axhspan(level / 2, 2 * level, color=BASELINE, alpha=0.22, linewidth=0)
         polish(axes, "frequency [Hz]" if last else "", f"[{unit(joint.torque_unit)}/√Hz]")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=6))
+            axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
     legend(made, 4)
     return made
 

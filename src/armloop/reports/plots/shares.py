@@ -9,6 +9,7 @@ from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, panels, 
 from armloop.reports.words import effect_label, percent
 
 _MOST_RIVALS = 4
+_INCHES_PER_LETTER = 0.085
 
 
 def shares_figure(diagnosis: Diagnosis) -> Figure:
@@ -19,7 +20,11 @@ def shares_figure(diagnosis: Diagnosis) -> Figure:
         rivals = sorted(found.rivals, key=lambda rival: -rival[1])[:_MOST_RIVALS]
         bars += [(f"alike: {effect_label(effect)}", share, False) for effect, share in rivals]
     made = figure(9.5, 1.0 + 0.42 * max(1, len(bars)))
-    axes = panels(made, left=2.9, legend_row=False)[0, 0]
+    axes = panels(
+        made,
+        left=0.4 + _INCHES_PER_LETTER * max([len(name) for name, _, _ in bars], default=0),
+        legend_row=False,
+    )[0, 0]
     for k, (_, share, real) in enumerate(bars):
         axes.barh(k, 100 * share, 0.62 if real else 0.34, color=BLUE if real else GREY)
         axes.annotate(

@@ -1,0 +1,81 @@
+"""Figures show every joint and every controller, and thin lines without losing their extremes."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from armloop.diagnosis import Diagnosis
+from armloop.reports import plots
+from armloop.reports.plots.style import thin, with_gaps
+from armloop.reports.residuals import held_out_residuals
+
+
+def drawn(figure: Figure) -> Figure:
+    figure.canvas.draw()
+    return figure
+
+
+def labels(figure: Figure) -> set[str]:
+    return {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+def test_tracking_has_a_column_per_joint_and_a_line_per_controller(loop: SimpleNamespace) -> None:
+    figure = drawn(plots.tracking_figure(loop.tracking))
+    assert len(figure.axes) == 6
+    assert labels(figure) == {"reference", "PID", "PID + Step I", "PID + Step III"}
+
+
+def test_joints_of_different_units_get_axes_of_their_own(loop: SimpleNamespace) -> None:
+    mixed = {name: replace(run, unit=("deg", "mm", "deg")) for name, run in loop.tracking.items()}
+    assert len(drawn(plots.eta_figure(mixed)).axes) == 2
+
+
+def test_eta_bars_are_the_etas(loop: SimpleNamespace) -> None:
+    axes = drawn(plots.eta_figure(loop.tracking, paper=True)).axes[0]
+    heights = [patch.get_height() for patch in axes.patches]
+    assert heights[:3] == pytest.approx(loop.tracking["pid"].eta)
+    assert heights[3:6] == [1.10, 1.21, 1.23]
+
+
+def test_reconstruction_figures(loop: SimpleNamespace) -> None:
+    assert len(drawn(plots.clusters_figure(loop.clusters)).axes) == 2
+    assert plots.has_trials(loop.reconstruction.reports)
+    drawn(plots.orders_figure(loop.reconstruction.reports, loop.baseline.reports))
+    assert len(drawn(plots.torque_figure(loop.reconstruction.model, loop.diagnosis.samples)).axes) == 3
+
+
+def test_diagnosis_figures(loop: SimpleNamespace, clean: Diagnosis) -> None:
+    assert len(drawn(plots.residual_time_figure(loop.diagnosis)).axes) == 3
+    assert len(drawn(plots.residual_shape_figure(loop.diagnosis)).axes) == 9
+    assert labels(plots.residual_time_figure(clean)) == {"residual", "baseline level (±2 RMS)"}
+    ticks = drawn(plots.shares_figure(loop.diagnosis)).axes[0].get_yticklabels()
+    assert ticks[0].get_text() == "joint spring, joint 2"
+
+
+def test_residuals_are_those_behind_the_errors(loop: SimpleNamespace) -> None:
+    for residual, key in zip(held_out_residuals(loop.diagnosis), ("before", "after"), strict=True):
+        rmse = np.sqrt(np.nanmean(residual**2, axis=0))
+        assert rmse == pytest.approx(loop.diagnosis.errors()[key])
+
+
+def test_the_ring_has_eight_stages() -> None:
+    with pytest.raises(ValueError, match="8 stages, there are 0"):
+        plots.ring_figure([], "", "")
+
+
+def test_thinning_keeps_spikes_and_gaps() -> None:
+    x = np.arange(100_000.0)
+    y = np.zeros_like(x)
+    y[54_321] = 9.0
+    y[20_000:30_000] = np.nan
+    few_x, few_y = thin(x, y, 1000)
+    assert len(few_x) <= 1002 and np.nanmax(few_y) == 9.0 and np.isnan(few_y).any()
+    assert (np.diff(few_x) >= 0).all()
+
+
+def test_runs_are_not_joined() -> None:
+    time = np.array([0, 1, 2, 3, 50, 51, 52, 53.0])
+    assert np.flatnonzero(np.isnan(with_gaps(time, np.ones(8))[1])).tolist() == [4]

@@ -1,0 +1,102 @@
+"""A report is one file that needs nothing else, and says what the results say."""
+
+import re
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import pytest
+
+from armloop.diagnosis import Diagnosis
+from armloop.reports.diagnosis_report import diagnosis_report
+from armloop.reports.html import Card, Report, Section, render
+from armloop.reports.loop_report import loop_figure, loop_report
+from armloop.reports.words import number
+
+# written without an end tag
+_VOID = {"meta", "link", "br", "img"}
+
+
+class Page(HTMLParser):
+    """Collects addresses and checks that tags are nested."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.addresses: list[str] = []
+        self.anchors: list[str] = []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        if tag not in _VOID:
+            self.open.append(tag)
+        given = dict(attributes)
+        self.addresses += [given[key] or "" for key in ("href", "src", "xlink:href") if key in given]
+        self.anchors += [given["id"] or ""] if tag == "section" else []
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def page(loop: SimpleNamespace) -> str:
+    return loop_report(loop)
+
+
+def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
+    outward = {a for a in Page(page).addresses if not a.startswith(("#", "data:image/png"))}
+    assert outward == {"replay.html"}
+    assert "url(http" not in page and "<script" not in page
+    assert len(page) < 6e6
+
+
+def test_without_a_replay_there_is_no_link(loop: SimpleNamespace) -> None:
+    assert "replay.html" not in loop_report(loop, replay=None)
+
+
+def test_contents_lead_to_sections(page: str) -> None:
+    parsed = Page(page)
+    assert len(set(parsed.anchors)) == len(parsed.anchors) >= 8
+    assert {f"#{anchor}" for anchor in parsed.anchors} <= set(parsed.addresses)
+
+
+def test_figures_take_the_pages_colours(page: str) -> None:
+    assert "var(--ink)" in page and "prefers-color-scheme: dark" in page
+    assert "#1b2430" not in page.partition("</style>")[2]
+
+
+def test_the_loops_numbers_are_the_results(page: str, loop: SimpleNamespace) -> None:
+    assert "joint spring, joint 2" in page and "the verdict was right" in page
+    for eta in loop.tracking_after.eta:
+        assert f"<td>{number(float(eta))}</td>" in page
+    stiffness = loop.diagnosis.outcome.added()[0].parameters["stiffness"]
+    assert f"{stiffness.value:.4g}" in page
+    assert "&lt;angle&gt;" in page
+
+
+def test_a_wrong_verdict_is_admitted(loop: SimpleNamespace) -> None:
+    assert "the verdict was wrong" in loop_report(SimpleNamespace(**{**vars(loop), "right": False}))
+
+
+def test_a_loop_without_an_effect_found(loop: SimpleNamespace, clean: Diagnosis) -> None:
+    text = loop_report(
+        SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "baseline": None})
+    )
+    assert "no effect" in text and "One-shot SINDy" not in text
+
+
+def test_the_picture_has_eight_small_figures(loop: SimpleNamespace) -> None:
+    assert len(loop_figure(loop).axes) == 9
+
+
+def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
+    found = diagnosis_report(loop.diagnosis, loop.reconstruction.model, ["again"])
+    assert "Diagnosis: joint spring, joint 2" in found and re.search(r"tau1 = ", found)
+    nothing = diagnosis_report(clean, loop.reconstruction.model, ["clean"])
+    assert "Diagnosis: no effect" in nothing
+    assert not [a for a in Page(found + nothing).addresses if a.startswith("http")]
+
+
+def test_text_cannot_become_markup() -> None:
+    text = render(Report("<b>", "a & b", [Section("<i>", ["<u>"])], [Card("<s>", "<q>")]))
+    assert not {"<b>", "<i>", "<u>", "<s>", "<q>"} & set(re.findall(r"<[^>]*>", text))

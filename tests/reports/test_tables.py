@@ -1,0 +1,61 @@
+"""Tables show the numbers of the objects they are made from, aligned."""
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from armloop.reports.tables import (
+    diagnosis_table,
+    eta_table,
+    formulas,
+    make_table,
+    score_table,
+    steps_table,
+    table,
+)
+
+
+def test_columns_are_aligned() -> None:
+    lines = table(["joint", "RMSE"], [["1", 0.5], ["12", None]], "Errors").splitlines()
+    assert lines[0] == "Errors"
+    assert lines[2:] == ["joint   RMSE", lines[1], "1      0.500", "12         –", lines[1]]
+
+
+def test_a_row_needs_a_cell_per_header() -> None:
+    with pytest.raises(ValueError, match="1 cells, the table 2 columns"):
+        make_table(["a", "b"], [[1]])
+
+
+def test_eta_stands_beside_the_papers(loop: SimpleNamespace) -> None:
+    rows = {row[0]: row[1:] for row in eta_table(loop.tracking, paper=True).rows}
+    assert rows["PID"][3:] == ("1.10", "1.21", "1.23")
+    assert rows["PID + Step III"][3:] == ("0.250", "0.250", "0.270")
+    assert float(rows["PID"][0]) == pytest.approx(loop.tracking["pid"].eta[0], rel=5e-3)
+    assert len(eta_table(loop.tracking).headers) == 4
+
+
+def test_steps_and_scores(loop: SimpleNamespace) -> None:
+    steps = steps_table(loop.reconstruction.reports)
+    assert [row[0] for row in steps.rows] == ["1", "2", "3"]
+    scores = score_table(loop.reconstruction.held_out, loop.arm)
+    assert float(scores.rows[1][3]) == pytest.approx(loop.reconstruction.held_out.moving["rmse"][1], rel=5e-3)
+
+
+def test_a_diagnosis_names_effect_and_errors(loop: SimpleNamespace, clean: object) -> None:
+    text = diagnosis_table(loop.diagnosis)
+    assert "effects_found" in text and "joint spring, joint 2" in text and "stiffness" in text
+    assert "no_effect" in diagnosis_table(clean)
+
+
+def test_long_formulas_say_that_they_are_cut(loop: SimpleNamespace) -> None:
+    text = formulas(loop.reconstruction.model, width=80, most_terms=2)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "more terms" in text and text.startswith("tau1 = ")
+
+
+def test_printing_a_table_loads_nothing_large() -> None:
+    program = "import armloop.reports.tables, sys; print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not {"matplotlib", "jinja2", "sklearn", "pydrake"} & set(answer.stdout.split())

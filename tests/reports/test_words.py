@@ -1,0 +1,40 @@
+"""Numbers are written as a person would write them."""
+
+import numpy as np
+import pytest
+
+from armloop.reports.words import controller, effect_name, listed, number, percent, unit, with_error
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.01164, "0.0116"),
+        (1.1, "1.10"),
+        (93270.4, "93270"),
+        (0, "0"),
+        (None, "–"),
+        (np.nan, "–"),
+        (2e-7, "2.00e-07"),
+    ],
+)
+def test_significant_digits(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+def test_a_value_ends_where_its_error_begins() -> None:
+    assert with_error(0.44982, 0.00071) == "0.44982 ± 0.00071"
+    assert with_error([1.0, 2.0], [0.1, 0.02]) == "(1.00 ± 0.10, 2.000 ± 0.020)"
+    assert with_error(1.0, float("nan")) == "1.00"
+
+
+def test_names() -> None:
+    assert [controller(name) for name in ("pid", "pid_step3", "pid_mine")] == [
+        "PID",
+        "PID + Step III",
+        "PID + mine",
+    ]
+    assert effect_name("joint_spring", 2) == "joint spring, joint 2"
+    assert unit("kg*m^2") == "kg·m²"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert [percent(x) for x in (0.004271, 0.0985, 0.9996)] == ["0.43 %", "9.8 %", "100 %"]
