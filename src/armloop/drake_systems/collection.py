@@ -68,16 +68,16 @@ class CollectionPlan:
     rate: float = 250.0
     segment_time_step: float = 2e-3
     dwell: bool = False
-    static_poses: int = 60
+    static_poses: int = 48
     static_speed: float = float(np.deg2rad(0.1))
     static_speed_prismatic: float = 1e-4
-    static_settle: float = 0.1
-    static_hold: float = 0.12
-    velocity_segments: int = 120
+    static_settle: float = 0.08
+    static_hold: float = 0.35
+    velocity_segments: int = 100
     slowest: float = 0.01
     slowest_prismatic: float = 1e-3
-    velocity_settle: float = 0.1
-    velocity_hold: float = 0.15
+    velocity_settle: float = 0.08
+    velocity_hold: float = 0.4
     trajectories: int = 2
     trajectory_duration: float = 20.0
 

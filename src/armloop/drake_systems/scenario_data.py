@@ -51,16 +51,16 @@ class PlanData:
     rate: float = 250.0  # Hz of the logs
     segment_time_step: float = 0.002  # s, of the plant during segments of constant velocity
     dwell: bool = False  # stand still at the static poses instead of creeping
-    static_poses: int = 60  # each in both directions
+    static_poses: int = 48  # each in both directions
     static_speed: float = 0.0017453292519943296  # rad/s (0.1 deg/s)
     static_speed_prismatic: float = 0.0001  # m/s
-    static_settle: float = 0.1  # s before the log of a segment starts
-    static_hold: float = 0.12  # s that are logged
-    velocity_segments: int = 120
+    static_settle: float = 0.08  # s before the log of a segment starts
+    static_hold: float = 0.35  # s that are logged
+    velocity_segments: int = 100
     slowest: float = 0.01  # rad/s
     slowest_prismatic: float = 0.001  # m/s
-    velocity_settle: float = 0.1  # s
-    velocity_hold: float = 0.15  # s
+    velocity_settle: float = 0.08  # s
+    velocity_hold: float = 0.4  # s
     trajectories: int = 2  # Fourier-series trajectories
     trajectory_duration: float = 20.0  # s each
 
