@@ -1,12 +1,14 @@
 """A report is one file that needs nothing else, and says what the results say."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import pytest
 
 from armloop.diagnosis import Diagnosis
+from armloop.diagnosis.unlisted import Unlisted
 from armloop.reports.diagnosis_report import diagnosis_report
 from armloop.reports.html import Card, Report, Section, render
 from armloop.reports.loop_report import loop_figure, loop_report
@@ -95,6 +97,14 @@ def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
     nothing = diagnosis_report(clean, loop.reconstruction.model, ["clean"])
     assert "Diagnosis: no effect" in nothing
     assert not [a for a in Page(found + nothing).addresses if a.startswith("http")]
+
+
+def test_an_unlisted_law_is_shown(loop: SimpleNamespace, clean: Diagnosis) -> None:
+    law = Unlisted(2, 3.2, 1.5, "0.48*cos(q2)^2*v2", 1.6)
+    text = diagnosis_report(
+        replace(clean, verdict="unlisted_effect", unlisted=law), loop.reconstruction.model, ["odd"]
+    )
+    assert "Diagnosis: unlisted effect, joint 2" in text and "it follows 0.48*cos(q2)^2*v2" in text
 
 
 def test_text_cannot_become_markup() -> None:

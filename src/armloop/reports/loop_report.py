@@ -114,9 +114,8 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
     return render(
         Report(
             f"The whole loop on {result.arm.name}",
-            "An arm was measured, its dynamics reconstructed and used for control. Then something about "
-            "the arm changed that nobody declared. The residual of one more run was traced to its cause, "
-            "the model was mended, and the arm was controlled again.",
+            "An arm was measured, its dynamics reconstructed and used for control. Then something about the "
+            f"arm changed that nobody declared. {_outcome(result)}",
             sections,
             _cards(result),
             [("Watch the replay", replay)] if replay else [],
@@ -264,6 +263,19 @@ def _effect_words(diagnosis: Diagnosis) -> tuple[str, str]:
     words = effect_label(found.effect)
     size = f"{vector(estimate.value)} {unit(estimate.unit)}"
     return words, f"{size}, explains {percent(found.share)}"
+
+
+def _outcome(result: LoopResult) -> str:
+    """What became of the change, in a sentence that also holds where it was missed."""
+    if not result.diagnosis.outcome.found:
+        return (
+            "The residual of one more run was traced to no listed effect, and the arm was controlled again."
+        )
+    cause = "its cause" if result.right else "a cause that was not the true one"
+    return (
+        f"The residual of one more run was traced to {cause}, the model was augmented by it, and the arm was "
+        "controlled again."
+    )
 
 
 def _truth_name(result: LoopResult) -> str:
