@@ -127,6 +127,11 @@ class Arm:
         """Rebuild an arm from :meth:`to_dict`; raises ``ArmError`` if a field is missing or misshapen."""
         try:
             joints = tuple(Joint(**joint) for joint in data["joints"])
+            for joint in joints:
+                if joint.kind not in ("revolute", "prismatic"):
+                    raise ValueError(
+                        f"joint {joint.name!r} is {joint.kind!r}, it must be revolute or prismatic"
+                    )
             n = len(joints)
             shapes = {
                 "X_PF": (n, 4, 4),

@@ -25,6 +25,7 @@ from armloop.errors import ArmError, ModelError
 from armloop.files import write_text
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
+from armloop.log import TAU_UNITS
 from armloop.motion import Motion
 from armloop.pointwise import Pointwise, pointwise
 from armloop.signals import Conditioning
@@ -253,13 +254,39 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         components=tuple(components),
         friction=friction,
         conditioning=Conditioning(**data["conditioning"]),
-        recorded=dict(data["recorded"]),
-        baseline=dict(data["baseline"]),
+        recorded=_recorded(data["recorded"], arm.n),
+        baseline=_baseline(data["baseline"], arm.n),
         effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
         history=dict(data["history"]),
     )
     half = np.full((1, arm.n), 0.5)
+    for added in model.effects:
+        joint = added.effect.joint
+        if joint is not None and not 1 <= joint <= arm.n:
+            raise ModelError(
+                f"effect {added.effect.name!r} is on joint {joint}; the arm has joints 1 to {arm.n}"
+            )
     probe = Motion(np.zeros(1), half, half, half, np.array([0]))
     if not np.isfinite(model.predict(probe)).all():
         raise ModelError("a coefficient is not a finite number")
     return model
+
+
+def _recorded(data: dict[str, Any], n: int) -> dict[str, Any]:
+    if data["unit"] not in TAU_UNITS:
+        raise ModelError(
+            f"recorded: unit {data['unit']!r} is unknown; it must be one of {', '.join(TAU_UNITS)}"
+        )
+    gains = data["drive_gains"]
+    if gains is not None and (len(gains) != n or not all(0 < float(gain) < np.inf for gain in gains)):
+        raise ModelError(f"recorded: drive_gains must be null or {n} positive numbers of N*m/A, not {gains}")
+    return dict(data)
+
+
+def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
+    for key in {"rmse", "rms", "nrmse"} & set(data):
+        if len(data[key]) != n or not all(x is None or 0 <= float(x) < np.inf for x in data[key]):
+            raise ModelError(
+                f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"
+            )
+    return dict(data)

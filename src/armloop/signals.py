@@ -7,7 +7,7 @@ motion it belongs to stay together in time; runs are treated one by one, never a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -32,15 +32,28 @@ class Conditioning:
             samples as they are (for inverse-dynamics samples that are no time series).
         oversampling: samples kept per period of the corner frequency.
         dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
+        smear: periods of the corner around a standstill in which a joint does not count as moving, because
+            the filter smears the torque of the standstill that far.
+
+    Raises:
+        ValueError: a setting is no number, or out of range.
     """
 
     cutoff_hz: float = 10.0
     oversampling: float = 4.0
     dead_zone: float = 4.0
+    smear: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name, value in self.to_dict().items():
+            if not isinstance(value, int | float) or not 0 <= value < np.inf:
+                raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
+        if self.oversampling == 0:
+            raise ValueError("oversampling must be positive")
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        return {"cutoff_hz": self.cutoff_hz, "oversampling": self.oversampling, "dead_zone": self.dead_zone}
+        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -80,9 +93,8 @@ def condition(logs: Sequence[MotionLog], how: Conditioning) -> Samples:
     ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
 
     Returns:
-        The samples of all runs, one after the other; ``moving`` is false within half a period of the
-        corner of any instant at which the joint is inside its dead zone, because the filter smears the
-        torque of a standstill that far.
+        The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
+        the corner of any instant at which the joint is inside its dead zone.
 
     Raises:
         LogError: no run is long enough for the filter.
@@ -135,7 +147,8 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     q, v, tau = (low_pass(on_grid(x)) for x in (log.q, log.v, log.tau))
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(v) <= dead_zone
-    smeared = binary_dilation(still, np.ones((2 * trim + 1, 1)))
+    reach = int(np.ceil(how.smear / (how.cutoff_hz * period)))
+    smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
     stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period)))
     keep = slice(trim, len(grid) - trim, stride)
     return grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
@@ -164,9 +177,10 @@ def _as_they_are(logs: Sequence[MotionLog]) -> Samples:
             raise LogError(
                 f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}"
             )
-    time, q, v, vdot, tau = (
-        np.concatenate([np.asarray(getattr(log, key)) for log in logs])
-        for key in ("time", "q", "v", "vdot", "tau")
+    q, v, vdot, tau = (
+        np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("q", "v", "vdot", "tau")
     )
+    # Samples that are no time series are independent: a second apart, each is a block of its own to hold out.
+    time = np.arange(float(len(q)))
     starts = np.cumsum([0] + [len(log.time) for log in logs[:-1]])
     return Samples(Motion(time, q, v, vdot, starts), tau, np.ones_like(q, dtype=bool), 1.0)

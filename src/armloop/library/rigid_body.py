@@ -152,10 +152,10 @@ def _usual_order(n: int, rotors: bool) -> list[int]:
 def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
     """Indices, rising, of the columns that are not sums of those before them in ``order``."""
     basis, kept = np.empty((len(rows), 0)), []
+    sizes = np.linalg.norm(rows, axis=0)
     for index in order:
-        column = rows[:, index]
-        size = np.linalg.norm(column)
-        if size == 0:
+        column, size = rows[:, index], sizes[index]
+        if size <= _TOLERANCE * sizes.max():  # what no torque feels is round-off, not exactly zero
             continue
         own = column / size
         for _ in range(2):  # Gram-Schmidt twice is orthogonal to machine precision

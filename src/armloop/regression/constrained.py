@@ -8,6 +8,7 @@ import numpy as np
 import osqp
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg import solve_triangular
 
 Array = NDArray[np.float64]
 
@@ -35,31 +36,41 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
     Raises:
         ArithmeticError: osqp finds no solution.
     """
+    # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
+    # In coordinates z = Lᵀθ with G = LLᵀ the cost is ‖z − z₀‖²: as well conditioned as it can be.
     scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
-    P = sparse.csc_matrix(np.triu(2 * G * np.outer(scale, scale)))
+    L = np.linalg.cholesky(G * np.outer(scale, scale) + 1e-12 * np.eye(len(b)))
+    target = solve_triangular(L, scale * b, lower=True)
     theta, rows = start, np.zeros((0, len(b)))
     for _ in range(_ROUNDS):
         violated = cuts(theta)
         if len(violated) == 0:
             break
         rows = np.vstack([rows, violated])
-        A = rows * scale
+        A = solve_triangular(L, (rows * scale).T, lower=True).T
         A /= np.linalg.norm(A, axis=1, keepdims=True)
-        problem = osqp.OSQP()
-        problem.setup(
-            P,
-            -2 * scale * b,
-            sparse.csc_matrix(A),
-            np.zeros(len(A)),
-            np.full(len(A), np.inf),
-            verbose=False,
-            eps_abs=_TOLERANCE,
-            eps_rel=_TOLERANCE,
-            max_iter=100_000,
-            polishing=True,
-        )
-        result = problem.solve(raise_error=False)
-        if result.info.status not in ("solved", "solved inaccurate"):
-            raise ArithmeticError(f"osqp: {result.info.status}")
-        theta = scale * np.asarray(result.x)
+        z = _nearest(target, A)
+        theta = scale * solve_triangular(L, z, lower=True, trans="T")
     return theta, len(rows)
+
+
+def _nearest(target: Array, A: Array) -> Array:
+    """The point nearest to ``target`` with A z ≥ 0."""
+    size = max(float(np.abs(target).max()), 1e-300)
+    problem = osqp.OSQP()
+    problem.setup(
+        sparse.identity(len(target), format="csc"),
+        -target / size,
+        sparse.csc_matrix(A),
+        np.zeros(len(A)),
+        np.full(len(A), np.inf),
+        verbose=False,
+        eps_abs=_TOLERANCE,
+        eps_rel=_TOLERANCE,
+        max_iter=100_000,
+        polishing=True,
+    )
+    result = problem.solve(raise_error=False)
+    if result.info.status not in ("solved", "solved inaccurate"):
+        raise ArithmeticError(f"osqp: {result.info.status}")
+    return size * np.asarray(result.x)

@@ -1,0 +1,110 @@
+"""The rigid-body library recovers base parameters and friction from a log, and says when motion is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, friction, measured, three_axis
+
+from armloop.arm import Arm
+from armloop.errors import ExcitationError
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.rigid_body import BaseParameters
+from armloop.log import MotionLog
+from armloop.reconstruction import Reconstruction, reconstruct
+from armloop.scoring import score
+from armloop.signals import condition
+
+
+def heavier(arm: Arm) -> Arm:
+    """The arm as it really is: links 20-50 % heavier than the URDF says, centres elsewhere."""
+    factor = np.array([1.2, 1.5, 1.3])
+    com = arm.com * 1.1 + [0.0, 0.01, 0.01]
+    shifted = [m * (c @ c * np.eye(3) - np.outer(c, c)) for m, c in zip(arm.mass * factor, com, strict=True)]
+    return replace(arm, mass=arm.mass * factor, com=com, inertia=np.array(shifted) + 0.003 * np.eye(3))
+
+
+ROTORS = np.array([0.08, 0.12, 0.05])  # kg m^2, at the joint
+
+
+def a_run(seed: int, **change):
+    motion = fourier_motion(40.0, 100.0, seed)
+    if change:
+        motion = replace(motion, **{k: f(getattr(motion, k)) for k, f in change.items()})
+    true = nominal_parameters(heavier(three_axis()))
+    tau = regressor(three_axis(), motion.q, motion.v, motion.vdot) @ true
+    return measured(motion, tau + ROTORS * motion.vdot + friction(motion.v), seed, noise=0.005)
+
+
+@pytest.fixture(scope="module")
+def result() -> Reconstruction:
+    return reconstruct([a_run(1), a_run(2)], three_axis(), library="rigid-body")
+
+
+def test_base_parameters_are_recovered_though_the_urdf_is_wrong(result: Reconstruction):
+    base = BaseParameters.of_arm(three_axis(), rotors=True)
+    (body,) = result.model.components
+    truth = base.from_full(np.concatenate([nominal_parameters(heavier(three_axis())), ROTORS]))
+    wrong = base.from_full(np.concatenate([nominal_parameters(three_axis()), np.zeros(3)]))
+    found = base.from_full(body.parameters)
+    size = np.abs(truth).max()
+    assert np.abs(found - truth).max() < 0.03 * size
+    assert np.linalg.norm(found - truth) < 0.06 * np.linalg.norm(wrong - truth)
+    assert body.names == tuple(base.names)
+    np.testing.assert_allclose(body.values, found, atol=1e-9)
+
+
+def test_a_fresh_run_is_predicted(result: Reconstruction):
+    samples = condition([a_run(9)], result.model.conditioning)
+    assert max(score(result.model, samples).moving["nrmse"]) < 0.03
+    assert max(result.held_out.moving["nrmse"]) < 0.03
+
+
+def test_the_steps_are_gravity_then_velocity_then_acceleration(result: Reconstruction):
+    motion = fourier_motion(2.0, 50.0, 3)
+    rest = replace(motion, v=0 * motion.v, vdot=0 * motion.vdot)
+    coasting = replace(motion, vdot=0 * motion.vdot)
+    body = result.model.components[0]
+    arm = result.model.arm
+    for step, part in ((1, rest), (2, coasting), (3, motion)):
+        np.testing.assert_allclose(body.torque(arm, motion, step), body.torque(arm, part, 3), atol=1e-12)
+    assert [report.step for report in result.reports] == [1, 2, 3]
+    assert all(report.orders is None for report in result.reports)
+
+
+def test_a_joint_that_never_moves_is_named():
+    still = {key: (lambda x: x * [1.0, 0.0, 1.0]) for key in ("q", "v", "vdot")}
+    with pytest.raises(ExcitationError, match=r"^q2: joint 'joint_2' moves in \d+ samples"):
+        reconstruct([a_run(1, **still)], three_axis(), library="rigid-body")
+
+
+def test_what_no_torque_feels_is_no_base_parameter():
+    # joint 2 turns about link 2's y: its first moment along y is seen by nothing but round-off
+    assert not any(name.startswith("my2") for name in BaseParameters.of_arm(three_axis()).names)
+    assert BaseParameters.of_arm(three_axis()).count == 15
+
+
+def test_friction_never_drives_and_the_mass_matrix_is_positive(result: Reconstruction):
+    model = result.model
+    motion = fourier_motion(20.0, 20.0, 5)
+    law = model.friction.torque(motion, load=model.rigid_body(motion))
+    offsets = np.array(
+        [next(t.coefficient for t in joint if t.kind == "offset") for joint in model.friction.terms]
+    )
+    assert ((law - offsets) * motion.v)[np.abs(motion.v) > 0.05].min() > 0
+    unit = np.eye(3)
+    weightless = replace(model.arm, gravity=np.zeros(3))
+    for q in motion.q[::40]:
+        rows = replace(motion, time=np.arange(3.0), q=np.tile(q, (3, 1)), v=np.zeros((3, 3)), vdot=unit)
+        M = model.components[0].torque(weightless, rows, 3)
+        np.testing.assert_allclose(M, M.T, atol=1e-9)
+        assert np.linalg.eigvalsh(M).min() > 0
+
+
+def test_motion_that_leaves_most_parameters_open_is_refused():
+    # all joints creep around one posture: there is friction to see, and one load
+    motion = fourier_motion(40.0, 100.0, 1)
+    q, v = 0.3 + 1e-6 * motion.q, 0.1 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
+    log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
+    with pytest.raises(ExcitationError, match=r"\d+ of \d+ inertial parameters undetermined"):
+        reconstruct([log], three_axis(), library="rigid-body")
