@@ -20,10 +20,11 @@ from armloop.progress import Progress, silent
 
 
 def _progress(options: argparse.Namespace) -> Progress:
-    """Progress on standard error, so that standard output stays the answer."""
+    """Progress on the terminal; with none, before the answer, so that standard error is for faults alone."""
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
-    return lambda message: print(f"  … {message}", file=sys.stderr, flush=True)
+    stream = sys.stderr if sys.stderr.isatty() else sys.stdout
+    return lambda message: print(f"  … {message}", file=stream, flush=True)
 
 
 def _print_json(value: Any) -> None:
@@ -41,6 +42,15 @@ def _out_folder(path: str) -> Path:
     if not os.access(existing, os.W_OK):
         raise InputError(f"{existing}: cannot be written to; choose another folder for --out")
     return folder
+
+
+def _out_file(path: str | None, option: str) -> None:
+    """Check the place of an output file before any work is done."""
+    if path is None:
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{path}: is a folder; {option} must name a file")
+    _out_folder(str(Path(path).parent))
 
 
 def _gains(text: str | None) -> list[float] | None:
@@ -126,7 +136,7 @@ def reconstruct(options: argparse.Namespace) -> None:
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
-    from armloop.reports.tables import score_table, steps_table
+    from armloop.reports.tables import formulas, score_table, steps_table
     from armloop.signals import Conditioning
 
     if options.estimator not in ESTIMATORS:
@@ -137,7 +147,8 @@ def reconstruct(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
-    _out_folder(str(Path(options.out).parent))
+    for name in ("out", "report"):
+        _out_file(getattr(options, name), f"--{name}")
     arm = load_arm(options.arm)
     recorded = _recorded(options, _TORQUE)
     logs = _read(options.logs, arm.n, recorded)
@@ -161,8 +172,7 @@ def reconstruct(options: argparse.Namespace) -> None:
         return
     print(steps_table(result.reports))
     print()
-    for line in result.model.formulas():
-        print(line)
+    print(formulas(result.model), *result.model.legend(), sep="\n")
     print()
     print(score_table(result.held_out, arm))
     for note in result.notes:

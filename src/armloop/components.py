@@ -33,6 +33,10 @@ class Component(Protocol):
         """(step, coefficient, name) of every term of one joint (0-based)."""
         ...
 
+    def legend(self) -> list[str]:
+        """What symbols in the terms stand for, one line each."""
+        ...
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
         ...
@@ -71,6 +75,9 @@ class SparseTerms:
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         c = self.coefficients[:, joint]
         return [(self.step, float(c[t]), self._names[t]) for t in np.flatnonzero(c)]
+
+    def legend(self) -> list[str]:
+        return []
 
     def to_dict(self) -> dict[str, Any]:
         n = self.coefficients.shape[1]
@@ -126,12 +133,24 @@ class RigidBody:
         return full_columns(arm, part, len(self.parameters) == 11 * arm.n) @ self.parameters
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
-        """The base parameters whose columns reach the joint; the column is named after its parameter."""
-        reach = [max((int(x) for x in re.findall(r"[A-Za-z](\d+)", name)), default=0) for name in self.names]
+        """The base parameters that act on the joint, each times its column of the regressor.
+
+        ``Y1[mx2]`` is the torque of joint 1 per unit of mx2; a parameter of link k acts on joints 1 … k.
+        """
+        found = []
+        for name, value in zip(self.names, self.values, strict=True):
+            lead = name.split(" ")[0]
+            link = int(re.sub(r"\D", "", lead))
+            acts = link == joint + 1 if lead.startswith("J") else link >= joint + 1
+            if acts:
+                found.append((3, float(value), f"Y{joint + 1}[{lead}]"))
+        return found
+
+    def legend(self) -> list[str]:
+        """The base parameters in full: sums of link parameters (m, m c, inertia about the link's origin; SI)."""
         return [
-            (3, float(value), f"Y[{joint + 1};{name}]")
-            for value, name, link in zip(self.values, self.names, reach, strict=True)
-            if link >= joint + 1
+            f"{name.split(' ')[0]}: {value:.4g} = {name}"
+            for name, value in zip(self.names, self.values, strict=True)
         ]
 
     def to_dict(self) -> dict[str, Any]:

@@ -181,6 +181,10 @@ class ReconstructedModel:
             lines.append(f"tau{j + 1} = {body.removeprefix('+ ') or '0'}")
         return lines
 
+    def legend(self) -> list[str]:
+        """What symbols in the formulas stand for, one line each; empty where they speak for themselves."""
+        return [line for component in self.components for line in component.legend()]
+
     def save(self, path: str | Path) -> None:
         """Write the model file (JSON), whole or not at all."""
         write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")

@@ -47,6 +47,8 @@ _REWEIGHTINGS = 3
 #: Postures at which M(q) is kept positive definite, and how negative counts as violated.
 _POSTURES = 60
 _SLACK = 1e-9
+#: What a constraint has pressed to zero, N·m.
+_NOTHING = 1e-12
 
 
 def rigid_body(
@@ -85,7 +87,11 @@ def rigid_body(
     for law in laws:
         values = theta[start : start + len(law)]
         friction.append(
-            [FrictionTerm(t.kind, float(c), t.parameter) for t, c in zip(law, values, strict=True)]
+            [
+                FrictionTerm(t.kind, float(c), t.parameter)
+                for t, c in zip(law, values, strict=True)
+                if abs(c) > _NOTHING
+            ]
         )
         start += len(law)
     values = theta[: base.count]

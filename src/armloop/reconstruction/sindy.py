@@ -13,6 +13,7 @@ import pysindy
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.blocks import folds
 from armloop.components import SparseTerms
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.library.friction import FrictionTerm
@@ -23,7 +24,8 @@ from armloop.reconstruction.options import Options, StepReport
 
 Array = NDArray[np.float64]
 
-_THRESHOLDS = (1e-3, 3e-3, 1e-2, 3e-2)
+#: Thresholds as a share of each joint's torque; ridges as a share of the columns' squared size.
+_SETTINGS = [(threshold, ridge) for ridge in (1e-4, 1e-2) for threshold in (3e-3, 1e-2, 3e-2)]
 #: pysindy holds the library and its normal equations several times over: 4,000 rows keep it in memory.
 _MOST_SAMPLES = 4000
 
@@ -38,7 +40,8 @@ def sindy(
     revolute = tuple(bool(r) for r in arm.revolute)
     rows = np.flatnonzero(samples.moving.all(axis=1) & ~held_out)
     rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
-    fit, check = rows[np.arange(len(rows)) % 4 != 0], rows[np.arange(len(rows)) % 4 == 0]
+    validation = folds(samples.motion, options.folds, options.block_seconds)[rows] == 1
+    fit, check = rows[~validation], rows[validation]
     scale = np.sqrt(np.mean(samples.tau[rows] ** 2, axis=0))
     trials: list[tuple[list[int], float]] = []
     best: tuple[float, DoubleFeatureSet, Array] | None = None
@@ -52,8 +55,10 @@ def sindy(
         names = [*library.names, *(f"sign(v{j + 1})" for j in range(arm.n))]
         inside, outside = np.isin(rows, fit), np.isin(rows, check)
         errors = []
-        for threshold in _THRESHOLDS:
-            coefficients = _stlsq(X[inside], samples.tau[fit], names, threshold)
+        for threshold, ridge in _SETTINGS:
+            coefficients = (
+                _stlsq(X[inside], samples.tau[fit] / scale, names, threshold, ridge) * scale[:, None]
+            )
             error = (samples.tau[check] - X[outside] @ coefficients.T) / scale
             errors.append(float(np.sqrt(np.mean(error**2))))
             if best is None or errors[-1] < best[0]:
@@ -70,12 +75,12 @@ def sindy(
     return Found(arm, [terms], friction, [report], [])
 
 
-def _stlsq(X: Array, tau: Array, names: list[str], threshold: float) -> Array:
-    """(n, T) coefficients; columns scaled to unit size so that the threshold is a share of torque."""
+def _stlsq(X: Array, tau: Array, names: list[str], threshold: float, ridge: float) -> Array:
+    """(n, T) coefficients; columns are scaled to unit size so that the threshold is a share of the torque."""
     size = np.sqrt(np.mean(X**2, axis=0))
     size[size == 0] = 1.0
     model = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=threshold, alpha=1e-6, max_iter=10),
+        optimizer=pysindy.STLSQ(threshold=threshold, alpha=ridge * len(X), max_iter=10),
         feature_library=pysindy.IdentityLibrary(),
     )
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Sections on how a model came about and how well it predicts."""
+"""Sections and a page on how a model came about and how well it predicts."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.conditions import Clusters
-from armloop.motion import Samples
+from armloop.conditions import Clusters, sort_samples
+from armloop.log import MotionLog
+from armloop.motion import Motion, Samples
 from armloop.reconstruction import Reconstruction, StepReport
-from armloop.reports.html import Picture, Section
+from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import clusters_figure, has_trials, orders_figure, torque_figure
 from armloop.reports.tables import Table, formulas, make_table, score_table, steps_table
 from armloop.reports.words import counted, number, percent
 from armloop.scoring import Score
+from armloop.signals import condition
 
 _ORDERS = (
     "Each candidate library was fitted with some blocks of data set aside; the smallest one whose error "
@@ -45,6 +47,26 @@ def conditions_section(clusters: Clusters, title: str = "Sorting the samples") -
         "later steps' terms are absent."
     )
     return Section(title, [text], [Picture(clusters_figure(clusters), _CLUSTERS)])
+
+
+def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionLog]) -> str:
+    """One HTML page on a reconstruction from these logs."""
+    model = reconstruction.model
+    samples = condition(logs, model.conditioning)
+    sections = reconstruction_sections(reconstruction, _longest_run(samples))
+    if reconstruction.reports[0].orders is not None:
+        sections.insert(0, conditions_section(sort_samples(samples.motion)))
+    error = percent(mean_nrmse(reconstruction.held_out))
+    lead = "From motion logs to a readable model of the joint torques, step by step."
+    cards = [Card(error, "Prediction error", "nRMSE on data that no step has seen, mean of the joints")]
+    return render(Report(f"Reconstruction of {model.arm.name}", lead, sections, cards))
+
+
+def _longest_run(samples: Samples) -> Samples:
+    run = max(samples.motion.runs(), key=lambda run: run.stop - run.start)
+    motion = samples.motion
+    part = Motion(motion.time[run], motion.q[run], motion.v[run], motion.vdot[run], np.array([0]))
+    return Samples(part, samples.tau[run], samples.moving[run], samples.period, samples.cutoff_hz)
 
 
 def reconstruction_sections(
@@ -79,6 +101,8 @@ def reconstruction_sections(
         tables.append(comparison(reconstruction, baseline))
         text.append(_against(reconstruction, baseline))
     folded = [("The model as formulas, one per joint", formulas(model))]
+    if legend := model.legend():
+        folded.append(("What the symbols stand for", "\n".join(legend)))
     return [Section("Reconstruction", text, pictures, tables, folded, list(reconstruction.notes))]
 
 
