@@ -83,7 +83,7 @@ def _loop(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--out", default="out/loop", help="folder for report.html, loop.json, logs, models (%(default)s)"
     )
     p.add_argument(
-        "--seed", type=int, default=1, help="draws the data and the undeclared effect (%(default)s)"
+        "--seed", type=_seed, default=1, help="draws the data and the undeclared effect (%(default)s)"
     )
 
 
@@ -102,7 +102,7 @@ def _collect(commands: argparse._SubParsersAction[_Parser]) -> None:
         help="a plan of scenarios/collection.yaml (paper, dwell, quick: closed loop on the plant with friction), or "
         "`simulation`: friction-free inverse dynamics with the paper's numbers of samples (%(default)s)",
     )
-    p.add_argument("--seed", type=int, default=1, help="(%(default)s)")
+    p.add_argument("--seed", type=_seed, default=1, help="(%(default)s)")
 
 
 def _logs(p: _Parser) -> None:
@@ -124,6 +124,13 @@ def _recorded(p: _Parser, default: str) -> None:
     )
 
 
+def _seed(text: str) -> int:
+    """A seed of a random generator, from 0."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is no seed; give a whole number from 0")
+    return int(text)
+
+
 def _json(p: _Parser) -> None:
     p.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
@@ -142,7 +149,7 @@ def _cluster(commands: argparse._SubParsersAction[_Parser]) -> None:
         default="robust",
         help="the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
     )
-    p.add_argument("--seed", type=int, default=0, help="of k-means (%(default)s)")
+    p.add_argument("--seed", type=_seed, default=0, help="of k-means (%(default)s)")
     _json(p)
 
 

@@ -45,6 +45,10 @@ def test_regressed_together_the_model_still_predicts_a_run_it_never_saw(together
 
 def test_the_held_out_score_is_the_baseline_of_the_model(together: Reconstruction):
     held = together.held_out.moving
+    samples = condition([a_run(1), a_run(2)], together.model.conditioning)
+    rows = held_out_rows(samples, Options())
+    assert together.held_out.samples == rows.sum() < 0.3 * samples.motion.samples
+    assert score(together.model, samples, rows).moving == held
     assert together.model.baseline["rmse"] == held["rmse"]
     assert together.to_dict()["held_out"] == held
     assert [len(step["terms"]) for step in together.to_dict()["steps"]] == [3, 3, 3]

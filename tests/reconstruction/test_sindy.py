@@ -51,6 +51,7 @@ def test_the_baseline_has_more_terms_and_larger_errors(samples):
     (many, large), (few, small) = results
     assert many > 1.3 * few
     assert (large > 1.3 * small).all()
+    assert (large < 0.3 * samples.tau.std(axis=0)).all()  # but a fair baseline
 
 
 def test_held_out_samples_are_not_fitted_by_the_baseline(samples):
