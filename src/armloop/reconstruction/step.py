@@ -136,13 +136,14 @@ class _Joint:
             best = self._profiled(moments, np.concatenate([fixed, chosen]), profile)
             forced = np.concatenate([fixed, best])
             columns = np.concatenate([library, forced]).astype(np.intp)
-            local = sparse.support(moments.take(columns), np.arange(len(library), len(columns)))
+            doubtless = np.arange(len(library), len(columns))
+            local = sparse.support(moments.take(columns), doubtless, self.scale**2)
             support = columns[local]
             chosen = support[support < size]
             if np.array_equal(best, previous):
                 break
         support = np.concatenate([chosen, fixed, best]).astype(np.intp)
-        return sparse.prune(moments, support, support[support >= size])
+        return sparse.prune(moments, support, support[support >= size], self.scale**2)
 
     @staticmethod
     def _profiled(moments: Moments, base: Index, profile: Index) -> Index:

@@ -49,21 +49,25 @@ class Sparse:
         if self.estimator not in ESTIMATORS:
             raise ValueError(f"unknown estimator {self.estimator!r}; there are: {', '.join(ESTIMATORS)}")
 
-    def support(self, moments: Moments, forced: Index) -> Index:
-        """Columns to keep, ``forced`` ones included, sorted."""
+    def support(self, moments: Moments, forced: Index, power: float = 0.0) -> Index:
+        """Columns to keep, ``forced`` ones included, sorted.
+
+        ``power`` is the mean square of the signal that y is a remainder of: what is smaller than round-off of
+        that signal is not worth a term.
+        """
         if self.estimator == "least_squares":
             return np.arange(len(moments.b), dtype=np.intp)
         free, reduced = _project_out(moments, forced)
-        if len(free) == 0 or reduced.yy <= _FLOOR * moments.yy:
+        if len(free) == 0 or reduced.yy <= _floor(moments, power):
             return np.sort(forced)
         if self.estimator == "lasso":
             chosen = _lasso(reduced, self.penalty)
         else:
-            floor = _FLOOR * moments.yy
-            chosen = _Search(reduced, self.gamma, self.max_terms, self.correlation, floor).run()
+            search = _Search(reduced, self.gamma, self.max_terms, self.correlation, _floor(moments, power))
+            chosen = search.run()
         return np.sort(np.concatenate([forced, free[chosen]])).astype(np.intp)
 
-    def prune(self, moments: Moments, support: Index, doubtful: Index) -> Index:
+    def prune(self, moments: Moments, support: Index, doubtful: Index, power: float = 0.0) -> Index:
         """The support without those doubtful columns whose loss the criterion welcomes."""
         support = np.asarray(support)
         count = max(moments.count / self.correlation, 2.0)
@@ -71,7 +75,7 @@ class Sparse:
 
         def score(columns: Index) -> float:
             rss = moments.squared_error(moments.solve(columns), columns)
-            return count * float(np.log(max(rss, _FLOOR * moments.yy, 1e-300))) + cost * len(columns)
+            return count * float(np.log(max(rss, _floor(moments, power), 1e-300))) + cost * len(columns)
 
         best = score(support)
         for column in doubtful:
@@ -80,6 +84,10 @@ class Sparse:
             if candidate < best:
                 support, best = shorter, candidate
         return support
+
+
+def _floor(moments: Moments, power: float) -> float:
+    return _FLOOR * max(moments.yy, power * moments.count)
 
 
 def _project_out(moments: Moments, forced: Index) -> tuple[Index, Moments]:
