@@ -2,6 +2,7 @@
 # make loop    the main job, start to end; results in out/loop
 # make test    style, types and tests
 # make bench   the benchmarks' ratios
+# make blind   how often the verdict on an undeclared effect is right
 
 PYTHON ?= python3
 VENV := .venv
@@ -11,7 +12,7 @@ PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: setup loop test bench clean
+.PHONY: setup loop test bench blind clean
 
 setup: $(INSTALLED)
 
@@ -46,6 +47,10 @@ test: setup
 
 bench: setup
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+# Whole loops with an effect hidden from a seed, and clean ones: how often the verdict is right (about ten minutes).
+blind: setup
+	$(BIN)/python tests/blind/undeclared.py --seeds 20 --clean 5
 
 clean:
 	rm -rf $(VENV) out dist

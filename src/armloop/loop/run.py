@@ -23,7 +23,7 @@ from armloop.drake_systems.replay import write_replay
 from armloop.drake_systems.scenarios import TrackingScenario, load_plan, load_tracking
 from armloop.drake_systems.tracking import TrackingResult, track
 from armloop.effects import EFFECTS
-from armloop.files import write_text
+from armloop.files import replacing, write_text
 from armloop.log import MotionLog, read_log, write_log
 from armloop.loop.tracking import tracking_answer
 from armloop.loop.undeclared import draw
@@ -73,7 +73,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
 
     What the diagnosis is given of the second run are two files: the model and the log.
     """
-    from armloop.reports.loop_report import loop_report
+    from armloop.reports.loop_report import loop_figure, loop_report
     from armloop.reports.tables import diagnosis_table, eta_table, score_table, steps_table
 
     scenario = load_tracking(SCENARIO)
@@ -142,6 +142,8 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     with _Clock(seconds, "report", progress, "6/6 writing the report"):
         write_text(folder / "loop.json", json.dumps(loop_answer(result, scenario), indent=1) + "\n")
         write_text(folder / "report.html", loop_report(result))
+        with replacing(folder / "loop.png") as draft:
+            loop_figure(result).savefig(draft, format="png", dpi=110, facecolor="white")
     print(f"open {folder}/report.html  ({sum(seconds.values()):.0f} s)")
     return result
 

@@ -3,7 +3,7 @@
 Every seed is a whole loop without the tracking: its own data collection, its own reconstructed model, its
 own second run. Clean runs have nothing hidden in them. The diagnosis is handed the model's file and the log.
 
-    python benchmarks/undeclared.py --seeds 20 --clean 5
+    python tests/blind/undeclared.py --seeds 20 --clean 5
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ def run(arm: str, seed: int, clean: bool) -> Case:
         estimates = diagnosis.outcome.added()[0].parameters
         parts = []
         for key, value in hidden.parameters.items():
-            off = np.linalg.norm(np.asarray(estimates[key].value, dtype=float) - np.asarray(value, dtype=float))
+            off = np.linalg.norm(
+                np.asarray(estimates[key].value, dtype=float) - np.asarray(value, dtype=float)
+            )
             parts.append(f"{key} {off / max(float(np.linalg.norm(np.asarray(value))), 1e-9):.1%}")
         deviation = ", ".join(parts)
     names = [", ".join(f"{name} {joint or ''}".strip() for name, joint in pairs) for pairs in (truth, found)]
@@ -92,13 +94,30 @@ def main() -> int:
         for case in workers.map(run, *zip(*jobs, strict=True)):
             cases.append(case)
             verdict = "right" if case.right else "WRONG"
-            print(f"  … {len(cases)}/{len(jobs)} seed {case.seed}: {case.hidden} → {case.found}: {verdict}", file=sys.stderr)
+            print(
+                f"  … {len(cases)}/{len(jobs)} seed {case.seed}: {case.hidden} → {case.found}: {verdict}",
+                file=sys.stderr,
+            )
     headers = ["seed", "hidden", "verdict", "right", "parameters off by", "before", "after"]
     rows = [
-        [c.seed, c.hidden, c.found, "yes" if c.right else "NO", c.deviation, f"{c.before:.1f}", f"{c.after:.1f}"]
+        [
+            c.seed,
+            c.hidden,
+            c.found,
+            "yes" if c.right else "NO",
+            c.deviation,
+            f"{c.before:.1f}",
+            f"{c.after:.1f}",
+        ]
         for c in cases
     ]
-    print(table(headers, rows, "Undeclared effects (residual before and after in units of the baseline's, worst joint)"))
+    print(
+        table(
+            headers,
+            rows,
+            "Undeclared effects (residual before and after in units of the baseline's, worst joint)",
+        )
+    )
     right = sum(case.right for case in cases)
     print(f"{right} of {len(cases)} verdicts right")
     return 0 if right == len(cases) else 1
