@@ -23,6 +23,7 @@ REPEATS = 5
 
 
 def motion_of(log: MotionLog) -> Motion:
+    """The states of a simulated log as one motion."""
     assert log.vdot is not None
     return Motion(log.time, log.q, log.v, log.vdot, np.array([0]))
 
