@@ -47,19 +47,19 @@ def pointwise(
         tau = terms(q, v, vdot)
         for body in bodies:
             tau += body(q, v, vdot)
-        load = tau.copy()
+        load = tau.tolist()
         for is_load, effect in effects:
             extra = effect(q, v, vdot)
             tau += extra
             if is_load:
-                load += extra
-        for j, laws in enumerate(laws_of):
-            speed = float(v[j])
+                load = [x + float(y) for x, y in zip(load, extra, strict=True)]
+        total = tau.tolist()
+        for j, (speed, laws) in enumerate(zip(v.tolist(), laws_of, strict=True)):
             sign = (speed > 0) - (speed < 0)
             for coefficient, law, parameter, by_load in laws:
                 value = coefficient * law(speed, sign, parameter)
-                tau[j] += value * abs(float(load[j])) if by_load else value
-        return tau
+                total[j] += value * abs(load[j]) if by_load else value
+        return np.array(total)
 
     return torque
 
@@ -86,14 +86,16 @@ def _merged(n: int, components: Sequence[Component], step: int) -> Pointwise:
     coefficients = np.ascontiguousarray(np.vstack([part.coefficients for part in parts]).T)
     factors = np.ascontiguousarray(index.T)
     values = np.ones(1 + 5 * n)
+    sines, cosines, positions, speeds, accelerations = values[1:].reshape(5, n)
+    products = np.empty(len(index))
 
     def torque(q: Array, v: Array, vdot: Array) -> Array:
-        np.sin(q, out=values[1 : 1 + n])
-        np.cos(q, out=values[1 + n : 1 + 2 * n])
-        values[1 + 2 * n : 1 + 3 * n] = q
-        values[1 + 3 * n : 1 + 4 * n] = v
-        values[1 + 4 * n :] = vdot
-        return coefficients @ np.multiply.reduce(values[factors], axis=0)
+        np.sin(q, out=sines)
+        np.cos(q, out=cosines)
+        positions[:] = q
+        speeds[:] = v
+        accelerations[:] = vdot
+        return coefficients.dot(np.multiply.reduce(values[factors], axis=0, out=products))
 
     return torque
 

@@ -7,7 +7,8 @@ from pydrake.systems.analysis import Simulator
 
 from armloop.arm import load_arm
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.plant import ArmPlant, ServoGains
+from armloop.drake_systems.joint_loads import ServoGains
+from armloop.drake_systems.plant import ArmPlant
 
 FRICTION = JointFriction(static=1.3, coulomb=1.0, stribeck_velocity=0.1, viscous=2.0)
 KINDS = ("revolute", "continuous", "prismatic")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Protocol
 
 import numpy as np
@@ -40,6 +41,8 @@ class Feedforward(LeafSystem):
     def _calc_tau_ff(self, context: Context, output: BasicVector) -> None:
         q, v, vdot = (port.Eval(context) for port in self._inputs)
         tau = self._model.feedforward(q, v, vdot, self._step)
-        if not np.isfinite(tau).all():
+        if not isfinite(
+            sum(tau.tolist())
+        ):  # a NaN or an infinity shows in the sum; several times faster than numpy
             raise RuntimeError(f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}")
         output.SetFromVector(tau)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ class PidGains:
         return PidGains(np.full(n, 80.0), np.full(n, 8.0), np.full(n, 2.0))
 
 
-class PidController(LeafSystem):
+class PidController(Diagram):
     """tau = K_p e + K_i integral(e) + K_d de/dt + tau_ff, with e = q_ref - q and de/dt = v_ref - v.
 
     q is read through encoders of the given resolution; v is the joint module's own velocity signal. The
@@ -54,45 +55,43 @@ class PidController(LeafSystem):
         """gains : n joints; period : s; resolution : rad (m) per encoder count, 0 for ideal encoders."""
         super().__init__()
         n = len(gains.kp)
+        builder = DiagramBuilder()
+        law = builder.AddNamedSystem("law", _PidLaw(gains, resolution))
+        split = builder.AddNamedSystem("split", Demultiplexer([n, n]))
+        integral = builder.AddNamedSystem("integral", DiscreteTimeIntegrator(n, period))
+        for name in ("q_ref", "v_ref", "tau_ff", "state"):
+            builder.ExportInput(law.GetInputPort(name), name)
+        builder.Connect(law.get_output_port(), split.get_input_port())
+        builder.Connect(split.get_output_port(1), integral.get_input_port())
+        builder.Connect(integral.get_output_port(), law.GetInputPort("integral"))
+        builder.ExportOutput(split.get_output_port(0), "tau")
+        builder.BuildInto(self)
+
+
+class _PidLaw(LeafSystem):
+    """The law without its memory. Output port: (2n,) the torques, then e; one port, so that e is found once."""
+
+    def __init__(self, gains: PidGains, resolution: ArrayLike) -> None:
+        super().__init__()
+        n = len(gains.kp)
+        counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
+        self._joints = list(zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), counts, strict=True))
         self._n = n
-        self._period = period
-        self._gains = list(zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), strict=True))
-        self._counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
-        self._q_ref = self.DeclareVectorInputPort("q_ref", n)
-        self._v_ref = self.DeclareVectorInputPort("v_ref", n)
-        self._tau_ff = self.DeclareVectorInputPort("tau_ff", n)
-        self._state = self.DeclareVectorInputPort("state", 2 * n)
-        self.DeclareVectorOutputPort("tau", n, self._calc_tau)
-        self.DeclareDiscreteState(n)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update_integral)
-
-    # Both run at every step: for a handful of joints plain floats are several times faster than arrays.
-
-    def _error(self, context: Context, state: list[float]) -> list[float]:
-        q_ref = self._q_ref.Eval(context).tolist()
-        return [
-            reference - (round(q / count) * count if count else q)
-            for reference, q, count in zip(q_ref, state, self._counts, strict=False)
+        self._ports = [
+            self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "tau_ff", "integral")
         ]
+        self._state = self.DeclareVectorInputPort("state", 2 * n)
+        self.DeclareVectorOutputPort("tau_and_e", 2 * n, self._calc)
 
-    def _calc_tau(self, context: Context, output: BasicVector) -> None:
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        # Called every step: for a handful of joints plain floats are several times faster than arrays.
         state = self._state.Eval(context).tolist()
-        terms = zip(
-            self._gains,
-            self._error(context, state),
-            context.get_discrete_state_vector().value().tolist(),
-            self._v_ref.Eval(context).tolist(),
-            state[self._n :],
-            self._tau_ff.Eval(context).tolist(),
-            strict=True,
-        )
-        output.SetFromVector(
-            [kp * e + ki * integral + kd * (w - v) + ff for (kp, ki, kd), e, integral, w, v, ff in terms]
-        )
-
-    def _update_integral(self, context: Context, update: DiscreteValues) -> None:
-        error = self._error(context, self._state.Eval(context).tolist())
-        integral = context.get_discrete_state_vector().value().tolist()
-        update.get_mutable_vector().SetFromVector(
-            [x + self._period * e for x, e in zip(integral, error, strict=True)]
-        )
+        signals = [port.Eval(context).tolist() for port in self._ports]
+        tau, errors = [], []
+        for (kp, ki, kd, count), q, v, q_ref, v_ref, tau_ff, integral in zip(
+            self._joints, state[: self._n], state[self._n :], *signals, strict=True
+        ):
+            e = q_ref - (round(q / count) * count if count else q)
+            errors.append(e)
+            tau.append(kp * e + ki * integral + kd * (v_ref - v) + tau_ff)
+        output.SetFromVector(tau + errors)

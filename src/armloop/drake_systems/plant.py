@@ -1,19 +1,14 @@
 """An arm as a Drake plant whose joints really stick: discrete, with Stribeck friction, Eq. (34) of the paper.
 
-Drake 1.51 has no dry friction in joints (a URDF's `<dynamics friction>` only warns). Eq. (34) is split into
-
-- -clamp(d v, +-f_s): a second actuator on every joint with a pure, very stiff velocity gain and effort limit
-f_s.
-  Drake's discrete solver applies gains and limits implicitly, so the joint sticks below f_s;
-- +(f_s - f_c) (1 - exp(-(v/v_s)^2)) sign(v): smooth, from the system `JointLoads`;
-- -f_v v: the joint's damping, implicit too.
+Drake 1.51 has no dry friction in joints (a URDF's `<dynamics friction>` only warns). Eq. (34) is split into the
+joint's damping, -f_v v, which Drake takes implicitly, and the dry part from the system `JointLoads`, which
+solves the step ahead for it. Stiff velocity gains of a second actuator per joint, with effort limits, stick as
+well, but Drake then solves a contact problem at every step: twice the time of the whole plant.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,70 +16,24 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
-    PdControllerGains,
     PrismaticJoint,
     RevoluteJoint,
     RotationalInertia,
     SpatialInertia,
     UnitInertia,
 )
-from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import ConstantVectorSource, MatrixGain
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from armloop.arm import Arm
 from armloop.drake_systems.effects import Realisation, UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.joint_loads import JointLoads, ServoGains
 from armloop.errors import ArmError
 
 Array = NDArray[np.float64]
 
-STICKING_GAIN = 1e6
-"""Velocity gain of the friction actuators, N*m*s/rad: a joint at rest creeps at tau / gain."""
 PAYLOAD_DENSITY = 7850.0
 """A payload is a steel ball, kg/m^3: its mass and centre are exact, its own inertia is small and known."""
-
-
-@dataclass(frozen=True)
-class ServoGains:
-    """A drive in speed mode: gains of the servo that Drake's discrete solver applies implicitly.
-
-    p : N*m/rad (N/m) on the position, d : N*m*s/rad (N*s/m) on the velocity
-    """
-
-    p: float = 5e4
-    d: float = 1e3
-
-
-class JointLoads(LeafSystem):
-    """The smooth part of what acts on the joints besides the drive.
-
-    tau_i = (f_s - f_c)_i (1 - exp(-(v_i/v_si)^2)) sign(v_i) - sum k (q_i - q0) - sum A sin(N q_i + phi)
-
-    Input port `state`: (2n,) positions, then velocities. Output port `tau`: (n,) generalized forces on the
-    plant. Stateless; not for scalar types other than float.
-    """
-
-    def __init__(self, friction: Sequence[JointFriction], springs: Array, ripples: Array) -> None:
-        """friction : n joints; springs, ripples : rows as in `effects.Realisation`."""
-        super().__init__()
-        self._n = len(friction)
-        self._drops = [(f.static - f.coulomb, 1.0 / f.stribeck_velocity) for f in friction]
-        self._springs = [(int(j), float(k), float(rest)) for j, k, rest in springs]
-        self._ripples = [(int(j), float(a), float(order), float(phase)) for j, a, order, phase in ripples]
-        self._state = self.DeclareVectorInputPort("state", 2 * self._n)
-        self.DeclareVectorOutputPort("tau", self._n, self._calc_tau)
-
-    def _calc_tau(self, context: Context, output: BasicVector) -> None:
-        # Called every step: for a handful of joints plain floats are several times faster than arrays.
-        state = self._state.Eval(context).tolist()
-        tau = []
-        for (drop, inverse_vs), v in zip(self._drops, state[self._n :], strict=True):
-            tau.append(-math.copysign(drop, v) * math.expm1(-((v * inverse_vs) ** 2)))
-        for j, stiffness, rest in self._springs:
-            tau[j] -= stiffness * (state[j] - rest)
-        for j, amplitude, order, phase in self._ripples:
-            tau[j] -= amplitude * math.sin(order * state[j] + phase)
-        output.SetFromVector(tau)
 
 
 class ArmPlant(Diagram):
@@ -128,59 +77,38 @@ class ArmPlant(Diagram):
         builder = DiagramBuilder()
         self.plant: MultibodyPlant = builder.AddNamedSystem("plant", MultibodyPlant(time_step))
         add_links(self.plant, arm, self.effects)
-        slots = self._add_actuators(servo)
+        self._add_drives()
         # A seventh faster, and `Linearize` accepts the plant.
         self.plant.SetUseSampledOutputPorts(False)
         self.plant.Finalize()
-        self._connect(builder, slots, servo)
+        self._connect(builder)
         builder.BuildInto(self)
         self.set_name(arm.name)
 
-    def _add_actuators(self, servo: ServoGains | None) -> list[int]:
-        """Add a drive and a friction actuator per joint; return the drives' actuator indices."""
-        slots = []
+    def _add_drives(self) -> None:
         for j, (joint, friction) in enumerate(zip(self.arm.joints, self.friction, strict=True)):
             moving = self.plant.GetJointByName(joint.name)
             moving.set_default_damping(friction.viscous)
             drive = self.plant.AddJointActuator(f"drive_{j + 1}", moving, joint.effort)
-            if servo is not None:
-                drive.set_controller_gains(PdControllerGains(p=servo.p, d=servo.d))
-            slots.append(int(drive.index()))
-            last = drive
-            if friction.static > 0:
-                brake = self.plant.AddJointActuator(f"friction_{j + 1}", moving, friction.static)
-                brake.set_controller_gains(PdControllerGains(p=0.0, d=STICKING_GAIN))
-                last = brake
-            # Drake 1.51 keeps the reflected inertia of a joint's last actuator only.
-            last.set_default_gear_ratio(1.0)
-            last.set_default_rotor_inertia(self.effects.rotor_inertia[j])
-        return slots
+            drive.set_default_gear_ratio(1.0)
+            drive.set_default_rotor_inertia(self.effects.rotor_inertia[j])
 
-    def _connect(self, builder: DiagramBuilder, slots: list[int], servo: ServoGains | None) -> None:
-        plant, n, actuators = self.plant, self.arm.n, self.plant.num_actuators()
-        to_slots = np.zeros((actuators, n))
-        to_slots[slots, range(n)] = 1.0
-        # A friction actuator does nothing unless this port is connected; its desired velocity is 0.
-        desired = plant.get_desired_state_input_port(plant.GetModelInstanceByName(self.arm.name))
-        if servo is not None:
-            widen = builder.AddNamedSystem("desired", MatrixGain(np.kron(np.eye(2), to_slots)))
-            builder.ExportInput(widen.get_input_port(), "desired_state")
-            builder.Connect(widen.get_output_port(), desired)
+    def _connect(self, builder: DiagramBuilder) -> None:
+        plant, effects = self.plant, self.effects
+        loads = builder.AddNamedSystem(
+            "loads",
+            JointLoads(
+                plant, self.friction, servo=self._servo, springs=effects.springs, ripples=effects.ripples
+            ),
+        )
+        builder.Connect(plant.get_state_output_port(), loads.GetInputPort("state"))
+        builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
+        if self._servo is None:
+            builder.ExportInput(loads.GetInputPort("tau"), "tau")
+            builder.ConnectInput("tau", plant.get_actuation_input_port())
+            builder.ExportOutput(plant.get_net_actuation_output_port(), "tau_drive")
         else:
-            rest = builder.AddNamedSystem("rest", ConstantVectorSource(np.zeros(desired.size())))
-            builder.Connect(rest.get_output_port(), desired)
-            widen = builder.AddNamedSystem("drives", MatrixGain(to_slots))
-            builder.ExportInput(widen.get_input_port(), "tau")
-            builder.Connect(widen.get_output_port(), plant.get_actuation_input_port())
-            narrow = builder.AddNamedSystem("tau_drive", MatrixGain(to_slots.T))
-            builder.Connect(plant.get_net_actuation_output_port(), narrow.get_input_port())
-            builder.ExportOutput(narrow.get_output_port(), "tau_drive")
-        stribeck = any(f.static > f.coulomb for f in self.friction)
-        if stribeck or len(self.effects.springs) or len(self.effects.ripples):
-            loads = JointLoads(self.friction, self.effects.springs, self.effects.ripples)
-            builder.AddNamedSystem("loads", loads)
-            builder.Connect(plant.get_state_output_port(), loads.get_input_port())
-            builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
+            builder.ExportInput(loads.GetInputPort("desired_state"), "desired_state")
         builder.ExportOutput(plant.get_state_output_port(), "state")
 
     def servo_torque(self, state: Array, desired_state: Array) -> Array:
@@ -188,8 +116,7 @@ class ArmPlant(Diagram):
 
         state : (N, 2n) at the end of each step; desired_state : (N, 2n) that was set for that end
 
-        The solver applies the law implicitly, so it holds with the state at the end of the step. (The plant's
-        own port `net_actuation` gives the sum with the friction when both actuators of a joint have gains.)
+        The law is implicit: it holds with the state at the end of the step.
         """
         if self._servo is None:
             raise ValueError("this plant's drives are in torque mode: it was built without a servo")

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.arm import Arm
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.plant import ArmPlant, ServoGains
+from armloop.drake_systems.joint_loads import ServoGains
+from armloop.drake_systems.plant import ArmPlant
+from armloop.drake_systems.reference import TableSource
 from armloop.excitation import Reference
 
 Array = NDArray[np.float64]
@@ -60,27 +62,6 @@ class Recording:
     q: Array
     v: Array
     tau: Array
-
-
-class TableSource(LeafSystem):
-    """Hold a table of desired states, one row per step.
-
-    Output port `desired_state`: (2n,), row k during [k, k+1) periods; the last row afterwards.
-    """
-
-    def __init__(self, width: int, period: float) -> None:
-        super().__init__()
-        self._rows = np.zeros((1, width))
-        self._period = period
-        self.DeclareVectorOutputPort("desired_state", width, self._calc_row)
-
-    def set_rows(self, rows: Array) -> None:
-        """Replace the table; `rows` is (K, width). Reset the context's time afterwards."""
-        self._rows = rows
-
-    def _calc_row(self, context: Context, output: BasicVector) -> None:
-        row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)
-        output.SetFromVector(self._rows[row])
 
 
 class SpeedModeArm:
