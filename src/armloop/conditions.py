@@ -7,12 +7,14 @@ sum (Eq. 9) shows how many clusters the data suggest.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
 
 from armloop.motion import Motion
 
@@ -59,7 +61,7 @@ def noise_floor(a: Array) -> float:
     largest = max(float(size.max()), 1e-300)
     level = np.log10(np.maximum(size, 1e-6 * largest))
     thin = level[:: max(1, len(level) // 4000)]
-    split = KMeans(2, n_init=1, init=np.array([[thin.min()], [thin.max()]])).fit(thin[:, None])
+    split = _fitted(KMeans(2, n_init=1, init=np.array([[thin.min()], [thin.max()]])), thin[:, None])
     low, high = np.sort(split.cluster_centers_[:, 0])
     quiet = level[level < (low + high) / 2] if high - low > 1 else level[level <= np.quantile(level, 0.02)]
     return float(10 ** np.median(quiet))
@@ -109,9 +111,9 @@ def sort_samples(motion: Motion, indicator: str = "robust", seed: int = 0) -> Cl
     thin = z[:: max(1, len(z) // 4000)]
     wcss = []
     for k in range(1, 7):
-        fit = KMeans(k, n_init=4, random_state=seed).fit(thin)
+        fit = _fitted(KMeans(k, n_init=4, random_state=seed), thin)
         wcss.append(float(np.linalg.norm(thin - fit.cluster_centers_[fit.labels_], axis=1).sum()))
-    best = KMeans(3, n_init=10, random_state=seed).fit(z)
+    best = _fitted(KMeans(3, n_init=10, random_state=seed), z)
     centers = best.cluster_centers_
     level = np.abs(centers) if indicator == "paper" else centers
     static = int(np.argmin(level.sum(axis=1)))
@@ -120,6 +122,13 @@ def sort_samples(motion: Motion, indicator: str = "robust", seed: int = 0) -> Cl
     names = np.full(3, int(Condition.CONSTANT_VELOCITY))
     names[static], names[varying] = Condition.STATIC, Condition.VARYING_VELOCITY
     return Clusters(names[best.labels_], z, centers, wcss, _elbow(wcss), int(best.n_iter_))
+
+
+def _fitted(means: KMeans, points: Array) -> KMeans:
+    """The fit, quiet where there are fewer distinct points than clusters: the counts and the elbow show it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        return means.fit(points)
 
 
 def _elbow(wcss: list[float]) -> int:

@@ -48,6 +48,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     still = log.q.copy()
     still[:, 1] = 0.3
     write_log(folder / "still.csv", replace(log, q=still, v=log.v * [1, 0, 1]))
+    write_log(folder / "no_torque.csv", replace(log, tau=log.tau * [1, 1, 0]))
     write_log(folder / "degrees.csv", replace(log, q=np.degrees(log.q), v=np.degrees(log.v)))
     good_model().save(folder / "model.json")
     (folder / "a_file").write_text("here")
@@ -202,6 +203,15 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
     "a joint that never moves, rigid body": (
         (*RECONSTRUCT, "--library", "rigid-body", given("still.csv")),
         r"q2: joint 'joint_2' moves in 0 samples",
+    ),
+    "a joint that never moves, one shot": (
+        (*RECONSTRUCT, "--method", "sindy", given("still.csv")),
+        r"q2: joint ",
+    ),
+    "a torque nobody recorded": ((*RECONSTRUCT, given("no_torque.csv")), r"tau3: zero throughout"),
+    "a torque nobody recorded, to diagnose": (
+        (*DIAGNOSE, given("no_torque.csv"), "--out", OUT),
+        r"no_torque: tau3 is zero throughout",
     ),
     # --- how they were recorded
     "two gains for three joints": (

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -197,6 +198,20 @@ def test_the_answer_has_the_published_shape(model: ReconstructedModel) -> None:
     assert set(effect["parameters"]["offset"]) == {"value", "std_error", "unit"}
     for rival in effect["alternatives"]:
         assert set(rival) >= {"effect", "joint", "why"}
+
+
+def test_joints_at_rest_are_left_out_of_the_judgement(model: ReconstructedModel) -> None:
+    law, expected = CASES["coulomb_friction", 1]
+    motion = fourier_motion(60.0, 125.0, 9)
+    motion = replace(motion, q=motion.q * [1, 0, 0], v=motion.v * [1, 0, 0], vdot=motion.vdot * [1, 0, 0])
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v) + law(motion)
+    log = measured(motion, tau, 9)
+    log = replace(log, v=log.v * [1, 0, 0])
+    answer = diagnose(model, [log]).to_dict()
+    (effect,) = answer["effects"]
+    assert (effect["effect"], effect["joint"]) == ("coulomb_friction", 1)
+    check_parameters(effect["parameters"], expected)
+    assert answer["error"]["before"][1:] == answer["error"]["nrmse"]["after"][1:] == [None, None]
 
 
 def test_of_equals_the_simplest_is_named_and_the_others_are_alternatives(model: ReconstructedModel) -> None:

@@ -108,3 +108,12 @@ def test_motion_that_leaves_most_parameters_open_is_refused():
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     with pytest.raises(ExcitationError, match=r"\d+ of \d+ inertial parameters undetermined"):
         reconstruct([log], three_axis(), library="rigid-body")
+
+
+def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.MonkeyPatch):
+    def fail(*_):
+        raise ArithmeticError("osqp: maximum iterations reached")
+
+    monkeypatch.setattr("armloop.reconstruction.rigid_body.constrained_least_squares", fail)
+    with pytest.raises(ExcitationError, match="the motion tells too little"):
+        reconstruct([a_run(1)], three_axis(), library="rigid-body")

@@ -51,7 +51,7 @@ class Diagnosis:
         return self.evidence.samples
 
     def errors(self) -> dict[str, Any]:
-        """RMSE per joint of held-out moving samples, before and after, beside the baseline's."""
+        """RMSE per joint of held-out moving samples, before and after, beside the baseline's; NaN for joints at rest."""
         scale = self.evidence.scale
         tau = np.sqrt(_by_joint(self.outcome.before, self._torque() ** 2))
         before, after = (
@@ -64,7 +64,7 @@ class Diagnosis:
             "before": before.tolist(),
             "after": after.tolist(),
             "noise_floor": scale.tolist(),
-            "nrmse": {"before": (before / tau).tolist(), "after": (after / tau).tolist()},
+            "nrmse": {"before": _ratio(before, tau).tolist(), "after": _ratio(after, tau).tolist()},
         }
 
     def _torque(self) -> Array:
@@ -96,14 +96,28 @@ class Diagnosis:
         effects.sort(key=lambda item: -item["share"])
         if self.unlisted is not None:
             effects.append(self.unlisted.to_dict())
-        return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": self.errors()}
+        return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": _null(self.errors())}
 
 
 def _by_joint(fit: Fit, values: Array) -> Array:
-    """(n,) mean of row values over each joint."""
-    joints = fit.stacked.joint
-    n = len(np.unique(joints)) if len(joints) == 0 else int(joints.max()) + 1
-    return np.bincount(joints, weights=values, minlength=n) / np.maximum(np.bincount(joints, minlength=n), 1)
+    """(n,) mean of row values over each joint; NaN where a joint has no rows."""
+    joints, n = fit.stacked.joint, fit.stacked.joints
+    counts = np.bincount(joints, minlength=n)
+    return _ratio(np.bincount(joints, weights=values, minlength=n), counts)
+
+
+def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """x / y, NaN where y is zero."""
+    return np.divide(x, y, out=np.full(len(x), np.nan), where=y > 0)
+
+
+def _null(value: Any) -> Any:
+    """The same for JSON, which has null in place of NaN."""
+    if isinstance(value, dict):
+        return {key: _null(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_null(item) for item in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Progress = silent) -> Diagnosis:
@@ -122,6 +136,11 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
             )
     progress("conditioning the run like the model's training logs")
     samples = condition(logs, model.conditioning)
+    for j in range(model.arm.n):
+        if not samples.tau[:, j].any():
+            raise InputError(
+                f"{logs[0].name}: tau{j + 1} is zero throughout; give a log that holds the joint's torque"
+            )
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     still = [j + 1 for j in range(model.arm.n) if samples.moving[:, j].sum() < 50]
     blocks = len(np.unique(evidence.blocks))

@@ -7,7 +7,7 @@ judged on folds that were not fitted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,11 @@ class Evidence:
         own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
         blocks = block_numbers(samples.motion, BLOCK_SECONDS)
-        return Evidence(model, samples, scale, samples.moving, blocks, model.context(samples.motion, effects))
+        context = model.context(samples.motion, effects)
+        if samples.cutoff_hz > 0:
+            # Effects that ask how fine the samples are must know how fine the filter has left them.
+            context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
+        return Evidence(model, samples, scale, samples.moving, blocks, context)
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -88,18 +92,20 @@ class Evidence:
             self.blocks[samples],
             self.fold[samples],
             joints,
+            residual.shape[1],
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Stacked:
-    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based) of each row."""
+    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based, of ``joints``) of each row."""
 
     X: Array
     y: Array
     block: NDArray[np.intp]
     fold: NDArray[np.intp]
     joint: NDArray[np.intp]
+    joints: int
 
     def moments(self) -> list[Moments]:
         """Moments of each fold."""

@@ -99,6 +99,8 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
 
 
 def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
+    if effect.joint is not None and not evidence.rows[:, effect.joint - 1].any():
+        return None  # a joint at rest shows nothing
     shapes = list(effect.shapes(evidence.context))
     if not shapes:
         return None

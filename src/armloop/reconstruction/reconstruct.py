@@ -16,6 +16,7 @@ from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress, silent
+from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import RIGID_BODY_CONDITIONING, rigid_body
 from armloop.reconstruction.sindy import sindy
@@ -97,6 +98,7 @@ def reconstruct(
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     progress(f"conditioning {len(logs)} log(s), low-pass {conditioning.cutoff_hz:g} Hz")
     samples = condition(logs, conditioning)
+    check_recorded(arm, samples)
     held_out = held_out_rows(samples, options)
     if library == "rigid-body":
         found = rigid_body(arm, samples, held_out, options, progress)

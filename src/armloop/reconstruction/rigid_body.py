@@ -82,7 +82,13 @@ def rigid_body(
     laws = [[*law, _LOAD_FRICTION] for law in laws]
     solution = _solve(samples, columns, laws, rows, load)
     cuts = _physical_cuts(arm, motion, base, laws)
-    theta, active = constrained_least_squares(solution.G, solution.b, solution.theta, cuts)
+    try:
+        theta, active = constrained_least_squares(solution.G, solution.b, solution.theta, cuts)
+    except ArithmeticError as error:
+        raise ExcitationError(
+            "the motion tells too little: no physically possible inertial parameters can be found for it; log "
+            "exciting motion of all joints, each moving apart from the others"
+        ) from error
     friction, start = [], base.count
     for law in laws:
         values = theta[start : start + len(law)]

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.components import SparseTerms
+from armloop.errors import ExcitationError
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options, StepReport
 
@@ -28,6 +30,7 @@ Array = NDArray[np.float64]
 _SETTINGS = [(threshold, ridge) for ridge in (1e-4, 1e-2) for threshold in (3e-3, 1e-2, 3e-2)]
 #: pysindy holds the library and its normal equations several times over: 4,000 rows keep it in memory.
 _MOST_SAMPLES = 4000
+_FEWEST_SAMPLES = 100
 
 
 def sindy(
@@ -36,9 +39,18 @@ def sindy(
     """Regress the one-shot library with pysindy's STLSQ; threshold and order N1 by held-out error.
 
     The joints' own friction columns, sign(v) and v, are offered to it as they are to the stepwise method.
+
+    Raises:
+        ExcitationError: a joint hardly moves, or the joints never move together.
     """
+    check_excitation(arm, samples)
     revolute = tuple(bool(r) for r in arm.revolute)
     rows = np.flatnonzero(samples.moving.all(axis=1) & ~held_out)
+    if len(rows) < _FEWEST_SAMPLES:
+        raise ExcitationError(
+            f"all joints move at once in {len(rows)} samples, at least {_FEWEST_SAMPLES} are needed for one-shot "
+            "regression; log runs in which every joint moves"
+        )
     rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
     validation = folds(samples.motion, options.folds, options.block_seconds)[rows] == 1
     fit, check = rows[~validation], rows[validation]

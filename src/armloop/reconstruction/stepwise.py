@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.conditions import Clusters, Condition, sort_samples
-from armloop.errors import ExcitationError
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.step import Part, StepPlan, regress_step
+from armloop.signals import independent_rows
 
 # A condition counts as met if what should be absent in it is this much weaker than where it is present.
 _PURITY = 0.1
@@ -35,15 +36,16 @@ def stepwise(
     Raises:
         ExcitationError: a joint does not move, or a condition has too few samples.
     """
-    _check_excitation(arm, samples)
+    check_excitation(arm, samples)
     clusters = sort_samples(samples.motion, seed=options.seed)
     note = _impure(samples.motion, clusters)
     validation = folds(samples.motion, options.folds, options.block_seconds) == 1
     found = Found(arm, friction=[[] for _ in arm.joints], notes=[note] if note else [])
     revolute = tuple(bool(r) for r in arm.revolute)
+    thin = independent_rows(samples)
     for plan in _together(revolute, options) if note else _steps(revolute, options):
         condition = np.isin(clusters.condition, plan.conditions)
-        rows = condition[:, None] & samples.moving & ~held_out[:, None]
+        rows = (condition & thin)[:, None] & samples.moving & ~held_out[:, None]
         progress(f"step {'+'.join(str(p.step) for p in plan.parts)}: {int(condition.sum())} samples")
         inherited = found.torque(samples.motion)
         terms, friction, report = regress_step(samples, revolute, inherited, rows, validation, plan, options)
@@ -82,16 +84,6 @@ def _orders(
     tried = [(N1, N2) for N1 in range(1, options.max_order + 1) for N2 in second]
     tried = [order for order in tried if size(order) <= options.max_candidates] or tried[:1]
     return tuple(sorted(tried, key=size))
-
-
-def _check_excitation(arm: Arm, samples: Samples) -> None:
-    for j, joint in enumerate(arm.joints):
-        q = samples.motion.q[:, j]
-        if np.ptp(q) < 1e-3 or samples.moving[:, j].sum() < 30:
-            raise ExcitationError(
-                f"q{j + 1}: joint {joint.name!r} hardly moves (range {np.ptp(q):.3g} {joint.position_unit}); "
-                "its terms cannot be determined: log runs in which every joint moves"
-            )
 
 
 def _impure(motion: Motion, clusters: Clusters) -> str:

@@ -147,7 +147,7 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
             "good",
         ),
         Card(
-            f"{percent(float(np.mean(relative['before'])))} → {percent(float(np.mean(relative['after'])))}",
+            f"{percent(float(np.nanmean(relative['before'])))} → {percent(float(np.nanmean(relative['after'])))}",
             "Held-out nRMSE",
             "mean of the joints, moving samples",
             "good",
