@@ -56,7 +56,7 @@ def test_velocity_does_not_lag_the_derivative_of_the_position_under_noise():
 def test_what_is_slow_passes_and_what_is_fast_does_not():
     time = np.arange(0, 8, 0.004)
     motion = condition([sines(time, (1.0, 40.0))], TEN_HZ).motion
-    inside = slice(20, -20)  # the ends know one side of the motion only
+    inside = np.abs(motion.time - 4) < 3.4  # the ends know one side of the motion only
     np.testing.assert_allclose(motion.q[inside, 0], np.sin(2 * np.pi * motion.time[inside]), atol=1e-5)
     assert np.abs(motion.q[inside, 1]).max() < 1e-4
 
@@ -65,7 +65,8 @@ def test_the_acceleration_is_that_of_the_motion():
     samples = condition([sines(np.arange(0, 8, 0.004), (0.5,))], TEN_HZ)
     w = 2 * np.pi * 0.5
     expected = -(w**2) * np.sin(w * samples.motion.time)
-    np.testing.assert_allclose(samples.motion.vdot[10:-10, 0], expected[10:-10], atol=1e-4 * w**2)
+    inside = np.abs(samples.motion.time - 4) < 3.4
+    np.testing.assert_allclose(samples.motion.vdot[inside, 0], expected[inside], atol=1e-4 * w**2)
     np.testing.assert_allclose(samples.motion.vdot[:, 0], expected, atol=1e-2 * w**2)
 
 
