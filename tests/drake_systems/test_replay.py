@@ -1,6 +1,7 @@
 """The replay is one file that needs nothing else."""
 
 import dataclasses
+import logging
 import re
 
 import numpy as np
@@ -19,13 +20,17 @@ def result(controller, n):
 
 
 @pytest.mark.parametrize("arm", ["three_axis", "scara", "without shapes"])
-def test_one_offline_html_file(arm, tmp_path):
+def test_one_offline_html_file(arm, tmp_path, caplog):
+    caplog.set_level(logging.INFO)
+    level = logging.getLogger("drake").level
     if arm == "without shapes":
         arm = Arm.from_dict(load_arm("three_axis").to_dict())
     else:
         arm = load_arm(arm)
     path = tmp_path / "replay.html"
     write_replay(path, arm, {name: result(name, arm.n) for name in ("pid", "pid_step3")})
+    assert logging.getLogger("drake").level == level
+    assert not caplog.records  # no word of an address that is already gone
     html = path.read_text(encoding="utf-8")
     assert html.lstrip().lower().startswith("<!doctype html")
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", html)

@@ -1,11 +1,14 @@
 """Scenario files: the built-in ones load, and what is wrong with one is said in one line."""
 
+import runpy
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from armloop.drake_systems.scenarios import load_plan, load_plant, load_tracking, plant_names
 from armloop.errors import ScenarioError
+from armloop.resources import scenario_path
 
 OWN = """
 own_plant:
@@ -116,3 +119,13 @@ def test_missing_names_are_told():
         load_plan("huge")
     with pytest.raises(ScenarioError, match="there are: scara, three_axis"):
         load_plant("puma")
+
+
+def test_the_scenarios_script_is_the_command(monkeypatch):
+    calls = []
+    monkeypatch.setattr("armloop.cli.main", lambda arguments: calls.append(arguments) or 0)
+    monkeypatch.setattr("sys.argv", ["three_axis_tracking.py", "--model", "step3=mine.json"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(scenario_path("three_axis_tracking").with_suffix(".py")), run_name="__main__")
+    assert ended.value.code == 0
+    assert calls == [["track", "three_axis_tracking", "--model", "step3=mine.json"]]

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from exact_model import ExactModel
 from numpy.testing import assert_allclose
 
 from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.exact import ExactModel
 from armloop.drake_systems.scenarios import load_tracking
 from armloop.drake_systems.tracking import controllers_for, run_tracking, track
 from armloop.excitation import FourierReference
@@ -68,8 +68,55 @@ def test_an_undeclared_payload_costs_and_knowing_it_pays(short, exact):
     assert np.all(results["pid_augmented"].eta < 0.01)
 
 
-def test_without_a_model_only_pid_runs(short):
-    assert controllers_for(short, {}) == ["pid"]
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("", "pid"),
+        ("model", "pid pid_step1 pid_step3"),
+        ("step3", "pid pid_step3"),
+        ("step3 step1", "pid pid_step1 pid_step3"),
+        ("augmented", "pid pid_augmented"),
+        ("mine model step1", "pid pid_step1 pid_step3 pid_mine"),
+    ],
+)
+def test_controllers_that_have_a_model_run(short, given, expected):
+    assert controllers_for(short, dict.fromkeys(given.split())) == expected.split()
+
+
+def test_a_model_asked_for_runs_even_if_the_scenario_does_not_list_its_controller(short):
+    scenario = dataclasses.replace(short, controllers=("pid",))
+    assert controllers_for(scenario, dict.fromkeys(["step1", "model"])) == ["pid", "pid_step1"]
+
+
+class Steps:
+    """A model that writes down which of its steps was asked for."""
+
+    def __init__(self):
+        self.asked = set()
+
+    def feedforward(self, q, v, vdot, step):
+        self.asked.add(step)
+        return np.zeros(3)
+
+
+def test_step1_and_step3_have_models_of_their_own(short):
+    blink = dataclasses.replace(
+        short, reference=dataclasses.replace(short.reference, duration=0.01), score=(0.0, 0.01)
+    )
+    models = {name: Steps() for name in ("model", "step1", "augmented")}
+    run_tracking(blink, models, processes=1)
+    assert {name: model.asked for name, model in models.items()} == {
+        "model": {3},
+        "step1": {1},
+        "augmented": {3},
+    }
+
+
+def test_a_controller_without_a_model_is_refused(short):
+    with pytest.raises(
+        ValueError, match="no model for the controller pid_step3; the models given are: step1"
+    ):
+        track(short, "pid_step3", {"step1": Steps()})
 
 
 def test_a_model_that_is_not_finite_stops_the_run(short):

@@ -59,6 +59,7 @@ class CollectionPlan:
     rate : Hz of the logs
     segment_time_step : of the plant during segments of constant velocity, where nothing changes fast
     dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
+    static_settle : long enough for the servo to take over the weight of a sliding joint
     static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the
         paper)
     velocity_segments : constant velocities from `slowest` to the range's largest
@@ -71,14 +72,14 @@ class CollectionPlan:
     static_poses: int = 48
     static_speed: float = float(np.deg2rad(0.1))
     static_speed_prismatic: float = 1e-4
-    static_settle: float = 0.08
+    static_settle: float = 0.09
     static_hold: float = 0.35
     velocity_segments: int = 100
     slowest: float = 0.01
     slowest_prismatic: float = 1e-3
     velocity_settle: float = 0.08
     velocity_hold: float = 0.4
-    trajectories: int = 2
+    trajectories: int = 3
     trajectory_duration: float = 20.0
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,7 +51,8 @@ def write_replay(
         actors.append((_add_arm(plant, arm, X_WB, colour, controller), result.q))
         actors.append((_add_arm(plant, arm, X_WB, GHOST, f"{controller}_reference"), result.q_ref))
     plant.Finalize()
-    meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
+    with _drake_says_less():  # the address that it listens on is gone before anybody could look there
+        meshcat = Meshcat(MeshcatParams(host="localhost", show_stats_plot=False))
     visualizer = MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
@@ -65,6 +68,18 @@ def write_replay(
     visualizer.StopRecording()
     visualizer.PublishRecording()
     write_text(path, meshcat.StaticHtml())
+
+
+@contextmanager
+def _drake_says_less() -> Iterator[None]:
+    """Let Drake's logger pass warnings only, for the time of the block."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _reach(arm: Arm) -> float:

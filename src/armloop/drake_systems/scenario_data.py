@@ -54,14 +54,14 @@ class PlanData:
     static_poses: int = 48  # each in both directions
     static_speed: float = 0.0017453292519943296  # rad/s (0.1 deg/s)
     static_speed_prismatic: float = 0.0001  # m/s
-    static_settle: float = 0.08  # s before the log of a segment starts
+    static_settle: float = 0.09  # s before the log of a segment starts
     static_hold: float = 0.35  # s that are logged
     velocity_segments: int = 100
     slowest: float = 0.01  # rad/s
     slowest_prismatic: float = 0.001  # m/s
     velocity_settle: float = 0.08  # s
     velocity_hold: float = 0.4  # s
-    trajectories: int = 2  # Fourier-series trajectories
+    trajectories: int = 3  # Fourier-series trajectories
     trajectory_duration: float = 20.0  # s each
 
 

@@ -11,20 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput
 
-from armloop.arm import Arm
+from armloop.drake_systems.closed_loop import add_arm_with_controller
 from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.feedforward import Feedforward, FeedforwardModel
-from armloop.drake_systems.pid import PidController
-from armloop.drake_systems.plant import ArmPlant
-from armloop.drake_systems.reference import ReferenceSource
+from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.scenarios import TrackingScenario
 
 Array = NDArray[np.float64]
 
 MAIN_MODEL = "model"
 """The name in `models` of the one behind `pid_step1` and `pid_step3`."""
+STEPS = {"step1": 1, "step3": 3}
+"""The names in `models` of the one behind `pid_step1` and the one behind `pid_step3`, and their steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +48,12 @@ class TrackingResult:
 
 
 def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
-    """Return the controllers that `run_tracking` runs, in order."""
-    names = [name for name in scenario.controllers if name == "pid" or MAIN_MODEL in models]
-    return names + [f"pid_{name}" for name in models if name != MAIN_MODEL]
+    """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
+    served = {f"pid_{name}" for name in models if name != MAIN_MODEL} | {"pid"}
+    if MAIN_MODEL in models:
+        served |= {f"pid_{name}" for name in STEPS}
+    names = [name for name in scenario.controllers if name in served]
+    return names + [f"pid_{name}" for name in models if name != MAIN_MODEL and f"pid_{name}" not in names]
 
 
 def run_tracking(
@@ -63,8 +65,9 @@ def run_tracking(
 ) -> dict[str, TrackingResult]:
     """Track the scenario's reference once per controller.
 
-    models : `"model"` serves `pid_step1` (Eq. 35) and `pid_step3` (Eq. 36); any other NAME adds a controller
-        `pid_NAME`, that model's third step. Without `"model"` only `pid` and those run.
+    models : `"model"` serves `pid_step1` (Eq. 35) and `pid_step3` (Eq. 36), `"step1"` and `"step3"` one of
+        them each and come first; any other NAME adds a controller `pid_NAME`, that model's third step.
+        Controllers of the scenario that have no model do not run; `pid` needs none.
     effects : what the plant has and the models may not know
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
@@ -104,46 +107,40 @@ def track(
 ) -> TrackingResult:
     """Run one controller over the scenario's reference, starting on it.
 
-    The diagram: `ReferenceSource` -> `Feedforward` -> `PidController` -> `ArmPlant` in torque mode -> back.
+    The diagram is that of `add_arm_with_controller`, with loggers. Raises `ValueError` when `models` has none
+    for the controller.
     """
     plant_spec, period = scenario.plant, scenario.plant.config.time_step
-    arm = plant_spec.arm
+    model, step = _feedforward(controller, models)
     builder = DiagramBuilder()
-    plant = builder.AddSystem(ArmPlant(arm, plant_spec.config.friction, effects=effects, time_step=period))
-    source = builder.AddNamedSystem("reference", ReferenceSource(scenario.reference, period))
-    resolution = plant_spec.config.instruments.resolution(arm)
-    pid = builder.AddNamedSystem("pid", PidController(scenario.gains, period, resolution))
-    feedforward = _feedforward(controller, models, arm)
-    builder.AddNamedSystem("feedforward", feedforward)
-    if isinstance(feedforward, Feedforward):
-        for port in ("q_ref", "v_ref", "vdot_ref"):
-            builder.Connect(source.GetOutputPort(port), feedforward.GetInputPort(port))
-    for port in ("q_ref", "v_ref"):
-        builder.Connect(source.GetOutputPort(port), pid.GetInputPort(port))
-    builder.Connect(feedforward.get_output_port(0), pid.GetInputPort("tau_ff"))
-    builder.Connect(plant.GetOutputPort("state"), pid.GetInputPort("state"))
-    builder.Connect(pid.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    states = LogVectorOutput(plant.GetOutputPort("state"), builder, period)
-    torques = LogVectorOutput(plant.GetOutputPort("tau_drive"), builder, period)
+    systems = add_arm_with_controller(
+        builder, plant_spec, scenario.gains, scenario.reference, model, step, effects=effects
+    )
+    states = LogVectorOutput(systems.plant.GetOutputPort("state"), builder, period)
+    torques = LogVectorOutput(systems.plant.GetOutputPort("tau_drive"), builder, period)
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
-    q_ref, v_ref, _ = source.tables
-    plant.set_state(context, q_ref[0], v_ref[0])
+    systems.start_on_reference(context)
     simulator.Initialize()
     simulator.AdvanceTo(scenario.reference.duration)
     log = states.FindLog(context)
-    q = log.data().T[:, : arm.n]
+    q = log.data().T[:, : plant_spec.arm.n]
+    q_ref = systems.reference.tables[0]
     return _score(scenario, controller, log.sample_times(), q_ref, q, torques.FindLog(context).data().T)
 
 
 def _feedforward(
-    controller: str, models: Mapping[str, FeedforwardModel], arm: Arm
-) -> Feedforward | ConstantVectorSource:
+    controller: str, models: Mapping[str, FeedforwardModel]
+) -> tuple[FeedforwardModel | None, int]:
+    """Return a controller's model and the last step of it that is used."""
     if controller == "pid":
-        return ConstantVectorSource(np.zeros(arm.n))
-    if controller in ("pid_step1", "pid_step3"):
-        return Feedforward(models[MAIN_MODEL], arm.n, int(controller[-1]))
-    return Feedforward(models[controller.removeprefix("pid_")], arm.n, 3)
+        return None, 3
+    name = controller.removeprefix("pid_")
+    model = models.get(name, models.get(MAIN_MODEL) if name in STEPS else None)
+    if model is None:
+        given = ", ".join(models) or "none"
+        raise ValueError(f"there is no model for the controller {controller}; the models given are: {given}")
+    return model, STEPS.get(name, 3)
 
 
 def _score(

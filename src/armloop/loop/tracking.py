@@ -28,6 +28,7 @@ def run_scenario(
     """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
 
     Without any model one is reconstructed first, from data collected on the scenario's own arm.
+    ``models`` are named as in :func:`armloop.drake_systems.tracking.run_tracking`.
 
     Returns:
         The content of ``tracking.json`` and the results by controller.
@@ -36,7 +37,7 @@ def run_scenario(
     if not chosen:
         progress("no --model given: collecting data on the scenario's arm and reconstructing one")
         plant = scenario.plant
-        logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed)
+        logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed, processes=2)
         chosen["model"] = reconstruct(list(logs.values()), plant.arm, progress=progress).model
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen)
