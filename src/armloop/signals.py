@@ -30,7 +30,8 @@ class Conditioning:
     Attributes:
         cutoff_hz: corner of the zero-phase Butterworth low-pass (order 4, run both ways); 0 leaves the
             samples as they are (for inverse-dynamics samples that are no time series).
-        oversampling: samples kept per period of the corner frequency.
+        oversampling: samples kept per period of the corner frequency; where a direction reverses, friction
+            steps, and on a coarse grid the step would lie up to half a sample off.
         dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
         smear: periods of the corner around a standstill in which a joint does not count as moving, because
             the filter smears the torque of the standstill that far.
@@ -40,7 +41,7 @@ class Conditioning:
     """
 
     cutoff_hz: float = 10.0
-    oversampling: float = 4.0
+    oversampling: float = 25.0
     dead_zone: float = 4.0
     smear: float = 0.5
 
@@ -130,6 +131,15 @@ def smooth(samples: Samples, x: Array) -> Array:
     if samples.cutoff_hz <= 0:
         return x
     return np.concatenate([low_pass(x[run]) for run in samples.motion.runs()])
+
+
+def independent_rows(samples: Samples) -> NDArray[np.bool_]:
+    """(N,) every so many samples that four are left per period of the corner: more carry no more information."""
+    rows = np.zeros(samples.motion.samples, dtype=bool)
+    stride = 1 if samples.cutoff_hz <= 0 else max(1, int(0.25 / (samples.cutoff_hz * samples.period)))
+    for run in samples.motion.runs():
+        rows[run.start : run.stop : stride] = True
+    return rows
 
 
 def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple[Array, ...] | None:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class Found:
     """Components, friction terms per joint, one report per step, and notes for the user.
 
-    ``history`` is kept in the model file.
+    ``history`` is kept in the model file; ``condition`` (N,) is set where the samples were sorted.
     """
 
     arm: Arm
@@ -30,6 +30,7 @@ class Found:
     reports: list[StepReport] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     history: dict[str, Any] = field(default_factory=dict)
+    condition: NDArray[np.int_] | None = None
 
     @property
     def law(self) -> FrictionLaw:

@@ -37,7 +37,8 @@ class StepReport:
     Attributes:
         step: 1, 2, 3.
         orders: [N1, N2]; None where a library has no orders.
-        candidates: size of the paper's library at these orders; ``independent`` of its full-rank basis.
+        candidates: size of the paper's library at these orders; ``independent``: those that were regressed,
+            its full-rank basis without what an earlier step owns.
         terms: number of terms kept per joint.
         samples: samples the step was fitted on, per joint.
         trials: (orders, held-out error relative to the torque) of every order tried.

@@ -222,5 +222,5 @@ def _check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) -
     if weak > base.count // 3:
         raise ExcitationError(
             f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
-            "joints (armloop excite writes one)"
+            "joints"
         )

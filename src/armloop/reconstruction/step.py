@@ -94,6 +94,10 @@ def _candidates(revolute: tuple[bool, ...], plan: StepPlan, independent: bool = 
         library = DoubleFeatureSet(revolute, N1, _second_order(part, N2), part.second, independent)
         for row, first in zip(library.index, library.order(), strict=True):
             key = tuple(int(e) for e in row if e)
+            # What depends on the position alone belongs to Step I, whose data are the cleanest for it: later
+            # steps inherit it instead of trading it against their own terms.
+            if part.step > 1 and len(key) == first:
+                continue
             rows.setdefault(key, (part.step, int(first), len(key) - int(first)))
     width = max(1, *(len(key) for key in rows))
     index = np.array([[0] * (width - len(key)) + list(key) for key in rows], dtype=np.intp)
@@ -207,9 +211,8 @@ def regress_step(
             int(np.count_nonzero(found.coefficients[:, j])) + sum(t.step == part.step for t in friction[j])
             for j in range(len(joints))
         ]
-        full, reduced = (
-            DoubleFeatureSet(revolute, orders[0], N2, part.second, r).size for r in (False, True)
-        )
+        full = DoubleFeatureSet(revolute, orders[0], N2, part.second, independent=False).size
+        reduced = int(np.count_nonzero(candidates.step[columns] == part.step))
         samples_used = [len(joint.y) for joint in joints]
         reports.append(StepReport(part.step, [orders[0], N2], full, reduced, counts, samples_used, trials))
     return terms, friction, reports

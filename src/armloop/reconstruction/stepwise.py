@@ -41,6 +41,8 @@ def stepwise(
     note = _impure(samples.motion, clusters)
     validation = folds(samples.motion, options.folds, options.block_seconds) == 1
     found = Found(arm, friction=[[] for _ in arm.joints], notes=[note] if note else [])
+    if not note:
+        found.condition = clusters.condition
     revolute = tuple(bool(r) for r in arm.revolute)
     thin = independent_rows(samples)
     for plan in _together(revolute, options) if note else _steps(revolute, options):
