@@ -38,8 +38,13 @@ def pointwise(
     """
     terms = _merged(arm.n, components, step)
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
+    # Python's own floats: numpy's scalars, as a fit leaves them, take three times as long.
     laws_of = [
-        [(t.coefficient, _LAWS[t.kind], t.parameter, t.by_load) for t in joint if t.step <= step]
+        [
+            (float(t.coefficient), _LAWS[t.kind], float(t.parameter), t.by_load)
+            for t in joint
+            if t.step <= step
+        ]
         for joint in friction.terms
     ]
 

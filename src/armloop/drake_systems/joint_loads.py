@@ -66,7 +66,8 @@ class JointLoads(LeafSystem):
         self._effort = [drive.effort_limit() for drive in drives]
         self._damping = [self._step * drive.joint().default_damping() for drive in drives]
         self._drops = [
-            (j, f.coulomb, f.static - f.coulomb, 1.0 / f.stribeck_velocity)
+            # Python's own floats: numpy's scalars take three times as long.
+            (j, float(f.coulomb), float(f.static - f.coulomb), 1.0 / float(f.stribeck_velocity))
             for j, f in enumerate(friction)
             if f.static > 0
         ]

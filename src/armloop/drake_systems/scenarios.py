@@ -27,6 +27,7 @@ from armloop.excitation import MotionRanges, Reference, fourier_reference, paper
 from armloop.resources import scenario_names, scenario_path
 
 T = TypeVar("T")
+_PARTS = ("plants", "collection")  # YAML files that scenarios and collections draw on
 _LONGEST = 600.0  # s of a tracking run
 _FINEST, _COARSEST = 1e-4, 5e-3  # s of a time step
 
@@ -236,7 +237,7 @@ def _per_joint(values: list[float], n: int, where: str, *, spread: bool = True) 
 def _read(path: Path, kind: str = "scenario") -> Mapping[str, Any]:
     """Return the file as a mapping."""
     if not path.is_file():
-        known = ", ".join(scenario_names())
+        known = ", ".join(name for name in scenario_names() if name not in _PARTS)
         raise ScenarioError(f"{path}: no such {kind}; give the path of a YAML file or one of: {known}")
     try:
         raw = yaml_load_file(str(path))
