@@ -22,7 +22,8 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like those of every other fault."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        raise InputError(f"{self.prog.removeprefix('armloop ').strip()}: {message}; see {self.prog} --help")
+        command = self.prog.removeprefix("armloop").strip()
+        raise InputError(f"{command + ': ' if command else ''}{message}; see {self.prog} --help")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -129,6 +129,11 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     Raises:
         InputError: the logs do not fit the model, or hold too little motion to judge.
     """
+    if model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None:
+        raise InputError(
+            "the model predicts motor currents (A), in which no effect has its physical size; "
+            "reconstruct it with --drive-gains K1,..,KN (N·m/A)"
+        )
     for log in logs:
         if log.joints != model.arm.n:
             raise InputError(

@@ -7,7 +7,7 @@ judged on folds that were not fitted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,7 @@ class Evidence:
     rows: NDArray[np.bool_]
     blocks: NDArray[np.intp]
     context: Context
+    _columns: dict[tuple[str, int | None, float], Array] = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -77,8 +78,11 @@ class Evidence:
         return self.samples.tau - smooth(self.samples, predicted)
 
     def columns(self, effect: Effect, shape: float) -> Array:
-        """(N, n, p) columns of an effect through the run's filter."""
-        return smooth(self.samples, effect.full_columns(self.context, shape))
+        """(N, n, p) columns of an effect through the run's filter, computed once."""
+        key = (effect.name, effect.joint, shape)
+        if key not in self._columns:
+            self._columns[key] = smooth(self.samples, effect.full_columns(self.context, shape))
+        return self._columns[key]
 
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
         """The weighted regression problem of all joints, one row per joint and counted sample."""

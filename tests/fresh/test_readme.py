@@ -1,0 +1,79 @@
+"""Every command and every line of Python in the README runs, in the order in which they stand there."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
+
+
+def blocks(language: str) -> list[str]:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return [body for kind, body in BLOCK.findall(text) if kind == language]
+
+
+def commands(program: str) -> list[str]:
+    lines = "\n".join(blocks("sh")).replace("\\\n", " ").splitlines()
+    return [line for line in lines if line.startswith(program)]
+
+
+def run(command: list[str], cwd: Path) -> str:
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False, timeout=500)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def armloop(line: str, cwd: Path) -> str:
+    words = shlex.split(line)[1:]
+    expanded = [
+        str(path.relative_to(cwd)) for word in words for path in sorted(cwd.glob(word)) if "*" in word
+    ]
+    plain = [word for word in words if "*" not in word]
+    at = next((i for i, word in enumerate(words) if "*" in word), len(plain))
+    return run([sys.executable, "-m", "armloop", *plain[:at], *expanded, *plain[at:]], cwd)
+
+
+def test_every_line_of_shell_is_make_or_armloop():
+    lines = [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
+    assert all(line.startswith(("make ", "armloop ", "  ")) for line in lines)
+    assert len(commands("armloop")) >= 6
+
+
+def test_make_targets_exist():
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("make is not installed")
+    named = [line.split()[1] for line in commands("make")] + ["bench", "blind"]
+    run([make, "-n", "-C", str(ROOT), *named], ROOT)
+
+
+def test_pictures_and_paths_of_the_text_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert "@" not in re.sub(r"`[^`]*`", "", text), "a figure is still to be filled in"
+    for path in re.findall(r"\]\(([^)#]+)\)", text):
+        assert (ROOT / path).exists(), path
+
+
+@pytest.mark.slow
+def test_every_command_and_the_python_run(tmp_path):
+    assert "make loop" in commands("make")
+    page = tmp_path / "out" / "loop" / "report.html"
+    # What `make loop` calls, without setting up an environment of its own.
+    out = armloop("armloop loop --out out/loop", tmp_path)
+    assert "the verdict was right" in out
+    assert page.is_file() and (page.parent / "replay.html").is_file()
+    for line in commands("armloop"):
+        if "$" not in line:
+            assert armloop(line, tmp_path).strip(), line
+    (example,) = blocks("python")
+    assert len([line for line in example.splitlines() if line.strip()]) <= 10
+    (tmp_path / "example.py").write_text(example, encoding="utf-8")
+    run([sys.executable, "example.py"], tmp_path)
+    assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
