@@ -7,6 +7,7 @@ before a command runs, so that ``--help`` and wrong arguments answer at once.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -37,6 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"armloop: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:
+        # Whoever read the answer (head, a pager) has had enough; Python would complain again at its exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except KeyboardInterrupt:
         print("armloop: interrupted", file=sys.stderr)
         return 130

@@ -1,5 +1,7 @@
 """Every command and every line of Python in the README runs, in the order in which they stand there."""
 
+import glob
+import json
 import os
 import re
 import shlex
@@ -31,13 +33,13 @@ def run(command: list[str], cwd: Path) -> str:
 
 
 def armloop(line: str, cwd: Path) -> str:
-    words = shlex.split(line)[1:]
-    expanded = [
-        str(path.relative_to(cwd)) for word in words for path in sorted(cwd.glob(word)) if "*" in word
-    ]
-    plain = [word for word in words if "*" not in word]
-    at = next((i for i, word in enumerate(words) if "*" in word), len(plain))
-    return run([sys.executable, "-m", "armloop", *plain[:at], *expanded, *plain[at:]], cwd)
+    """Run one line as a shell would, wildcards included."""
+    words: list[str] = []
+    for word in shlex.split(line)[1:]:
+        found = sorted(glob.glob(word, root_dir=cwd)) if "*" in word else [word]
+        assert found, f"{word} matches nothing"
+        words += found
+    return run([sys.executable, "-m", "armloop", *words], cwd)
 
 
 def test_every_line_of_shell_is_make_or_armloop():
@@ -70,10 +72,27 @@ def test_every_command_and_the_python_run(tmp_path):
     assert "the verdict was right" in out
     assert page.is_file() and (page.parent / "replay.html").is_file()
     for line in commands("armloop"):
-        if "$" not in line:
+        if "$UR10E" not in line:
             assert armloop(line, tmp_path).strip(), line
     (example,) = blocks("python")
     assert len([line for line in example.splitlines() if line.strip()]) <= 10
     (tmp_path / "example.py").write_text(example, encoding="utf-8")
     run([sys.executable, "example.py"], tmp_path)
     assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
+
+
+@pytest.mark.measured
+def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path, measured):
+    outputs = [
+        armloop(line.replace("$UR10E", str(measured / "ur10e")), tmp_path)
+        for line in commands("armloop")
+        if "$UR10E" in line
+    ]
+    assert len(outputs) == 3
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (mass,) = re.findall(r"`payload`, ([\d.]+) ± ", text)
+    assert mass in outputs[2]
+    answer = json.loads((tmp_path / "out" / "ur10e" / "diagnosis.json").read_text(encoding="utf-8"))
+    nrmse = answer["error"]["nrmse"]
+    for values in nrmse.values():
+        assert f"| {sum(values) / 6:.3f} |" in text
