@@ -89,7 +89,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
             for trial in trials
             if trial is not best and _gain(current, trial) >= (1 - 2 * EQUAL_SHARE) * gain
         ]
-        found.append(Found(best.effects[-1], best.shapes[-1], gain / explainable, rivals))
+        found.append(Found(best.effects[-1], best.shapes[-1], min(gain / explainable, 1.0), rivals))
         progress(
             f"found {best.effects[-1].label()}: removes {gain / explainable:.0%} of what can be explained"
         )

@@ -143,7 +143,9 @@ def _baseline(
     table = np.array([[np.nan if x is None else x for x in s.moving["rmse"]] for s in scores])
     usable = np.isfinite(table).any(axis=0)
     rmse = [float(np.nanmax(column)) if ok else None for column, ok in zip(table.T, usable, strict=True)]
-    return {"rmse": rmse, "rms": score(model, samples, held_out).rms, "samples": int(held_out.sum())}
+    rms = score(model, samples, held_out).rms
+    nrmse = [e / scale if e is not None and scale else None for e, scale in zip(rmse, rms, strict=True)]
+    return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "samples": int(held_out.sum())}
 
 
 def _range(motion: Motion) -> list[list[float]]:
