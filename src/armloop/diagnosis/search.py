@@ -24,8 +24,10 @@ BASELINE_SHARE = 0.35
 #: A further effect must remove at least this part of what could be explained at first: what a large effect leaves
 #: because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for small ones.
 LEAST_SHARE = 0.01
-#: Fits whose held-out error is within this part of the explained energy of the best count as equals.
-EQUAL_SHARE = 0.03
+#: A simpler effect is as good as a richer one that leaves less by no more than this part of the baseline's energy.
+ALIKE = 1.0
+#: Effects that explain this much of what the chosen one explains are listed as its alternatives.
+RIVAL_SHARE = 0.94
 _MOST_EFFECTS = 4
 
 
@@ -82,12 +84,12 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
                 trials.append(trial)
         if not trials:
             break
-        best = _simplest_of_equals(current, trials)
+        best = _simplest_of_equals(current, trials, rows_per_joint)
         gain = _gain(current, best)
         rivals = [
             (trial.effects[-1], _gain(current, trial) / explainable)
             for trial in trials
-            if trial is not best and _gain(current, trial) >= (1 - 2 * EQUAL_SHARE) * gain
+            if trial is not best and _gain(current, trial) >= RIVAL_SHARE * gain
         ]
         found.append(Found(best.effects[-1], best.shapes[-1], min(gain / explainable, 1.0), rivals))
         progress(
@@ -141,24 +143,32 @@ def _worth(current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
     spread = float(np.sqrt(len(gains)) * gains.std(ddof=1))
     if gains.sum() <= SIGNIFICANCE * spread:
         return False
-    joints = current.stacked.joint
-    by_joint = np.bincount(
-        joints, weights=current.held_out**2 - trial.held_out**2, minlength=len(rows_per_joint)
-    )
+    by_joint = _by_joint(current, trial, len(rows_per_joint))
     return bool((by_joint > BASELINE_SHARE * rows_per_joint).any())
 
 
-def _simplest_of_equals(current: Fit, trials: list[Fit]) -> Fit:
-    """Among trials whose held-out error is as good as the best, the one with the fewest parameters."""
+def _simplest_of_equals(current: Fit, trials: list[Fit], rows_per_joint: NDArray[np.intp]) -> Fit:
+    """Among trials as good as the best, the one with the fewest parameters.
+
+    As good is one whose error exceeds the best's by no more than chance over blocks, or, on every joint, by
+    no more than the model's own shortcomings there, which a richer law can always soak up. What it leaves
+    beyond that is evidence, however small beside a large effect.
+    """
     best = max(trials, key=lambda trial: _gain(current, trial))
-    gain = _gain(current, best)
     equals = []
     for trial in trials:
         excess = trial.block_errors() - best.block_errors()
-        spread = float(np.sqrt(len(excess)) * excess.std(ddof=1))
-        if excess.sum() <= max(EQUAL_SHARE * gain, min(spread, 2 * EQUAL_SHARE * gain)):
+        chance = 2 * float(np.sqrt(len(excess)) * excess.std(ddof=1))
+        within = _by_joint(trial, best, len(rows_per_joint)) <= ALIKE * rows_per_joint
+        if excess.sum() <= chance or within.all():
             equals.append(trial)
     return min(equals, key=lambda trial: (trial.complexity, -_gain(current, trial)))
+
+
+def _by_joint(worse: Fit, better: Fit, n: int) -> Array:
+    """(n,) how much held-out squared error one fit leaves more than another, joint by joint."""
+    difference = worse.held_out**2 - better.held_out**2
+    return np.asarray(np.bincount(worse.stacked.joint, weights=difference, minlength=n))
 
 
 def _refit(evidence: Evidence, current: Fit) -> Fit:
