@@ -175,7 +175,8 @@ def _reconstruct(commands: argparse._SubParsersAction[_Parser]) -> None:
     p.add_argument(
         "--library",
         default=None,
-        help="double-feature-set (default up to four joints) or rigid-body (scales to seven joints)",
+        help="double-feature-set (default up to four joints), rigid-body (default beyond; base parameters of the "
+        "URDF's chain) or lagrangian (few terms of the energies, found without the URDF's lengths)",
     )
     p.add_argument(
         "--estimator",

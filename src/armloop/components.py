@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.errors import ModelError
 from armloop.library.double_feature_set import Factors, product_name, products
+from armloop.library.lagrangian import EnergyTerms
 from armloop.library.rigid_body import full_columns
 from armloop.motion import Motion
 
@@ -171,6 +172,79 @@ class RigidBody:
         return RigidBody(parameters, tuple(base), np.array(list(base.values()), dtype=float))
 
 
-COMPONENTS: dict[str, type[SparseTerms] | type[RigidBody]] = {
-    kind.kind: kind for kind in (SparseTerms, RigidBody)
+@dataclass(frozen=True, eq=False)
+class Lagrangian:
+    """Kinetic and potential energy as sums of few terms; the torques follow by Euler-Lagrange.
+
+    Attributes:
+        energy: the terms (see :class:`EnergyTerms`).
+        coefficients: (p,) in J per unit of each term.
+    """
+
+    energy: EnergyTerms
+    coefficients: Array
+    kind: ClassVar[str] = "lagrangian"
+
+    def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
+        v = motion.v if step >= 2 else np.zeros_like(motion.v)
+        vdot = motion.vdot if step >= 3 else np.zeros_like(motion.vdot)
+        part = Motion(motion.time, motion.q, v, vdot, motion.starts)
+        return self.energy.columns(part) @ self.coefficients
+
+    def mass_matrix(self, q: Array) -> Array:
+        """(N, n, n) M(q) at postures q (N, n), symmetric by construction."""
+        return self.energy.mass(q) @ self.coefficients
+
+    def terms(self, arm: Arm, joint: int) -> list[Term]:
+        """The derivatives of the energies that make the joint's torque; the legend spells the energies out."""
+        acts, potential, m = self.energy.acts[joint], self.energy.potential, joint + 1
+        found: list[Term] = []
+        if (acts & potential).any():
+            found.append((1, 1.0, f"dU/dq{m}"))
+        if (acts & ~potential).any():
+            found.append((3, 1.0, f"(d/dt(dT/dv{m}) - dT/dq{m})"))
+        return found
+
+    def legend(self) -> list[str]:
+        """The two energies, in J for rad, m and s."""
+        lines = []
+        for name, chosen in (("T", ~self.energy.potential), ("U", self.energy.potential)):
+            pairs = zip(self.coefficients[chosen], np.array(self.energy.names)[chosen], strict=True)
+            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.4g}*{term}" for c, term in pairs)
+            lines.append(f"{name} = {text.removeprefix('+ ') or '0'}")
+        return lines
+
+    def to_dict(self) -> dict[str, Any]:
+        energy = self.energy
+        columns = zip(
+            energy.names,
+            self.coefficients.tolist(),
+            energy.degrees.tolist(),
+            energy.sine.tolist(),
+            (energy.speeds + 1).tolist(),
+            strict=True,
+        )
+        keys = ("term", "coefficient", "degrees", "sine", "speeds")
+        return {"kind": self.kind, "terms": [dict(zip(keys, row, strict=True)) for row in columns]}
+
+    @staticmethod
+    def from_dict(data: dict[str, Any], arm: Arm) -> Lagrangian:
+        rows = data["terms"]
+        degrees = np.array([row["degrees"] for row in rows], dtype=int).reshape(len(rows), -1)
+        speeds = np.array([row["speeds"] for row in rows], dtype=int).reshape(-1, 2) - 1
+        if len(rows) and degrees.shape[1] != arm.n:
+            raise ModelError(f"lagrangian: terms of {degrees.shape[1]} joints, the arm has {arm.n}")
+        if ((speeds < -1) | (speeds >= arm.n) | ((speeds < 0) != (speeds[:, :1] < 0))).any():
+            raise ModelError(
+                f"lagrangian: speeds must be two joints from 1 to {arm.n}, or 0, 0 for a term of U"
+            )
+        if (degrees.reshape(-1, arm.n)[:, ~arm.revolute] < 0).any():
+            raise ModelError("lagrangian: a prismatic joint's degree must not be negative")
+        sine = np.array([bool(row["sine"]) for row in rows])
+        energy = EnergyTerms(arm.revolute, degrees.reshape(-1, arm.n), sine, speeds)
+        return Lagrangian(energy, np.array([float(row["coefficient"]) for row in rows]))
+
+
+COMPONENTS: dict[str, type[SparseTerms] | type[RigidBody] | type[Lagrangian]] = {
+    kind.kind: kind for kind in (SparseTerms, RigidBody, Lagrangian)
 }

@@ -1,7 +1,8 @@
 """Evaluating a model one sample at a time, fast enough for a 1 kHz loop in Python.
 
 Sparse terms of all steps are merged into one table of factor indices, whose products come from a single
-gather; friction is plain arithmetic; rigid bodies go through the recursive Newton-Euler algorithm.
+gather; friction is plain arithmetic; rigid bodies go through the recursive Newton-Euler algorithm, energies
+through the Euler-Lagrange equations.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
-from armloop.components import Component, RigidBody, SparseTerms
+from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.effects.base import Pointwise as EffectPointwise
 from armloop.library.friction import FrictionLaw
 from armloop.newton_euler import inverse_dynamics
@@ -38,6 +39,7 @@ def pointwise(
     """
     terms = _merged(arm.n, components, step)
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
+    bodies += [_energies(c, step) for c in components if isinstance(c, Lagrangian)]
     # Python's own floats: numpy's scalars, as a fit leaves them, take three times as long.
     laws_of = [
         [
@@ -78,6 +80,40 @@ def _body(arm: Arm, body: RigidBody, step: int) -> Pointwise:
     def torque(q: Array, v: Array, vdot: Array) -> Array:
         v, vdot = v if step >= 2 else still, vdot if step >= 3 else still
         return np.asarray(dynamics(q, v, vdot)) + rotors * vdot
+
+    return torque
+
+
+def _energies(body: Lagrangian, step: int) -> Pointwise:
+    """The Euler-Lagrange equations of :class:`EnergyTerms`, all terms of one sample at once."""
+    energy, c = body.energy, body.coefficients
+    n, (first, second), potential = len(energy.revolute), energy.speeds.T, energy.potential
+    waves, powers = energy.degrees * energy.revolute, energy.degrees * ~energy.revolute
+    prismatic = np.flatnonzero(powers.any(axis=0))
+    quarter = np.where(energy.sine, 0.0, 0.5 * np.pi)
+    to_first, to_second = (((np.arange(n)[:, None] == own) * c) for own in (first, second))
+    still = np.zeros(n)
+
+    def torque(q: Array, v: Array, vdot: Array) -> Array:
+        v, vdot = v if step >= 2 else still, vdot if step >= 3 else still
+        phase = waves @ q + quarter
+        f, slope = np.sin(phase), np.cos(phase)
+        if len(prismatic):
+            factors = q**powers
+            polynomial = factors.prod(axis=1)
+            derivatives = waves * (slope * polynomial)[:, None]
+            for m in prismatic:
+                factors[:, m] = powers[:, m] * q[m] ** np.maximum(powers[:, m] - 1, 0)
+                derivatives[:, m] = f * factors.prod(axis=1)
+                factors[:, m] = q[m] ** powers[:, m]
+            f = f * polynomial
+        else:
+            derivatives = waves * slope[:, None]
+        rate, one, other = derivatives @ v, v[first], v[second]
+        tau: Array = -((c * np.where(potential, -1.0, one * other)) @ derivatives)
+        tau += to_first @ (rate * other + f * vdot[second])
+        tau += to_second @ (rate * one + f * vdot[first])
+        return tau
 
     return torque
 

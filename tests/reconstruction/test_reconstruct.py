@@ -11,7 +11,8 @@ from armloop.excitation import MotionRanges
 from armloop.log import MotionLog
 from armloop.reconstruction import Options, Reconstruction, reconstruct
 from armloop.reconstruction.reconstruct import default_library, held_out_rows
-from armloop.reconstruction.rigid_body import RIGID_BODY_CONDITIONING, rigid_body
+from armloop.reconstruction.rigid_body import rigid_body
+from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.sampling import inverse_dynamics_samples
 from armloop.scoring import score
 from armloop.signals import Conditioning, condition
@@ -69,7 +70,7 @@ def test_the_model_remembers_how_it_came_about(together: Reconstruction):
 
 def test_held_out_blocks_do_not_reach_the_model():
     # spoil the torque in every held-out block
-    samples = condition([a_run(3)], RIGID_BODY_CONDITIONING)
+    samples = condition([a_run(3)], SHARED_CONDITIONING)
 
     def parameters(tau: np.ndarray) -> np.ndarray:
         options = Options()
@@ -109,8 +110,12 @@ def test_inverse_dynamics_samples_are_taken_as_they_are():
     ("change", "expected"),
     [
         ({"method": "magic"}, r"unknown method 'magic'; there are: stepwise, sindy"),
-        ({"library": "magic"}, r"unknown library 'magic'; there are: double-feature-set, rigid-body"),
+        (
+            {"library": "magic"},
+            r"unknown library 'magic'; there are: double-feature-set, rigid-body, lagrangian",
+        ),
         ({"method": "sindy", "library": "rigid-body"}, r"'sindy' works on the library double-feature-set"),
+        ({"method": "sindy", "library": "lagrangian"}, r"'sindy' works on the library double-feature-set"),
     ],
 )
 def test_what_is_unknown_is_refused(change: dict, expected: str):

@@ -114,6 +114,6 @@ def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.Monke
     def fail(*_):
         raise ArithmeticError("osqp: maximum iterations reached")
 
-    monkeypatch.setattr("armloop.reconstruction.rigid_body.constrained_least_squares", fail)
+    monkeypatch.setattr("armloop.reconstruction.physical.constrained_least_squares", fail)
     with pytest.raises(ExcitationError, match="the motion tells too little"):
         reconstruct([a_run(1)], three_axis(), library="rigid-body")

@@ -17,15 +17,17 @@ from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress, silent
 from armloop.reconstruction.excitation import check_recorded
+from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.rigid_body import RIGID_BODY_CONDITIONING, rigid_body
+from armloop.reconstruction.rigid_body import rigid_body
+from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise
 from armloop.scoring import Score, score
 from armloop.signals import Conditioning, condition
 
 METHODS = ("stepwise", "sindy")
-LIBRARIES = ("double-feature-set", "rigid-body")
+LIBRARIES = ("double-feature-set", "rigid-body", "lagrangian")
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,7 @@ def default_library(arm: Arm) -> str:
 
 def default_conditioning(library: str) -> Conditioning:
     """Filter that suits a library: friction with memory needs every sample, sparse terms do not."""
-    return RIGID_BODY_CONDITIONING if library == "rigid-body" else Conditioning()
+    return Conditioning() if library == "double-feature-set" else SHARED_CONDITIONING
 
 
 def reconstruct(
@@ -102,6 +104,8 @@ def reconstruct(
     held_out = held_out_rows(samples, options)
     if library == "rigid-body":
         found = rigid_body(arm, samples, held_out, options, progress)
+    elif library == "lagrangian":
+        found = lagrangian(arm, samples, held_out, options, progress)
     elif method == "sindy":
         found = sindy(arm, samples, held_out, options, progress)
     else:

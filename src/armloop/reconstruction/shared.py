@@ -1,0 +1,132 @@
+"""What the libraries that serve all joints with shared coefficients have in common.
+
+One regression over all moving samples of all joints, weighted by what each joint's residual turns out to be,
+with the same friction terms for every joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.errors import ExcitationError
+from armloop.library.friction import FrictionTerm
+from armloop.library.rigid_body import BaseParameters
+from armloop.motion import Samples
+from armloop.regression.moments import Moments
+from armloop.signals import Conditioning, smooth
+
+Array = NDArray[np.float64]
+
+#: Friction with memory needs every sample.
+SHARED_CONDITIONING = Conditioning(cutoff_hz=9.5)
+
+#: Presliding widths, rad, and the speed below which the direction fades in, rad/s. Held-out errors on
+#: measured arms are flat around these values.
+FRICTION = (
+    FrictionTerm("offset"),
+    FrictionTerm("smooth_sign", parameter=0.01),
+    FrictionTerm("hysteresis", parameter=1e-3),
+    FrictionTerm("hysteresis", parameter=1e-2),
+    FrictionTerm("viscous"),
+    FrictionTerm("quadratic"),
+)
+#: Added in a second pass: the torque that passes a joint is known after the first.
+LOAD_FRICTION = FrictionTerm("load_hysteresis", parameter=1e-3)
+#: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion.
+_SLIDING = 0.01
+_RIDGE = 1e-7
+_REWEIGHTINGS = 3
+#: What a constraint has pressed to zero, N·m.
+_NOTHING = 1e-12
+
+
+def sliding_rows(samples: Samples) -> NDArray[np.bool_]:
+    """(N, n) samples in which a joint's torque is determined by its motion."""
+    return samples.moving & (np.abs(samples.motion.v) > _SLIDING)
+
+
+def check_moves(arm: Arm, rows: NDArray[np.bool_]) -> None:
+    """Raise unless every joint moves in the rows (N, n) that are fitted."""
+    for j, joint in enumerate(arm.joints):
+        if rows[:, j].sum() < 100:
+            raise ExcitationError(
+                f"q{j + 1}: joint {joint.name!r} moves in {int(rows[:, j].sum())} samples, at least 100 are needed; "
+                "log runs in which every joint moves"
+            )
+
+
+def found_friction(laws: list[list[FrictionTerm]], values: Array) -> list[list[FrictionTerm]]:
+    """The laws with their coefficients, joint after joint; terms that vanished are left out."""
+    friction, start = [], 0
+    for law in laws:
+        own = values[start : start + len(law)]
+        friction.append(
+            [
+                FrictionTerm(t.kind, float(c), t.parameter)
+                for t, c in zip(law, own, strict=True)
+                if abs(c) > _NOTHING
+            ]
+        )
+        start += len(law)
+    return friction
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Coefficients with the weighted normal equations they solve."""
+
+    theta: Array
+    G: Array
+    b: Array
+
+
+def solve_weighted(
+    samples: Samples,
+    columns: Array,
+    laws: list[list[FrictionTerm]],
+    rows: NDArray[np.bool_],
+    load: Array | None,
+) -> Solution:
+    """Coefficients of the shared columns (N, n, r), then of each joint's friction terms, by reweighted least squares."""
+    r = columns.shape[2]
+    total = r + sum(len(law) for law in laws)
+    parts: list[tuple[NDArray[np.intp], Moments]] = []
+    start = r
+    G, b = np.zeros((total, total)), np.zeros(total)
+    for j, law in enumerate(laws):
+        friction = np.column_stack([term.column(samples.motion, j, load) for term in law])
+        X = np.hstack([columns[:, j], smooth(samples, friction)])[rows[:, j]]
+        where = np.concatenate([np.arange(r), np.arange(start, start + len(law))])
+        parts.append((where.astype(np.intp), Moments.of(X, samples.tau[rows[:, j], j])))
+        start += len(law)
+    weights = np.array([part.count / part.yy for _, part in parts])
+    theta = np.zeros(total)
+    for _ in range(_REWEIGHTINGS + 1):
+        G, b = np.zeros((total, total)), np.zeros(total)
+        for weight, (where, part) in zip(weights, parts, strict=True):
+            G[np.ix_(where, where)] += weight * part.G
+            b[where] += weight * part.b
+        scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+        G += _RIDGE * np.diag(1 / scale**2)
+        theta = scale * np.linalg.solve(G * np.outer(scale, scale), scale * b)
+        errors = [part.squared_error(theta[where]) / part.count for where, part in parts]
+        weights = 1 / np.maximum(errors, 1e-12 * np.array([part.yy / part.count for _, part in parts]))
+    return Solution(theta, G, b)
+
+
+def check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) -> None:
+    """Raise unless the motion tells most base parameters apart; the ridge takes care of the last few."""
+    stacked = np.concatenate([columns[rows[:, j], j] for j in range(columns.shape[1])])
+    scale = np.linalg.norm(stacked, axis=0)
+    scaled = stacked / np.maximum(scale, 1e-12)
+    eigenvalues = np.linalg.eigvalsh(scaled.T @ scaled)
+    weak = int(np.count_nonzero(eigenvalues < 1e-8 * eigenvalues[-1]))
+    if weak > base.count // 3:
+        raise ExcitationError(
+            f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
+            "joints"
+        )
