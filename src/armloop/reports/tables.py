@@ -15,7 +15,6 @@ from armloop.reports.words import (
     controller,
     effect_label,
     number,
-    numbers,
     percent,
     unit,
     with_error,
@@ -210,9 +209,3 @@ def formulas(model: ReconstructedModel, width: int = 110, most_terms: int | None
             textwrap.fill(f"{head} = {' '.join(terms)}", width, subsequent_indent=" " * (len(head) + 3))
         )
     return "\n".join(lines)
-
-
-def tracking_summary(result: TrackingResult) -> str:
-    """One controller's η of all joints with its unit, as a report quotes it."""
-    units = list(dict.fromkeys(result.unit))
-    return f"{numbers(result.eta)} {units[0] if len(units) == 1 else '(' + ', '.join(result.unit) + ')'}"
