@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,21 @@ _ITERATIONS = 30
 _RIDGE = 1e-8
 
 
+class Shape(NamedTuple):
+    """An effect's nonlinear parameter: chosen on all blocks, and for each fold on the blocks outside it.
+
+    Only the latter may judge a fold, else its own data would have had a say.
+    """
+
+    final: float
+    without: tuple[float, ...]
+
+    @staticmethod
+    def fixed(value: float) -> Shape:
+        """A value that was not chosen from data."""
+        return Shape(value, (value,) * FOLDS)
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Several effects fitted together to one residual.
@@ -31,7 +47,7 @@ class Fit:
     """
 
     effects: tuple[Effect, ...]
-    shapes: tuple[float, ...]
+    shapes: tuple[Shape, ...]
     parameters: tuple[dict[str, Estimate], ...]
     held_out: Array
     stacked: Stacked
@@ -46,26 +62,33 @@ class Fit:
         return block_sums(self.held_out**2, self.stacked.block)
 
 
-def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[float]) -> Fit:
+def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
     """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
-    columns = [evidence.columns(e, s) for e, s in zip(effects, shapes, strict=True)]
-    sizes = [c.shape[2] for c in columns]
-    stacked = evidence.stack(residual, columns)
-    parts = stacked.moments()
-    whole = total(parts)
+    stacked, sizes = _stack(evidence, residual, effects, [shape.final for shape in shapes])
+    whole = total(stacked.moments())
     held_out = np.array(stacked.y)
     for k in range(FOLDS):
-        beta, _, _ = solve(whole - parts[k], effects, sizes)
-        mine = stacked.fold == k
-        held_out[mine] -= stacked.X[mine] @ beta
+        values = [shape.without[k] for shape in shapes]
+        same = values == [shape.final for shape in shapes]
+        judged = stacked if same else _stack(evidence, residual, effects, values)[0]
+        mine = judged.fold == k
+        beta, _, _ = solve(Moments.of(judged.X[~mine], judged.y[~mine]), effects, sizes)
+        held_out[mine] -= judged.X[mine] @ beta
     beta, x, J = solve(whole, effects, sizes)
     covariance = _block_covariance(stacked, beta, J)
     parameters, start = [], 0
     for effect, shape, free in zip(effects, shapes, x, strict=True):
         block = slice(start, start + len(free))
-        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], shape))
+        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], shape.final))
         start += len(free)
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), held_out, stacked)
+
+
+def _stack(
+    evidence: Evidence, residual: Array, effects: Sequence[Effect], values: Sequence[float]
+) -> tuple[Stacked, list[int]]:
+    columns = [evidence.columns(e, value) for e, value in zip(effects, values, strict=True)]
+    return evidence.stack(residual, columns), [c.shape[2] for c in columns]
 
 
 def solve(

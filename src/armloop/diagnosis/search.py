@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit, fit
+from armloop.diagnosis.evidence import FOLDS, Evidence
+from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.progress import Progress
@@ -41,7 +41,7 @@ class Found:
     """
 
     effect: Effect
-    shape: float
+    shape: Shape
     share: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
 
@@ -106,7 +106,8 @@ def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) ->
     shapes = list(effect.shapes(evidence.context))
     if not shapes:
         return None
-    shape = shapes[0] if len(shapes) == 1 else _best_shape(evidence, residual, current, effect, shapes)
+    one = len(shapes) == 1
+    shape = Shape.fixed(shapes[0]) if one else _best_shape(evidence, residual, current, effect, shapes)
     trial = fit(evidence, residual, [*current.effects, effect], [*current.shapes, shape])
     arm = evidence.model.arm
     if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
@@ -116,8 +117,11 @@ def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) ->
 
 def _best_shape(
     evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]
-) -> float:
-    """The shape whose columns explain most of what the current effects leave on the effect's joint."""
+) -> Shape:
+    """The shape whose columns explain most of what the current effects leave on the effect's joint.
+
+    Chosen on all blocks for the parameters, and without each fold in turn for judging that fold.
+    """
     assert effect.joint is not None
     j = effect.joint - 1
     left = np.array(residual[:, j])
@@ -127,10 +131,18 @@ def _best_shape(
     X = smooth(evidence.samples, np.hstack(each))[rows]
     width = each[0].shape[1]
     X = X.reshape(len(X), len(shapes), width)
-    G = np.einsum("ksp,ksr->spr", X, X) + 1e-12 * len(X) * np.eye(width)
-    b = np.einsum("ksp,k->sp", X, left[rows])
-    explained = np.einsum("sp,sp->s", b, np.linalg.solve(G, b[:, :, None])[:, :, 0])
-    return shapes[int(np.argmax(explained))]
+    fold, y = evidence.fold[rows], left[rows]
+    G = [np.einsum("ksp,ksr->spr", X[fold == k], X[fold == k]) for k in range(FOLDS)]
+    b = [np.einsum("ksp,k->sp", X[fold == k], y[fold == k]) for k in range(FOLDS)]
+
+    def best(folds: list[int]) -> float:
+        A = sum((G[k] for k in folds), 1e-12 * len(X) * np.eye(width))
+        c = sum((b[k] for k in folds), np.zeros_like(b[0]))
+        explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
+        return shapes[int(np.argmax(explained))]
+
+    every = list(range(FOLDS))
+    return Shape(best(every), tuple(best([other for other in every if other != k]) for k in every))
 
 
 def _gain(current: Fit, trial: Fit) -> float:

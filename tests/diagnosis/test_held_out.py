@@ -1,0 +1,67 @@
+"""What judges an effect was not fitted, and a richer effect is not lost to a simple one that nearly serves."""
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, measured, rigid_torque
+
+from armloop.arm import load_arm
+from armloop.components import RigidBody
+from armloop.diagnosis import diagnose
+from armloop.diagnosis.evidence import FOLDS, Evidence
+from armloop.diagnosis.fit import fit
+from armloop.diagnosis.search import _best_shape
+from armloop.effects import effect, hypotheses
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.model import ReconstructedModel
+from armloop.signals import condition
+
+
+def exact(name: str) -> ReconstructedModel:
+    arm = load_arm(name)
+    law = tuple((FrictionTerm("viscous", 1.0),) for _ in arm.joints)
+    body = RigidBody(nominal_parameters(arm), ("m1",), np.ones(1))
+    rmse = [0.01] * arm.n
+    return ReconstructedModel(arm, (body,), FrictionLaw(law), baseline={"rmse": rmse})
+
+
+def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
+    model = exact("three_axis")
+    motion = fourier_motion(40.0, 100.0, 3)
+    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + motion.v
+    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    ripple = effect("torque_ripple", 2)
+    shapes = list(ripple.shapes(evidence.context))
+
+    def chosen(order_in_fold: tuple[int, int]) -> tuple[float, ...]:
+        # another order in each fold: only what was fitted outside a fold may decide for it
+        residual = np.zeros_like(samples.tau)
+        for k, order in enumerate(order_in_fold):
+            mine = evidence.fold == k
+            residual[mine, 1] = 0.2 * np.sin(order * samples.motion.q[mine, 1])
+        current = fit(evidence, residual, [], [])
+        return _best_shape(evidence, residual, current, ripple, shapes).without
+
+    assert FOLDS == 2
+    assert chosen((6, 11)) == (11.0, 6.0)
+    assert chosen((9, 11)) == (11.0, 9.0)
+
+
+@pytest.mark.parametrize("mass", [0.1, 0.3])
+def test_a_load_on_an_upright_slide_is_no_torque_offset(mass):
+    # On the SCARA arm a load is almost only a constant force on the slide; its inertia tells it apart.
+    model = exact("scara")
+    motion = fourier_motion(50.0, 100.0, 5, model.arm)
+    c = np.array([0.02, 0.01, 0.0])
+    inertia = mass * (c @ c * np.eye(3) - np.outer(c, c))
+    tensor = [inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    load = np.concatenate([[mass], mass * c, tensor])
+    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + motion.v
+    tau += regressor(model.arm, motion.q, motion.v, motion.vdot, links=[3]) @ load
+    model = ReconstructedModel(
+        model.arm, model.components, model.friction, baseline={"rmse": [4e-4, 4e-4, 0.01, 4e-4]}
+    )
+    found = diagnose(model, [measured(motion, tau, 5, noise=0.002)]).outcome
+    assert [f.effect.name for f in found.found] == ["payload"]
+    assert found.added()[0].parameters["mass"].value == pytest.approx(mass, rel=0.05)
