@@ -1,0 +1,56 @@
+"""Sort the samples of logs by condition."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import add_json, add_logs, seed
+
+HELP = "sort samples into static, constant-velocity and varying-velocity data"
+EXAMPLE = "armloop cluster out/logs/*.csv"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_logs(p)
+    p.add_argument(
+        "--indicator",
+        choices=("robust", "paper"),
+        default="robust",
+        help="the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
+    )
+    p.add_argument("--seed", type=seed, default=0, help="of k-means (%(default)s)")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Sort the samples of logs by condition."""
+    from armloop.commands.shared import TORQUE, print_json, read_logs
+    from armloop.conditions import sort_samples
+    from armloop.errors import InputError
+    from armloop.reports.tables import table
+    from armloop.signals import Conditioning, condition
+
+    logs = read_logs(options.logs, None, TORQUE)
+    widths = {log.joints for log in logs}
+    if len(widths) > 1:
+        raise InputError(f"the logs have {sorted(widths)} joints; give logs of one arm")
+    samples = condition(logs, Conditioning())
+    clusters = sort_samples(samples.motion, options.indicator, options.seed)
+    if options.json:
+        print_json(
+            {
+                "counts": clusters.counts(),
+                "elbow": clusters.elbow,
+                "wcss": clusters.wcss,
+                "iterations": clusters.iterations,
+                "samples": samples.motion.samples,
+            }
+        )
+        return
+    rows = [
+        [name, count, f"{count / samples.motion.samples:.1%}"] for name, count in clusters.counts().items()
+    ]
+    print(table(["condition", "samples", "share"], rows))
+    print("\nwithin-cluster sum for 1, 2, … clusters: " + ", ".join(f"{w:.4g}" for w in clusters.wcss))
+    print(f"the elbow suggests {clusters.elbow} clusters; k-means took {clusters.iterations} iterations")

@@ -1,0 +1,46 @@
+"""Trace what a model lacks on a run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from armloop.commands.arguments import add_json, add_logs, add_recorded
+
+HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
+EXAMPLE = "armloop diagnose model.json run.csv --out out/diagnosis"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument("model", metavar="MODEL.json")
+    add_logs(p)
+    p.add_argument(
+        "--out", required=True, help="folder for diagnosis.json, model.json (augmented), report.html"
+    )
+    p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
+    add_recorded(p, "as the model's training logs")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Trace what a model lacks on a run."""
+    from armloop.commands.shared import model_and_logs, out_folder, print_json, progress
+    from armloop.diagnosis import diagnose as run
+    from armloop.files import write_text
+    from armloop.reports.diagnosis_report import diagnosis_report
+    from armloop.reports.tables import diagnosis_table
+
+    folder = out_folder(options.out)
+    model, logs = model_and_logs(options)
+    result = run(model, logs, progress(options))
+    answer = result.to_dict()
+    page = diagnosis_report(result, model, [log.name for log in logs])
+    write_text(folder / "diagnosis.json", json.dumps(answer, indent=1) + "\n")
+    result.model.save(folder / "model.json")
+    write_text(folder / "report.html", page)
+    if options.json:
+        print_json(answer)
+        return
+    print(diagnosis_table(result))
+    print(f"\nwritten: {folder}/diagnosis.json, model.json (augmented), report.html")

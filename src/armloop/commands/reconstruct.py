@@ -1,0 +1,93 @@
+"""Reconstruct a model and write it."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import ARM_HELP, add_json, add_logs, add_recorded
+
+HELP = "reconstruct a readable model of the joint torques from logs"
+EXAMPLE = "armloop reconstruct out/logs/*.csv --arm three_axis --out model.json"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_logs(p)
+    p.add_argument("--arm", required=True, help=ARM_HELP)
+    p.add_argument("--out", required=True, help="the model file, JSON")
+    p.add_argument(
+        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+    )
+    p.add_argument(
+        "--library",
+        default=None,
+        help="double-feature-set (default up to four joints), rigid-body (default beyond; base parameters of the "
+        "URDF's chain) or lagrangian (few terms of the energies, found without the URDF's lengths)",
+    )
+    p.add_argument(
+        "--estimator",
+        default="lasso_ebic",
+        help="how terms are chosen: lasso_ebic (Lasso path, information criterion, swap search), lasso (Eq. 32 with "
+        "--penalty) or least_squares (%(default)s)",
+    )
+    p.add_argument("--penalty", type=float, default=1e-3, help="λ of --estimator lasso (%(default)s)")
+    p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
+    p.add_argument(
+        "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
+    )
+    p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
+    add_recorded(p, "N*m")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Reconstruct a model and write it."""
+    from armloop.arm import load_arm
+    from armloop.commands.shared import TORQUE, out_file, print_json, progress, read_logs, recorded_as
+    from armloop.errors import InputError
+    from armloop.files import write_text
+    from armloop.reconstruction import Options
+    from armloop.reconstruction import reconstruct as run
+    from armloop.regression.sparse import ESTIMATORS, Sparse
+    from armloop.reports.tables import formulas, score_table, steps_table
+    from armloop.signals import Conditioning
+
+    if options.estimator not in ESTIMATORS:
+        raise InputError(f"unknown estimator {options.estimator!r}; there are: {', '.join(ESTIMATORS)}")
+    if not options.penalty > 0:
+        raise InputError(f"--penalty {options.penalty}: λ must be positive")
+    if not 1 <= options.max_order <= 6:
+        raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
+    if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
+        raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
+    for name in ("out", "report"):
+        out_file(getattr(options, name), f"--{name}")
+    arm = load_arm(options.arm)
+    recorded = recorded_as(options, TORQUE)
+    logs = read_logs(options.logs, arm.n, recorded)
+    result = run(
+        logs,
+        arm,
+        options.method,
+        options.library,
+        None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
+        Options(sparse=Sparse(options.estimator, options.penalty), max_order=options.max_order),
+        progress(options),
+        recorded,
+    )
+    result.model.save(options.out)
+    if options.report:
+        from armloop.reports.reconstruction_report import reconstruction_report
+
+        write_text(options.report, reconstruction_report(result, logs))
+    if options.json:
+        print_json({"model": str(options.out), **result.to_dict()})
+        return
+    print(steps_table(result.reports))
+    print()
+    print(formulas(result.model), *result.model.legend(), sep="\n")
+    print()
+    print(score_table(result.held_out, arm))
+    for note in result.notes:
+        print(f"note: {note}")
+    print(f"model written to {options.out}")

@@ -1,0 +1,102 @@
+"""What several commands do: check what they are given, read logs and models, tell how far they are."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.arm import Arm, load_arm
+from armloop.errors import InputError, ModelError
+from armloop.log import MotionLog, read_log
+from armloop.model import ReconstructedModel, load_model
+from armloop.progress import Progress, silent
+
+
+def progress(options: argparse.Namespace) -> Progress:
+    """Progress on the terminal; with none, before the answer, so that standard error is for faults alone."""
+    if getattr(options, "json", False) and not sys.stderr.isatty():
+        return silent
+    stream = sys.stderr if sys.stderr.isatty() else sys.stdout
+    return lambda message: print(f"  … {message}", file=stream, flush=True)
+
+
+def print_json(value: Any) -> None:
+    """Print the answer of ``--json``."""
+    print(json.dumps(value))
+
+
+def out_folder(path: str) -> Path:
+    """The output folder, checked before any work is done; it is made when the first file is written."""
+    folder = Path(path)
+    existing = folder
+    while not existing.exists():
+        existing = existing.parent
+    if not existing.is_dir():
+        raise InputError(f"{existing}: is a file; --out must name a folder")
+    if not os.access(existing, os.W_OK):
+        raise InputError(f"{existing}: cannot be written to; choose another folder for --out")
+    return folder
+
+
+def out_file(path: str | None, option: str) -> None:
+    """Check the place of an output file before any work is done."""
+    if path is None:
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{path}: is a folder; {option} must name a file")
+    out_folder(str(Path(path).parent))
+
+
+def drive_gains(text: str | None) -> list[float] | None:
+    """The numbers of ``--drive-gains``; raises ``InputError`` for anything else."""
+    if text is None:
+        return None
+    try:
+        gains = [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"--drive-gains {text!r}: give one number per joint, separated by commas") from error
+    if not all(np.isfinite(g) and g > 0 for g in gains):
+        raise InputError(f"--drive-gains {text!r}: every gain must be a positive number of N·m/A")
+    return gains
+
+
+def recorded_as(options: argparse.Namespace, default: dict[str, Any]) -> dict[str, Any]:
+    """What the torque columns hold, by the options or else as ``default`` says."""
+    gains = drive_gains(options.drive_gains)
+    unit = options.tau_unit
+    if gains is not None and unit == "N*m":
+        raise InputError(
+            "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
+        )
+    if gains is None and unit is None:
+        return default
+    if gains is not None:
+        return {"unit": "A", "drive_gains": gains}
+    return {"unit": unit, "drive_gains": default["drive_gains"] if unit == "A" else None}
+
+
+def read_logs(paths: list[str], joints: int | None, recorded: dict[str, Any]) -> list[MotionLog]:
+    """The logs, with currents turned into torques where gains are known."""
+    return [
+        read_log(path, joints=joints, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"])
+        for path in paths
+    ]
+
+
+TORQUE = {"unit": "N*m", "drive_gains": None}
+
+
+def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, list[MotionLog]]:
+    """The model of a command line and the logs that are to be compared with it."""
+    arm: Arm | None = load_arm(options.arm) if options.arm else None
+    model = load_model(options.model, arm)
+    recorded = recorded_as(options, model.recorded)
+    if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":
+        raise ModelError(f"{options.model}: predicts torque in N·m; currents in A need --drive-gains")
+    return model, read_logs(options.logs, model.arm.n, recorded)

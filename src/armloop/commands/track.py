@@ -1,0 +1,58 @@
+"""Compare controllers in closed loop."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import add_json
+
+HELP = "compare controllers in closed loop in Drake: mean absolute tracking error per joint"
+EXAMPLE = (
+    "armloop track three_axis_tracking --model step1=model.json --model step3=model.json --out out/track"
+)
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument(
+        "scenario", metavar="SCENARIO", help="a built-in scenario (three_axis_tracking) or a YAML file"
+    )
+    p.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        metavar="NAME=MODEL.json",
+        help="step1 and step3 are the feedforwards of pid_step1 and pid_step3, `model` serves both; any other NAME "
+        "adds a controller pid_NAME. Without any, a model is reconstructed from data collected on the "
+        "scenario's arm first",
+    )
+    p.add_argument("--out", default=None, help="folder for tracking.json, plots and replay.html")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Compare controllers in closed loop."""
+    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.drake_systems.scenarios import load_tracking
+    from armloop.errors import InputError
+    from armloop.loop import run_scenario
+    from armloop.model import ReconstructedModel, load_model
+    from armloop.reports.tables import eta_table
+
+    folder = out_folder(options.out) if options.out else None
+    scenario = load_tracking(options.scenario)
+    models: dict[str, ReconstructedModel] = {}
+    for item in options.model:
+        name, equals, path = item.partition("=")
+        if not equals or not name.replace("_", "").isalnum() or not path:
+            raise InputError(f"--model {item!r}: write NAME=MODEL.json, such as step3=model.json")
+        if name in models:
+            raise InputError(f"--model {item!r}: {name!r} is given twice")
+        models[name] = load_model(path, scenario.plant.arm)
+    answer, results = run_scenario(scenario, models, folder, progress(options))
+    if options.json:
+        print_json(answer)
+        return
+    print(eta_table(results, paper=scenario.name == "three_axis_tracking"))
+    if folder is not None:
+        print(f"\nwritten: {folder}/tracking.json, tracking.png, replay.html")
