@@ -1,0 +1,28 @@
+"""Motions that make an arm show its dynamics: poses, constant velocities, Fourier-series trajectories, tables.
+
+Plain arrays, no simulator. A reference is anything with `evaluate(t) -> q, v, vdot` and a `duration`.
+"""
+
+from armloop.excitation.fourier import FourierReference, fourier_reference, paper_reference
+from armloop.excitation.ranges import MotionRanges, speeds
+from armloop.excitation.reference import Reference, within
+from armloop.excitation.segments import (
+    Segment,
+    constant_velocity_segments,
+    static_poses,
+    static_segments,
+)
+
+__all__ = [
+    "FourierReference",
+    "MotionRanges",
+    "Reference",
+    "Segment",
+    "constant_velocity_segments",
+    "fourier_reference",
+    "paper_reference",
+    "speeds",
+    "static_poses",
+    "static_segments",
+    "within",
+]
