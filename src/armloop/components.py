@@ -50,28 +50,34 @@ class Component(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SparseTerms:
-    """Terms of the double feature set found in one step.
+    """Terms of the double feature set, or of its angle sums, found in one step.
 
     Attributes:
         step: 1, 2 or 3; 3 for one-shot SINDy.
         index: (T, K) factor indices of the terms (see :class:`Factors`).
         coefficients: (T, n), zero where a joint does not use a term.
+        waves: the wave vectors of the factors; none for the paper's sin qᵢ and cos qᵢ.
     """
 
     step: int
     index: NDArray[np.intp]
     coefficients: Array
+    waves: tuple[tuple[int, ...], ...] = ()
     kind: ClassVar[str] = "terms"
 
     @cached_property
+    def factors(self) -> Factors:
+        """The elementary functions that the index refers to."""
+        return Factors(self.coefficients.shape[1], self.waves)
+
+    @cached_property
     def _names(self) -> list[str]:
-        factors = Factors(self.coefficients.shape[1])
-        return [product_name(row, factors.names) for row in self.index]
+        return [product_name(row, self.factors.names) for row in self.index]
 
     def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
         if step < self.step or len(self.index) == 0:
             return np.zeros_like(motion.q)
-        return products(Factors(arm.n).evaluate(motion), self.index) @ self.coefficients
+        return products(self.factors.evaluate(motion), self.index) @ self.coefficients
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         c = self.coefficients[:, joint]
@@ -94,17 +100,35 @@ class SparseTerms:
         if len(joints) != arm.n:
             raise ModelError(f"terms of step {data['step']}: {len(joints)} joints, the arm has {arm.n}")
         names = list(dict.fromkeys(name for joint in joints for name in joint))
-        rows = [_parse_product(name, arm.n) for name in names]
+        waves = _waves_in(names, arm.n)
+        factors = Factors(arm.n, waves)
+        known = {factor: e for e, factor in enumerate(factors.names)}
+        rows = [_parse_product(name, known, arm.n) for name in names]
         width = max([len(row) for row in rows], default=1)
         index = np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
         coefficients = np.array([[float(joint.get(name, 0.0)) for joint in joints] for name in names])
-        return SparseTerms(int(data["step"]), index, coefficients.reshape(-1, arm.n))
+        return SparseTerms(int(data["step"]), index, coefficients.reshape(-1, arm.n), waves)
 
 
-def _parse_product(name: str, n: int) -> list[int]:
-    known = {factor: e for e, factor in enumerate(Factors(n).names)}
+_WAVE = re.compile(r"(?:sin|cos)\(([^()]*)\)")
+_ADDEND = re.compile(r"([+-]?)(?:(\d)\*)?q(\d)")
+
+
+def _waves_in(names: list[str], n: int) -> tuple[tuple[int, ...], ...]:
+    """The wave vectors that occur in names, each once; none if all are unit vectors."""
+    waves: dict[tuple[int, ...], None] = {}
+    for phase in (phase for name in names for phase in _WAVE.findall(name)):
+        wave = [0] * n
+        for sign, size, joint in _ADDEND.findall(phase):
+            if 1 <= int(joint) <= n:
+                wave[int(joint) - 1] += int(size or 1) * (-1 if sign == "-" else 1)
+        waves[tuple(wave)] = None
+    return tuple(waves) if any(sum(map(abs, wave)) != 1 or min(wave) < 0 for wave in waves) else ()
+
+
+def _parse_product(name: str, known: dict[str, int], n: int) -> list[int]:
     row: list[int] = []
-    for part in name.split("*"):
+    for part in re.split(r"\*(?![^(]*\))", name):
         match = re.fullmatch(r"(.+?)(?:\^(\d))?", part)
         if match is None or match[1] not in known:
             raise ModelError(f"unknown term {name!r}: {part!r} is no function of {n} joints")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.effects.base import Pointwise as EffectPointwise
+from armloop.library.double_feature_set import Factors
 from armloop.library.friction import FrictionLaw
 from armloop.newton_euler import inverse_dynamics
 
@@ -122,23 +123,35 @@ def _merged(n: int, components: Sequence[Component], step: int) -> Pointwise:
     parts = [c for c in components if isinstance(c, SparseTerms) and c.step <= step and len(c.index)]
     if not parts:
         return lambda q, v, vdot: np.zeros(n)
-    width = max(part.index.shape[1] for part in parts)
-    index = np.vstack([np.pad(part.index, ((0, 0), (width - part.index.shape[1], 0))) for part in parts])
+    # One table for all parts: only the waves that occur, and every part's index translated to it.
+    merged = Factors(n, tuple(dict.fromkeys(wave for part in parts for wave in _waves_used(part))))
+    place = {name: e for e, name in enumerate(merged.names)}
+    tables = [np.array([place.get(name, 0) for name in part.factors.names])[part.index] for part in parts]
+    width = max(table.shape[1] for table in tables)
+    index = np.vstack([np.pad(table, ((0, 0), (width - table.shape[1], 0))) for table in tables])
     coefficients = np.ascontiguousarray(np.vstack([part.coefficients for part in parts]).T)
     factors = np.ascontiguousarray(index.T)
-    values = np.ones(1 + 5 * n)
-    sines, cosines, positions, speeds, accelerations = values[1:].reshape(5, n)
+    waves = np.array(merged.waves, dtype=float)
+    values = np.ones(1 + 2 * len(waves) + 3 * n)
+    sines, cosines = values[1 : 1 + 2 * len(waves)].reshape(2, -1)
+    positions, speeds, accelerations = values[1 + 2 * len(waves) :].reshape(3, n)
     products = np.empty(len(index))
 
     def torque(q: Array, v: Array, vdot: Array) -> Array:
-        np.sin(q, out=sines)
-        np.cos(q, out=cosines)
+        phase = waves.dot(q)
+        np.sin(phase, out=sines)
+        np.cos(phase, out=cosines)
         positions[:] = q
         speeds[:] = v
         accelerations[:] = vdot
         return coefficients.dot(np.multiply.reduce(values[factors], axis=0, out=products))
 
     return torque
+
+
+def _waves_used(part: SparseTerms) -> list[tuple[int, ...]]:
+    used, w = set(part.index.ravel().tolist()), len(part.factors.waves)
+    return [wave for k, wave in enumerate(part.factors.waves) if {1 + k, 1 + w + k} & used]
 
 
 _LAWS: dict[str, Callable[[float, int, float], float]] = {

@@ -30,25 +30,54 @@ _CHUNK = 1024
 
 @dataclass(frozen=True)
 class Factors:
-    """The elementary functions of n joints in a fixed order: 1, sin qᵢ, cos qᵢ, qᵢ, vᵢ, v̇ᵢ."""
+    """The elementary functions of n joints in a fixed order: 1, sin k·q, cos k·q, qᵢ, vᵢ, v̇ᵢ.
+
+    Attributes:
+        n: number of joints.
+        waves: the wave vectors k, by default the unit vectors: sin qᵢ and cos qᵢ.
+    """
 
     n: int
+    waves: tuple[tuple[int, ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.waves:
+            unit = tuple(tuple(int(i == j) for i in range(self.n)) for j in range(self.n))
+            object.__setattr__(self, "waves", unit)
 
     def evaluate(self, motion: Motion) -> Array:
-        """(N, 1 + 5 n) values."""
+        """(N, 1 + 2 w + 3 n) values."""
         ones = np.ones((motion.samples, 1))
-        return np.hstack([ones, np.sin(motion.q), np.cos(motion.q), motion.q, motion.v, motion.vdot])
+        phase = motion.q @ np.array(self.waves, dtype=float).T
+        return np.hstack([ones, np.sin(phase), np.cos(phase), motion.q, motion.v, motion.vdot])
 
     @cached_property
     def names(self) -> list[str]:
         """Readable names, joints counted from 1."""
-        patterns = ("sin(q{})", "cos(q{})", "q{}", "v{}", "vdot{}")
-        return ["1"] + [pattern.format(j + 1) for pattern in patterns for j in range(self.n)]
+        phases = [_phase_name(wave) for wave in self.waves]
+        names = ["1"] + [f"{function}({phase})" for function in ("sin", "cos") for phase in phases]
+        return names + [f"{symbol}{j + 1}" for symbol in ("q", "v", "vdot") for j in range(self.n)]
 
     def block(self, kind: str) -> list[int]:
         """Column indices of one kind: ``"s"``, ``"c"``, ``"q"``, ``"v"``, ``"a"``."""
-        first = 1 + "scqva".index(kind) * self.n
-        return list(range(first, first + self.n))
+        w = len(self.waves)
+        first, count = {
+            "s": (1, w),
+            "c": (1 + w, w),
+            "q": (1 + 2 * w, self.n),
+            "v": (1 + 2 * w + self.n, self.n),
+            "a": (1 + 2 * w + 2 * self.n, self.n),
+        }[kind]
+        return list(range(first, first + count))
+
+
+def _phase_name(wave: tuple[int, ...]) -> str:
+    parts = ""
+    for j, k in enumerate(wave):
+        if k:
+            size = "" if abs(k) == 1 else f"{abs(k)}*"
+            parts += f"{'-' if k < 0 else '+'}{size}q{j + 1}"
+    return parts.removeprefix("+")
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_numbers, block_sums
 from armloop.components import SparseTerms
 from armloop.errors import ExcitationError
+from armloop.library.angle_sums import AngleSums
 from armloop.library.double_feature_set import DoubleFeatureSet, Factors, products
 from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion, Samples
@@ -68,11 +69,13 @@ class _Candidates:
     """The candidates of all parts at the largest orders.
 
     Attributes:
+        factors: the elementary functions that ``index`` refers to.
         index: (T, K) factors of each candidate.
         step: (T,) step it belongs to.
         first, second: (T,) its orders in the two feature sets.
     """
 
+    factors: Factors
     index: Index
     step: Index
     first: Index
@@ -87,22 +90,25 @@ class _Candidates:
         return np.flatnonzero((self.first <= orders[0]) & (self.second <= orders[1])).astype(np.intp)
 
 
-def _candidates(revolute: tuple[bool, ...], plan: StepPlan, independent: bool = True) -> _Candidates:
+def _candidates(revolute: tuple[bool, ...], plan: StepPlan) -> _Candidates:
     N1, N2 = (max(order[k] for order in plan.orders) for k in (0, 1))
     rows: dict[tuple[int, ...], tuple[int, int, int]] = {}
+    factors = AngleSums(revolute, N1, 0, "none").factors
+    rates = {*factors.block("v"), *factors.block("a")}
     for part in plan.parts:
-        library = DoubleFeatureSet(revolute, N1, _second_order(part, N2), part.second, independent)
+        library = AngleSums(revolute, N1, _second_order(part, N2), part.second)
         for row, first in zip(library.index, library.order(), strict=True):
             key = tuple(int(e) for e in row if e)
+            second = sum(e in rates for e in key)
             # What depends on the position alone belongs to Step I, whose data are the cleanest for it: later
             # steps inherit it instead of trading it against their own terms.
-            if part.step > 1 and len(key) == first:
+            if part.step > 1 and second == 0:
                 continue
-            rows.setdefault(key, (part.step, int(first), len(key) - int(first)))
+            rows.setdefault(key, (part.step, int(first), second))
     width = max(1, *(len(key) for key in rows))
     index = np.array([[0] * (width - len(key)) + list(key) for key in rows], dtype=np.intp)
     step, first_order, second_order = np.array(list(rows.values()), dtype=np.intp).T
-    return _Candidates(index, step, first_order, second_order)
+    return _Candidates(factors, index, step, first_order, second_order)
 
 
 def _second_order(part: Part, N2: int) -> int:
@@ -189,7 +195,7 @@ def regress_step(
     """
     candidates = _candidates(revolute, plan)
     used: Mask = np.any(rows, axis=1)
-    X_all = products(Factors(samples.motion.joints).evaluate(_rows(samples.motion, used)), candidates.index)
+    X_all = products(candidates.factors.evaluate(_rows(samples.motion, used)), candidates.index)
     joints = []
     for j in range(samples.motion.joints):
         mine = rows[used, j]
@@ -295,7 +301,9 @@ def _collect(
     terms = []
     for part in plan.parts:
         mine = kept & (candidates.step == part.step)
-        terms.append(SparseTerms(part.step, candidates.index[mine], coefficients[mine]))
+        terms.append(
+            SparseTerms(part.step, candidates.index[mine], coefficients[mine], candidates.factors.waves)
+        )
     return terms, friction
 
 
