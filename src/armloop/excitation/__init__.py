@@ -12,17 +12,21 @@ from armloop.excitation.segments import (
     static_poses,
     static_segments,
 )
+from armloop.excitation.table import TableReference, read_reference, write_reference
 
 __all__ = [
     "FourierReference",
     "MotionRanges",
     "Reference",
     "Segment",
+    "TableReference",
     "constant_velocity_segments",
     "fourier_reference",
     "paper_reference",
+    "read_reference",
     "speeds",
     "static_poses",
     "static_segments",
     "within",
+    "write_reference",
 ]
