@@ -84,6 +84,8 @@ class ReconstructedModel:
             ``rmse``, ``rms`` per joint, ``nrmse``.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
+        uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
+            empty where nobody computed them.
     """
 
     arm: Arm
@@ -94,6 +96,7 @@ class ReconstructedModel:
     baseline: dict[str, Any] = field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
     history: dict[str, Any] = field(default_factory=dict)
+    uncertainty: dict[str, Any] = field(default_factory=dict)
 
     def rigid_body(self, motion: Motion, step: int = 3) -> Array:
         """(N, n) torque of the components without friction and effects."""
@@ -202,6 +205,7 @@ class ReconstructedModel:
             "recorded": self.recorded,
             "baseline": self.baseline,
             "history": self.history,
+            "uncertainty": self.uncertainty,
         }
 
     def _check(self, motion: Motion) -> None:
@@ -262,6 +266,7 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         baseline=_baseline(data["baseline"], arm.n),
         effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
         history=dict(data["history"]),
+        uncertainty=_uncertainty(data.get("uncertainty", {}), arm.n),
     )
     half = np.full((1, arm.n), 0.5)
     for added in model.effects:
@@ -293,4 +298,15 @@ def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
             raise ModelError(
                 f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"
             )
+    return dict(data)
+
+
+def _uncertainty(data: dict[str, Any], n: int) -> dict[str, Any]:
+    for key in {"joints", "friction", "stribeck"} & set(data):
+        if len(data[key]) != n:
+            raise ModelError(f"uncertainty: {key} has {len(data[key])} joints, the arm has {n}")
+    tables = [*data.get("joints", []), *data.get("friction", []), data.get("shared", {})]
+    for name, entry in (item for table in tables for item in table.items()):
+        if not all(0 <= float(entry[key]) < np.inf for key in ("std_error", "degrees_of_freedom")):
+            raise ModelError(f"uncertainty: {name}: std_error must be a number of at least 0, not {entry}")
     return dict(data)
