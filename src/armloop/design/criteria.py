@@ -17,6 +17,8 @@ Criterion = Callable[[Array], tuple[float, Array]]
 
 #: Information relative to the mean below which a direction counts as not excited: keeps logarithms finite.
 _FLOOR = 1e-13
+#: Least eigenvalue of an information matrix, relative to the largest, that is more than round-off.
+ROUND_OFF = 1e-14
 #: Exponent of the smooth stand-in for the extreme eigenvalues.
 _SHARPNESS = 6.0
 
@@ -77,7 +79,7 @@ CRITERIA: dict[str, Criterion] = {
 def condition_number(F: Array) -> float:
     """Condition number of the weighted, scaled regression: the root of that of F."""
     values = np.linalg.eigvalsh(F)
-    return float(np.sqrt(values[-1] / max(values[0], 1e-300))) if values[0] > 0 else float("inf")
+    return float(np.sqrt(values[-1] / values[0])) if values[0] > ROUND_OFF * values[-1] else np.inf
 
 
 def _log_volume(F: Array) -> tuple[float, Array]:

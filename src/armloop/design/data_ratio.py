@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.design.criteria import ROUND_OFF
 from armloop.design.information import Regression
 from armloop.motion import Motion
 
@@ -37,6 +39,19 @@ class DataRatio:
         """The median ratio."""
         return float(np.median(self.ratios))
 
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values; a ratio beyond the largest amount of data that was tried is null."""
+        low, middle, high = np.quantile(self.ratios, [0.1, 0.5, 0.9], method="nearest")
+        ratios = {"median": middle, "low": low, "high": high}
+        return {
+            **{key: float(x) if np.isfinite(x) else None for key, x in ratios.items()},
+            "most": int(self.trajectories[-1]),
+            "error": {
+                "optimised": _rms(self.optimised).tolist(),
+                "random": np.median(_rms(self.random), axis=0).tolist(),
+            },
+        }
+
 
 def data_ratio(
     regression: Regression,
@@ -46,7 +61,7 @@ def data_ratio(
     *,
     most: int = 32,
     orders: int = 9,
-    noises: int = 32,
+    noises: int = 200,
 ) -> DataRatio:
     """Simulate noisy torques on the optimised motion, repeated, and on random ones, each a new one; compare errors.
 
@@ -63,8 +78,8 @@ def data_ratio(
     theirs = np.stack(
         [_errors([known[k] for k in rng.permutation(len(known))[:count]], noises, rng) for _ in range(orders)]
     )
-    goal = float(np.median(ours[:, 0]))
-    ratios = np.array([_reaches(np.median(errors, axis=0), goal) for errors in theirs])
+    goal = float(_rms(ours)[0])
+    ratios = np.array([_reaches(_rms(errors), goal) for errors in theirs])
     return DataRatio(np.arange(1.0, count + 1), ours, theirs, ratios)
 
 
@@ -82,15 +97,23 @@ class _Known:
 
 
 def _errors(parts: Sequence[_Known], noises: int, rng: np.random.Generator) -> Array:
-    """(noises, K) error after the first 1, 2, ... K parts."""
+    """(noises, K) error after the first 1, 2, ... K parts; infinite as long as they leave a coefficient undetermined."""
     F = np.zeros_like(parts[0].F)
     b = np.zeros((len(F), noises))
     errors = np.empty((noises, len(parts)))
     for k, part in enumerate(parts):
         F = F + part.F
         b = b + part.root.T @ rng.standard_normal((len(part.root), noises))
-        errors[:, k] = np.sqrt(np.mean(np.linalg.lstsq(F, b, rcond=1e-14)[0] ** 2, axis=0))
+        values, vectors = np.linalg.eigh(F)
+        known = values[0] > ROUND_OFF * values[-1]
+        error = vectors @ ((vectors.T @ b) / values[:, None]) if known else np.full_like(b, np.inf)
+        errors[:, k] = np.sqrt(np.mean(error**2, axis=0))
     return errors
+
+
+def _rms(errors: Array) -> Array:
+    """(..., K) over the draws of the noise."""
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=-2)))
 
 
 def _reaches(errors: Array, goal: float) -> float:

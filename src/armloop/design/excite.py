@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.design.columns import double_feature_columns, rigid_body_columns
-from armloop.design.criteria import CRITERIA, condition_number
+from armloop.design.criteria import CRITERIA, ROUND_OFF, condition_number
 from armloop.design.data_ratio import DataRatio, data_ratio
 from armloop.design.information import Regression
 from armloop.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
@@ -38,12 +38,17 @@ _POOL = 48
 
 @dataclass(frozen=True)
 class Measure:
-    """How informative a reference is: condition number of the scaled regression, log-determinant of the mean information
-    of a sample (natural logarithm), and its share per coefficient."""
+    """How informative a reference is.
+
+    Attributes:
+        condition: condition number of the scaled regression.
+        logdet: log-determinant (natural) of the mean information of a sample.
+        error: root mean square standard error of the coefficients, times the root of the number of samples.
+    """
 
     condition: float
     logdet: float
-    per_coefficient: float
+    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +92,7 @@ class Excitation:
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop excite --json``, without the path."""
         names = ("position", "velocity", "acceleration", "torque")
-        table = {key: [getattr(m, key) for m in self.random] for key in ("condition", "logdet")}
+        table = {key: [getattr(m, key) for m in self.random] for key in ("condition", "logdet", "error")}
         return {
             "library": self.settings.library,
             "criterion": self.settings.criterion,
@@ -95,8 +100,7 @@ class Excitation:
             "duration": self.timing.duration,
             "period": self.timing.period,
             "harmonics": self.timing.harmonics,
-            "condition": self.measure.condition,
-            "logdet": self.measure.logdet,
+            **{key: _finite(getattr(self.measure, key)) for key in table},
             "random": {key: _spread(values) for key, values in table.items()},
             "use": {name: row.tolist() for name, row in zip(names, self.use, strict=True)},
             "notes": self.notes,
@@ -176,9 +180,10 @@ def excite(
 def measured(regression: Regression, motion: Motion) -> Measure:
     """How informative a motion is for a regression."""
     F = regression.information(motion)
-    values = np.maximum(np.linalg.eigvalsh(F), 1e-300)
-    logdet = float(np.log(values).sum())
-    return Measure(condition_number(F), logdet, logdet / regression.count)
+    values = np.linalg.eigvalsh(F)
+    if not values[0] > ROUND_OFF * values[-1]:
+        return Measure(np.inf, -np.inf, np.inf)
+    return Measure(condition_number(F), float(np.log(values).sum()), float(np.sqrt((1 / values).mean())))
 
 
 def _regression(arm: Arm, limits: Limits, settings: Settings, typical: list[Motion]) -> Regression:
@@ -215,6 +220,11 @@ def _effort_notes(arm: Arm, torque: TorqueLaw) -> list[str]:
     return notes
 
 
-def _spread(values: list[float]) -> dict[str, float]:
-    low, median, high = np.quantile(values, [0.1, 0.5, 0.9])
-    return {"median": float(median), "low": float(low), "high": float(high), "count": len(values)}
+def _spread(values: list[float]) -> dict[str, float | None]:
+    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="nearest")
+    return {"median": _finite(median), "low": _finite(low), "high": _finite(high), "count": len(values)}
+
+
+def _finite(value: float) -> float | None:
+    """JSON knows no infinity; where a measure has it, some coefficients are not determined at all."""
+    return float(value) if np.isfinite(value) else None

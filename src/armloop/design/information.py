@@ -24,6 +24,8 @@ all where every joint is regressed on the same candidates). They must depend on 
 
 #: A column of which less than this part is its own, over all random motions, cannot be excited.
 _DEPENDENT = 1e-6
+#: Nor can one that is round-off beside the others, in whatever units.
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class Regression:
         count = sum(len(row) / len(noise) for row in rows)
         gram = sum((row.T @ row for row in rows), np.zeros((len(names), len(names)))) / count
         size = np.sqrt(np.diag(gram))
-        alive = np.flatnonzero(size > _DEPENDENT * size.max(initial=0.0))
+        alive = np.flatnonzero(size > _NOTHING * size.max(initial=0.0))
         scaled = gram[np.ix_(alive, alive)] / np.outer(size[alive], size[alive])
         values, vectors = np.linalg.eigh(scaled)
         root = (vectors * np.sqrt(np.maximum(values, 0.0))).T

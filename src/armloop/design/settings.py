@@ -16,6 +16,7 @@ _LONGEST_PERIOD, _LONGEST = 60.0, 3600.0
 #: Hz that the default number of harmonics reaches, about the band of the random trajectories.
 _TOP = 0.4
 _FEWEST, _MOST = 4, 40
+_USUAL = (6, 24)
 #: Products of columns and trigonometric functions reach beyond the motion's own band; this keeps most of them below
 #: the corner of the low-pass that the log will meet.
 _BELOW_CUTOFF = 5.0
@@ -30,7 +31,7 @@ class Settings:
         criterion: a key of `CRITERIA`.
         duration: s, a whole number of periods.
         base_frequency: Hz; by default one period is the duration, up to a minute.
-        harmonics: of the base frequency; by default as many as reach 0.4 Hz, 4 to 24.
+        harmonics: of the base frequency; by default as many as reach 0.4 Hz, 6 to 24.
         order: N1 of the double feature set.
         reserve: part of the effort limits kept free for what the torque's prediction lacks.
         noise: standard deviation of each joint's torque noise, N*m (N).
@@ -81,7 +82,7 @@ class Settings:
         period, periods = _period(duration, self.base_frequency)
         harmonics = self.harmonics
         if harmonics is None:
-            harmonics = min(24, max(_FEWEST, round(_TOP * period)))
+            harmonics = min(_USUAL[1], max(_USUAL[0], round(_TOP * period)))
         if not _FEWEST <= harmonics <= _MOST:
             raise InputError(f"harmonics {harmonics}: give {_FEWEST} to {_MOST}")
         highest = self.cutoff_hz / _BELOW_CUTOFF

@@ -81,7 +81,8 @@ def write_reference(path: str | Path, reference: Reference, rate: float) -> int:
     t = np.linspace(0.0, reference.duration, steps + 1)
     columns = {"time": t}
     for name, values in zip(("q", "v", "vdot"), reference.evaluate(t), strict=True):
-        columns |= {f"{name}{j + 1}": values[:, j] for j in range(values.shape[1])}
+        # without the round-off in the last digits: rest reads 0
+        columns |= {f"{name}{j + 1}": np.round(values[:, j], 12) + 0.0 for j in range(values.shape[1])}
     write_columns(Path(path), columns)
     return len(t)
 
