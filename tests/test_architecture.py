@@ -17,10 +17,10 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 LAYERS = (
     {"__init__"},
     {"errors"},
-    {"files", "functions", "motion", "progress", "resources"},
+    {"files", "functions", "motion", "progress", "resources", "workers"},
     {"blocks", "regression", "tables"},
     {"arm", "log"},
-    {"kinematics", "newton_euler", "signals"},
+    {"kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},
     {"components", "effects", "sampling"},
     {"pointwise"},

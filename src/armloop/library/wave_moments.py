@@ -27,7 +27,7 @@ Wave = tuple[int, ...]
 Monomial = tuple[int, ...]
 
 #: Samples per product: enough for the product to run at full rate, few enough to need little memory.
-_CHUNK = 2048
+_CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
