@@ -75,7 +75,7 @@ def test_a_reference_from_a_file(tmp_path):
     assert scenario.reference.duration == 6.0
     t = np.linspace(0, 6, 777)
     for ours, theirs in zip(scenario.reference.evaluate(t), made.evaluate(t), strict=True):
-        assert_allclose(ours, theirs, atol=1e-7)
+        assert_allclose(ours, theirs, atol=1e-6)
     with pytest.raises(ScenarioError, match=r"reference.file: .*mine.csv: column q4 is of a joint"):
         load(tmp_path, scara.replace("plant: scara", "plant: three_axis"))
     with pytest.raises(ScenarioError, match=r"reference\.file is missing"):
