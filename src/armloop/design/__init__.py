@@ -5,7 +5,7 @@ competing effects that a run should tell apart (`criteria.told_apart`), are desi
 """
 
 from armloop.design.criteria import CRITERIA, Criterion, condition_number, told_apart
-from armloop.design.data_ratio import DataRatio, data_ratio
+from armloop.design.data_ratio import DataRatio, amount_needed, data_ratio
 from armloop.design.excite import Excitation, Measure, excite, measured
 from armloop.design.information import Columns, Regression
 from armloop.design.limits import Limits, TorqueLaw, nominal_torque
@@ -29,6 +29,7 @@ __all__ = [
     "Settings",
     "Timing",
     "TorqueLaw",
+    "amount_needed",
     "condition_number",
     "data_ratio",
     "excite",

@@ -79,7 +79,7 @@ def data_ratio(
         [_errors([known[k] for k in rng.permutation(len(known))[:count]], noises, rng) for _ in range(orders)]
     )
     goal = float(_rms(ours)[0])
-    ratios = np.array([_reaches(_rms(errors), goal) for errors in theirs])
+    ratios = np.array([amount_needed(_rms(errors), goal) for errors in theirs])
     return DataRatio(np.arange(1.0, count + 1), ours, theirs, ratios)
 
 
@@ -116,8 +116,8 @@ def _rms(errors: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(errors**2, axis=-2)))
 
 
-def _reaches(errors: Array, goal: float) -> float:
-    """The (fractional) number of trajectories after which the errors fall to the goal."""
+def amount_needed(errors: Array, goal: float) -> float:
+    """The number of trajectories, interpolated, after which their errors (K,) fall to the goal; infinite beyond K."""
     below = np.flatnonzero(errors <= goal)
     if len(below) == 0:
         return np.inf
