@@ -27,7 +27,7 @@ from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
 from armloop.log import TAU_UNITS
 from armloop.motion import Motion
-from armloop.pointwise import Pointwise, pointwise
+from armloop.pointwise import Drive, pointwise
 from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
@@ -148,20 +148,23 @@ class ReconstructedModel:
         rest = self.rigid_body(part).ravel() - Y @ nominal
         return nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
 
-    def feedforward(self, q: Array, v: Array, vdot: Array, step: int = 3) -> Array:
+    def feedforward(
+        self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
+    ) -> Array:
         """(n,) torque a controller should supply for one sample; sensor effects excluded.
 
-        Friction with memory acts as if fully slid: a single sample has no history.
+        Friction with memory acts as if fully slid: a single sample has no history. ``sliding`` (n,) are the
+        velocities to take friction at, by default v.
         """
         if step not in self._pointwise:
             added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
             inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
             effects = [(a.effect.load, a.pointwise(self.arm, inertial)) for a in added]
             self._pointwise[step] = pointwise(self.arm, self.components, self.friction, effects, step)
-        return self._pointwise[step](q, v, vdot)
+        return self._pointwise[step](q, v, vdot, sliding)
 
     @cached_property
-    def _pointwise(self) -> dict[int, Pointwise]:
+    def _pointwise(self) -> dict[int, Drive]:
         return {}
 
     def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:

@@ -44,7 +44,8 @@ def pointwise(
     """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
     Args:
-        effects: each with whether its torque loads the joint, so that friction grows with it.
+        effects: each with whether its torque loads the joint, so that friction grows with it; one that does
+            not is friction itself or knows no velocity, and takes the velocities that friction does.
 
     Friction with memory acts as if fully slid: one sample has no past.
     """
@@ -58,14 +59,14 @@ def pointwise(
         for body in bodies:
             tau += body(q, v, vdot)
         total = load = tau.tolist()
+        slip = v if sliding is None else sliding
         for is_load, effect in effects:
-            extra = effect(q, v, vdot)
+            extra = effect(q, v if is_load else slip, vdot)
             total = [x + float(y) for x, y in zip(total, extra, strict=True)]
             if is_load:
                 load = [x + float(y) for x, y in zip(load, extra, strict=True)]
-        speeds = (v if sliding is None else sliding).tolist()
         return np.array(
-            [x + law(speed, y) for x, law, speed, y in zip(total, laws, speeds, load, strict=True)]
+            [x + law(speed, y) for x, law, speed, y in zip(total, laws, slip.tolist(), load, strict=True)]
         )
 
     return torque

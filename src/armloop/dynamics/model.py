@@ -37,6 +37,7 @@ class ModelEquations:
         *,
         step: int = 3,
         smoothing: float = 0.0,
+        sharp: bool = False,
         symmetric: bool = False,
     ) -> None:
         """Take a model.
@@ -45,6 +46,7 @@ class ModelEquations:
             step: what of it: 1 gravity and dry friction, 2 with velocity terms, 3 the whole with its effects.
             smoothing: speed, rad/s or m/s, within which dry friction changes sign as tanh(v / smoothing);
                 0 for the sign itself, which has no derivative at rest.
+            sharp: take smoothed dry friction of the model, tanh(v / p), as sign(v), for a plant that sticks.
             symmetric: take (M + M^T) / 2 for M. The mass matrix of sparse terms is not symmetric by itself.
 
         Raises:
@@ -76,7 +78,12 @@ class ModelEquations:
         self._effects: list[EffectLaw] = [law for law in laws if law.friction is not None]
         self._friction = [
             [
-                (float(t.coefficient), FRICTION_LAWS[t.kind], float(t.parameter), t.by_load)
+                (
+                    float(t.coefficient),
+                    FRICTION_LAWS[t.kind.replace("smooth_", "") if sharp else t.kind],
+                    float(t.parameter),
+                    t.by_load,
+                )
                 for t in joint
                 if t.step <= step
             ]
@@ -112,16 +119,24 @@ class ModelEquations:
         """The n torques that load the joints, which friction may grow with."""
         return self._torque(q, v, vdot, loads_only=True)
 
-    def friction(self, v: Numbers, load: Sequence[Any] | None = None, t: Any = 0.0) -> list[Any]:
+    def friction(
+        self,
+        v: Numbers,
+        load: Sequence[Any] | None = None,
+        t: Any = 0.0,
+        signs: Sequence[Any] | None = None,
+    ) -> list[Any]:
         """The n friction torques at velocities v; at rest, where they are not determined, 0.
 
         Args:
             load: n torques, for friction that grows with them; 0 by default.
             t: time, s, for friction that changes with it.
+            signs: n directions to take instead of those of v.
         """
         f = self.functions
         loads = [0.0] * self.n if load is None else load
-        signs = [f.tanh(x / self._smoothing) if self._smoothing else f.sign(x) for x in v]
+        if signs is None:
+            signs = [f.tanh(x / self._smoothing) if self._smoothing else f.sign(x) for x in v]
         total: list[Any] = []
         for speed, sign, torque, laws in zip(v, signs, loads, self._friction, strict=True):
             own: Any = 0.0
