@@ -44,11 +44,11 @@ class DataRatio:
         low, middle, high = np.quantile(self.ratios, [0.1, 0.5, 0.9], method="nearest")
         ratios = {"median": middle, "low": low, "high": high}
         return {
-            **{key: float(x) if np.isfinite(x) else None for key, x in ratios.items()},
+            **{key: _finite(x) for key, x in ratios.items()},
             "most": int(self.trajectories[-1]),
             "error": {
-                "optimised": _rms(self.optimised).tolist(),
-                "random": np.median(_rms(self.random), axis=0).tolist(),
+                "optimised": [_finite(x) for x in _rms(self.optimised)],
+                "random": [_finite(x) for x in np.median(_rms(self.random), axis=0)],
             },
         }
 
@@ -109,6 +109,10 @@ def _errors(parts: Sequence[_Known], noises: int, rng: np.random.Generator) -> A
         error = vectors @ ((vectors.T @ b) / values[:, None]) if known else np.full_like(b, np.inf)
         errors[:, k] = np.sqrt(np.mean(error**2, axis=0))
     return errors
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None
 
 
 def _rms(errors: Array) -> Array:

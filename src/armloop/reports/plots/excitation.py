@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, legend, panels, polish
 
@@ -61,6 +62,10 @@ def data_figure(ratio: DataRatio, result: Excitation) -> Figure:
     axes.axhline(ours[0], color=BLUE, linewidth=1, linestyle=(0, (4, 3)))
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axis.set_minor_formatter(NullFormatter())
     polish(axes, "data [s]", "coefficient error [noise levels]")
     legend(made, 3)
     return made
