@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 from armloop.commands.arguments import ARM_HELP, add_json, add_logs, add_recorded
 
@@ -26,11 +27,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--estimator",
-        default="lasso_ebic",
-        help="how terms are chosen: lasso_ebic (Lasso path, information criterion, swap search), lasso (Eq. 32 with "
-        "--penalty) or least_squares (%(default)s)",
+        default="evidence",
+        help="how terms are chosen: evidence (Lasso path, information criterion, exchange of terms), lasso, "
+        "debiased_lasso, adaptive_lasso, thresholded, stlsq, sr3, stability or least_squares (%(default)s)",
     )
-    p.add_argument("--penalty", type=float, default=1e-3, help="λ of --estimator lasso (%(default)s)")
+    p.add_argument(
+        "--penalty",
+        type=float,
+        default=None,
+        help="λ of the Lassos (Eq. 32), or the threshold of thresholded, stlsq and sr3, for columns and torque of unit "
+        "root mean square (default: by held-out error)",
+    )
     p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
     p.add_argument(
         "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
@@ -54,7 +61,7 @@ def run(options: argparse.Namespace) -> None:
 
     if options.estimator not in ESTIMATORS:
         raise InputError(f"unknown estimator {options.estimator!r}; there are: {', '.join(ESTIMATORS)}")
-    if not options.penalty > 0:
+    if options.penalty is not None and not 0 < options.penalty < math.inf:
         raise InputError(f"--penalty {options.penalty}: λ must be positive")
     if not 1 <= options.max_order <= 6:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
