@@ -217,11 +217,13 @@ FRICTION_LAWS: dict[str, Callable[[Any, Any, float, Functions], Any]] = {
     "load_sign": lambda v, sign, p, f: sign,
     "load_smooth_sign": lambda v, sign, p, f: f.tanh(v / p),
     "load_hysteresis": lambda v, sign, p, f: sign,
-    "abs_speed": lambda v, sign, p, f: abs(v),
     "viscous": lambda v, sign, p, f: v,
+    "viscous_forward": lambda v, sign, p, f: 0.5 * (v + abs(v)),
+    "viscous_backward": lambda v, sign, p, f: 0.5 * (v - abs(v)),
     # sqrt(|v|) sign(v), rounded off below 1e-10 so that it has a derivative at rest
     "root": lambda v, sign, p, f: v / f.sqrt(f.sqrt(v * v + 1e-20)),
     "quadratic": lambda v, sign, p, f: abs(v) * v,
     "cubic": lambda v, sign, p, f: v * v * v,
+    "stribeck_peak": lambda v, sign, p, f: f.exp(-(v / p) * (v / p)) * sign,
     "stribeck": lambda v, sign, p, f: (1.0 - f.exp(-(v / p) * (v / p))) * sign,
 }

@@ -42,6 +42,24 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
     )
+    p.add_argument(
+        "--no-physical",
+        action="store_true",
+        help="do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)",
+    )
+    p.add_argument(
+        "--jobs",
+        type=int,
+        default=None,
+        metavar="N",
+        help="processes that pass over logs too large for memory (default: one per core)",
+    )
+    p.add_argument(
+        "--scheduler",
+        default=None,
+        metavar="ADDRESS",
+        help="pass over the logs on a Dask cluster whose workers see the same files (extra: dask)",
+    )
     p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
     add_recorded(p, "N*m")
     add_json(p)
@@ -50,14 +68,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Reconstruct a model and write it."""
     from armloop.arm import load_arm
-    from armloop.commands.shared import TORQUE, out_file, print_json, progress, read_logs, recorded_as
+    from armloop.commands.shared import TORQUE, out_file, print_json, progress, recorded_as
     from armloop.errors import InputError
     from armloop.files import write_text
+    from armloop.pieces import IN_MEMORY, first_samples, log_sources
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
     from armloop.reports.tables import formulas, score_table, steps_table
     from armloop.signals import Conditioning
+    from armloop.workers import Cluster, Processes
 
     if options.estimator not in ESTIMATORS:
         raise InputError(f"unknown estimator {options.estimator!r}; there are: {', '.join(ESTIMATORS)}")
@@ -67,26 +87,38 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
+    if options.jobs is not None and options.jobs < 1:
+        raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
     arm = load_arm(options.arm)
     recorded = recorded_as(options, TORQUE)
-    logs = read_logs(options.logs, arm.n, recorded)
-    result = run(
-        logs,
-        arm,
-        options.method,
-        options.library,
-        None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
-        Options(sparse=Sparse(options.estimator, options.penalty), max_order=options.max_order),
-        progress(options),
-        recorded,
-    )
+    logs = log_sources(options.logs, arm.n, recorded, 0 if options.scheduler else IN_MEMORY)
+    workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)
+    try:
+        result = run(
+            logs,
+            arm,
+            options.method,
+            options.library,
+            None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
+            Options(
+                sparse=Sparse(options.estimator, options.penalty),
+                max_order=options.max_order,
+                physical=not options.no_physical,
+            ),
+            progress(options),
+            recorded,
+            workers,
+            in_memory=0 if options.scheduler else IN_MEMORY,
+        )
+    finally:
+        workers.close()
     result.model.save(options.out)
     if options.report:
         from armloop.reports.reconstruction_report import reconstruction_report
 
-        write_text(options.report, reconstruction_report(result, logs))
+        write_text(options.report, reconstruction_report(result, first_samples(logs)))
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})
         return
