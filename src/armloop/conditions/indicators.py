@@ -39,7 +39,12 @@ def robust_indicator(a: Array, weight: float = 0.2) -> Array:
 
 
 def size(a: Array) -> Array:
-    """(N,) Euclidean norm of a (N, n), every joint in units of its own noise.
+    """(N,) Euclidean norm of a (N, n), every joint in units of its own noise (:func:`units`)."""
+    return np.asarray(np.linalg.norm(a / units(a), axis=1))
+
+
+def units(a: Array) -> Array:
+    """(n,) noise of every joint in a (N, n).
 
     The noise is that of the quiet samples, which are known once the size is: three rounds. The first is in units
     of each joint's RMS, so that joints of small numbers are seen; if a joint at rest then drowns the others in its
@@ -50,19 +55,20 @@ def size(a: Array) -> Array:
     rms = np.sqrt(np.mean(a**2, axis=0))
     least = max(_NOTHING * float(rms.max(initial=0.0)), 1e-300)
     own = np.maximum(rms, least)
-    for first in (own, np.full_like(own, own.max())):
-        total = np.linalg.norm(a / first, axis=1)
+    for unit in (own, np.full_like(own, own.max())):
+        total = np.linalg.norm(a / unit, axis=1)
         if noise_floor(total) is not None:
             break
     else:
-        return np.asarray(np.linalg.norm(a / own, axis=1))
+        return own
     for _ in range(_ROUNDS):
         quiet = np.abs(a[(total <= limit(total, a.shape[1])) & (total > _NOTHING * total.max())])
         if len(quiet) == 0:
             break
         noise = np.quantile(quiet, 0.75, axis=0) / norm.ppf(0.875)
-        total = np.linalg.norm(a / np.maximum(noise, least), axis=1)
-    return np.asarray(total)
+        unit = np.maximum(noise, least)
+        total = np.linalg.norm(a / unit, axis=1)
+    return np.asarray(unit)
 
 
 def limit(total: Array, joints: int) -> float:

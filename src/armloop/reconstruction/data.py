@@ -26,7 +26,7 @@ Mask = NDArray[np.bool_]
 Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.
-REFERENCE = 200_000
+REFERENCE = 50_000
 
 
 @dataclass(frozen=True, eq=False)

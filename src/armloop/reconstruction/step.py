@@ -24,6 +24,7 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.sums import Choice, Columns, Problems, StepSums
 from armloop.reconstruction.trials import Correction, Fit, HeldOut
+from armloop.reconstruction.unattenuated import unattenuated
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
 
@@ -197,7 +198,9 @@ def regress_step(
     trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
     final = [_fit(joint, joint.all, chosen, options) for joint in joints]
     final = _corrected(final, joints, partial(_gradients, data, choice, columns))
-    terms, friction = _collect(final, candidates, columns, plan)
+    if options.snr is not None:
+        final = unattenuated(data, choice, columns, final, options.snr)
+    terms, friction = _collect(final, candidates.step, columns, plan)
     reports = []
     for part, found in zip(plan.parts, terms, strict=True):
         N2 = _second_order(part, orders[1])
@@ -276,9 +279,9 @@ def _corrected(
 
 
 def _collect(
-    fits: Sequence[Fit], candidates: _Candidates, columns: Columns, plan: StepPlan
+    fits: Sequence[Fit], step: Index, columns: Columns, plan: StepPlan
 ) -> tuple[list[SparseTerms], list[list[FrictionTerm]]]:
-    size = candidates.size
+    size = columns.library.size
     coefficients = np.zeros((size, len(fits)))
     friction: list[list[FrictionTerm]] = []
     for j, fit in enumerate(fits):
@@ -286,11 +289,9 @@ def _collect(
         coefficients[fit.support[mine], j] = fit.beta[mine]
         laws = zip(fit.support[~mine] - size, fit.beta[~mine].tolist(), strict=True)
         friction.append([replace(columns.friction[j][k], coefficient=value) for k, value in laws])
-    kept = coefficients.any(axis=1)
     terms = []
     for part in plan.parts:
-        mine = kept & (candidates.step == part.step)
-        terms.append(
-            SparseTerms(part.step, candidates.index[mine], coefficients[mine], candidates.factors.waves)
-        )
+        kept = np.flatnonzero(coefficients.any(axis=1) & (step == part.step))
+        found = columns.library.only(kept)
+        terms.append(SparseTerms(part.step, found.index, coefficients[kept], found.factors.waves))
     return terms, friction
