@@ -14,6 +14,7 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
+from armloop.reconstruction.refit import refit
 from armloop.reconstruction.sorter import Sorter
 from armloop.reconstruction.step import Part, StepPlan, regress_step
 from armloop.reconstruction.sums import Choice
@@ -59,6 +60,8 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
         for law, more in zip(found.friction, friction, strict=True):
             law += more
         found.reports += report
+    if refit(found, data, options.sparse.estimator):
+        found.notes.append("coefficients regressed once more on columns that are filtered like the torque")
     return found
 
 

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0
+#: Of a problem with more unknowns (nothing was chosen) no errors are computed: the table would say nothing.
+MOST_UNKNOWNS = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +98,10 @@ def covariances(
     todo = problems(model)
     residual, spread = _residuals(todo, samples, fitted)
     rows = np.logical_or.reduce([part.rows for part in fitted])
+    # an even selection from long logs is coarser than its sample period
+    step = float(np.median(np.diff(samples.motion.time)))
     correlation = max(
-        correlation_time(residual[:, j], rows[:, j], samples.motion, samples.period)
-        for j in range(model.arm.n)
+        correlation_time(residual[:, j], rows[:, j], samples.motion, step) for j in range(model.arm.n)
     )
     covered = [
         covered_time(samples.motion.time, np.any(one.rows, axis=1, keepdims=True)[:, 0]) for one in fitted
@@ -107,7 +110,7 @@ def covariances(
     blocks = independent_blocks(samples.motion, seconds)
     found = []
     for problem in todo:
-        if problem.unknowns:
+        if 0 < len(problem.unknowns) <= MOST_UNKNOWNS:
             sums = _equations(problem, samples, fitted, blocks, spread)
             found.append(Errors(problem.unknowns, sums.covariance(), sums.degrees_of_freedom(), sums))
     return found, seconds, correlation
@@ -125,6 +128,14 @@ def gauss_newton_steps(
         for problem in todo
         if problem.unknowns
     ]
+
+
+def misfit(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> float:
+    """Sum over the joints of mean squared residual relative to mean squared torque, on the fitted samples."""
+    residual, _ = _residuals(problems(model), samples, fitted)
+    rows = np.logical_or.reduce([one.rows for one in fitted])
+    power = (samples.tau**2 * rows).sum(axis=0)
+    return float(((residual**2).sum(axis=0) / np.maximum(power, 1e-300)).sum())
 
 
 @dataclass(frozen=True, eq=False)
