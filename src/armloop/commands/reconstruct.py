@@ -38,9 +38,19 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="λ of the Lassos (Eq. 32), or the threshold of thresholded, stlsq and sr3, for columns and torque of unit "
         "root mean square (default: by held-out error)",
     )
+    p.add_argument(
+        "--snr",
+        default=None,
+        metavar="Q,V,VDOT",
+        help="signal-to-noise ratios in dB of q, v and vdot, where they are known and the samples are no time series "
+        "(--cutoff 0): coefficients are corrected for this noise after the terms are chosen",
+    )
     p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
     p.add_argument(
         "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
+    )
+    p.add_argument(
+        "--coefficients", action="store_true", help="print every coefficient with its standard error, too"
     )
     p.add_argument(
         "--no-physical",
@@ -89,6 +99,7 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
     if options.jobs is not None and options.jobs < 1:
         raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
+    _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
     arm = load_arm(options.arm)
@@ -106,6 +117,7 @@ def run(options: argparse.Namespace) -> None:
                 sparse=Sparse(options.estimator, options.penalty),
                 max_order=options.max_order,
                 physical=not options.no_physical,
+                snr=_snr(options),
             ),
             progress(options),
             recorded,
@@ -126,7 +138,32 @@ def run(options: argparse.Namespace) -> None:
     print()
     print(formulas(result.model), *result.model.legend(), sep="\n")
     print()
+    if options.coefficients:
+        from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
+
+        for table in (coefficients_table(result.model), stribeck_table(result.model)):
+            print(table, end="\n\n") if table else None
+        print(NOTE, end="\n\n")
     print(score_table(result.held_out, arm))
     for note in result.notes:
         print(f"note: {note}")
     print(f"model written to {options.out}")
+
+
+def _snr(options: argparse.Namespace) -> tuple[float, float, float] | None:
+    """The signal-to-noise ratios of q, v and vdot, or None."""
+    from armloop.errors import InputError
+
+    if options.snr is None:
+        return None
+    try:
+        q, v, vdot = (float(level) for level in options.snr.split(","))
+    except ValueError:
+        raise InputError(f"--snr {options.snr}: give three numbers in dB, such as 60,40,20") from None
+    if not all(0 < level < math.inf for level in (q, v, vdot)):
+        raise InputError(f"--snr {options.snr}: ratios in dB must be positive")
+    if options.cutoff != 0:
+        raise InputError("--snr is for samples that are no time series; give --cutoff 0 with it")
+    if options.method != "stepwise" or options.library not in (None, "double-feature-set"):
+        raise InputError("--snr works with the stepwise method and the library double-feature-set")
+    return q, v, vdot

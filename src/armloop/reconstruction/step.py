@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.components import SparseTerms
-from armloop.errors import ExcitationError
+from armloop.errors import ExcitationError, InputError
 from armloop.library.angle_sums import AngleSums
 from armloop.library.double_feature_set import DoubleFeatureSet, Factors
 from armloop.library.friction import FrictionTerm
@@ -139,23 +139,27 @@ class _Joint:
     profile: Index
     scale: float
 
-    def select(self, moments: Moments, library: Index, sparse: Sparse) -> Index:
-        """Support among the library columns ``library`` and the friction columns."""
+    def select(self, moments: Moments, library: Index, sparse: Sparse) -> Fit:
+        """Support among the library columns ``library`` and the friction columns, and its coefficients."""
         chosen = np.zeros(0, dtype=np.intp)
         best: Index = np.zeros(0, dtype=np.intp)
+        parts = (self.fit, self.all - self.fit) if moments is self.all and sparse.needs_parts else ()
         for _ in range(3):
             previous = best
             best = self._profiled(moments, np.concatenate([self.fixed, chosen]))
             forced = np.concatenate([self.fixed, best])
             columns = np.concatenate([library, forced]).astype(np.intp)
             doubtless = np.arange(len(library), len(columns))
-            local = sparse.support(moments.take(columns), doubtless, self.scale**2)
+            local, beta = sparse.fit(
+                moments.take(columns), doubtless, self.scale**2, [part.take(columns) for part in parts]
+            )
             support = columns[local]
             chosen = support[support < self.size]
             if np.array_equal(best, previous):
                 break
-        support = np.concatenate([chosen, self.fixed, best]).astype(np.intp)
-        return sparse.prune(moments, support, support[support >= self.size], self.scale**2)
+        kept = sparse.prune(moments, support, support[support >= self.size], self.scale**2)
+        shrunk = sparse.shrinks and len(kept) == len(support)
+        return Fit(kept, beta if shrunk else moments.solve(kept))
 
     def _profiled(self, moments: Moments, base: Index) -> Index:
         """The one profiled column that, with the base, leaves the smallest squared error."""
@@ -179,6 +183,7 @@ def regress_step(
 
     Raises:
         ExcitationError: too few samples for a joint.
+        InputError: the estimator's solver does not converge.
     """
     candidates = _candidates(revolute, plan)
     library = WaveProducts(candidates.factors, candidates.index)
@@ -197,7 +202,8 @@ def regress_step(
     errors = np.sqrt(tried.errors.mean(axis=1)).tolist()
     trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
     final = [_fit(joint, joint.all, chosen, options) for joint in joints]
-    final = _corrected(final, joints, partial(_gradients, data, choice, columns))
+    if not options.sparse.shrinks:
+        final = _corrected(final, joints, partial(_gradients, data, choice, columns))
     if options.snr is not None:
         final = unattenuated(data, choice, columns, final, options.snr)
     terms, friction = _collect(final, candidates.step, columns, plan)
@@ -248,8 +254,10 @@ def _joints(columns: Columns, sums: StepSums, plan: StepPlan) -> list[_Joint]:
 
 
 def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> Fit:
-    support = joint.select(moments, library, options.sparse)
-    return Fit(support, moments.solve(support))
+    try:
+        return joint.select(moments, library, options.sparse)
+    except ArithmeticError as error:
+        raise InputError(f"{error}; choose another estimator, or another penalty") from error
 
 
 def _gradients(data: Data, choice: Choice, columns: Columns, fits: list[Fit]) -> tuple[Array, ...]:

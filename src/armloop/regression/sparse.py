@@ -48,6 +48,16 @@ class Sparse:
         if self.estimator not in ESTIMATORS:
             raise ValueError(f"unknown estimator {self.estimator!r}; there are: {', '.join(ESTIMATORS)}")
 
+    @property
+    def shrinks(self) -> bool:
+        """Whether coefficients are smaller than those of least squares on the terms kept."""
+        return self.estimator in ("lasso", "adaptive_lasso")
+
+    @property
+    def needs_parts(self) -> bool:
+        """Whether parts of the data change the estimate."""
+        return self.estimator not in ("evidence", "least_squares")
+
     def support(
         self, moments: Moments, forced: Index, power: float = 0.0, parts: Sequence[Moments] = ()
     ) -> Index:
