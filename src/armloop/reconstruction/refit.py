@@ -29,8 +29,8 @@ def refit(found: Found, data: Data, estimator: str) -> bool:
     """Replace a stepwise result's coefficients; tell whether it was done.
 
     It is not done for samples that passed no filter, for logs that are not kept in memory, for estimators that
-    shrink or choose nothing, and where the squared error of the fitted samples would not fall; nor for a joint whose v_s would move
-    by more than a factor of two and a half.
+    shrink or choose nothing, and where the squared error of the fitted samples would not fall; nor for a joint
+    whose v_s would move by more than a factor of two and a half.
     """
     if data.reference.samples.cutoff_hz <= 0 or not in_memory(data) or estimator not in _LEAST_SQUARES:
         return False
