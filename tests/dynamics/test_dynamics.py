@@ -93,7 +93,9 @@ def test_an_unsymmetric_mass_matrix_is_told_apart_from_an_impossible_one():
     assert_allclose(symmetric, 0.5 * (M + M.T))
     assert require_mass_matrix(model)[0] > 0
     negative = model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients))
-    with pytest.raises(ModelError, match="not positive definite: its smallest eigenvalue is -"):
+    with pytest.raises(
+        ModelError, match="not positive definite: its smallest eigenvalue is -.* nearest_rigid_body"
+    ):
         require_mass_matrix(negative)
 
 
@@ -109,8 +111,6 @@ def test_the_nearest_rigid_body_averages_the_errors_of_terms_out():
         noisy = model_of(
             arm, *others, SparseTerms(3, inertia.index, inertia.coefficients + noise), effects=EFFECTS
         )
-        with pytest.raises(ModelError, match="nearest_rigid_body"):
-            require_mass_matrix(noisy)
         errors = [
             np.sqrt(((Dynamics(m).mass_matrix(q) - M) ** 2).mean())
             for m in (noisy, nearest_rigid_body(noisy))
