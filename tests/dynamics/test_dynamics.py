@@ -94,7 +94,7 @@ def test_an_unsymmetric_mass_matrix_is_told_apart_from_an_impossible_one():
     assert require_mass_matrix(model)[0] > 0
     negative = model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients))
     with pytest.raises(
-        ModelError, match="not positive definite: its smallest eigenvalue is -.* nearest_rigid_body"
+        ModelError, match=r"not positive definite: its smallest eigenvalue is -.*nearest_rigid_body"
     ):
         require_mass_matrix(negative)
 
