@@ -49,7 +49,7 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
     if not note:
         found.sorter = sorter
     revolute = tuple(bool(r) for r in arm.revolute)
-    for plan in _together(revolute, options) if note else _steps(revolute, options):
+    for plan in _together(revolute, options) if note else steps(revolute, options):
         share = float(np.isin(clusters.condition, plan.conditions).mean())
         progress(f"{plan.name}: {share:.0%} of the samples")
         # A copy: what is found now must not be inherited by itself.
@@ -68,7 +68,8 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
 _PARTS = (Part(1, "none"), Part(2, "velocity"), Part(3, "acceleration"))
 
 
-def _steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+    """The three steps, each with the orders worth trying."""
     first, second, third = _PARTS
     return [
         StepPlan((first,), _orders(revolute, (first,), (0,), options), ("sign",), (1,)),
