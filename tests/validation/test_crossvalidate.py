@@ -52,7 +52,8 @@ def test_the_command_answers_for_blocks(
     assert set(answer["files"][0]) == {"file", "samples", "moving", "standstill"}
     compared = answer["physical_consistency"]
     assert compared["physical"]["nrmse"] == pytest.approx(answer["mean"]["nrmse"])
-    assert set(compared["free"]) == set(compared["physical"])
+    assert set(compared) == {"physical", "insisted", "free"}
+    assert compared["insisted"]["mass_matrix_within"]["least"] > 0
     assert main(call) == 0
     text = capsys.readouterr().out
     assert "nRMSE of the moving joints on data left out" in text and "Friction ladder" in text

@@ -41,7 +41,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     choice.add_argument(
         "--compare-physical",
         action="store_true",
-        help="do both, and say what physical consistency costs and gains",
+        help="do both, and insist on it as well, and say what physical consistency costs and gains",
     )
     add_recorded(p, "N*m")
     add_json(p)
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> None:
     }
     if options.compare_physical:
         comparison = compare_physical(logs, arm, **how)
-        result = comparison.runs[True]
+        result = comparison.runs["physical"]
     else:
         comparison, result = None, crossvalidate(logs, arm, **how)
     if options.json:

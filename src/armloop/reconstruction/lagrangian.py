@@ -88,7 +88,7 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, mass, ladder.laws)
+                physical = physical_solution(solution, mass, ladder.laws, options.insist)
                 theta = physical.theta
                 physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
             except (

@@ -22,7 +22,9 @@ class Options:
         seed: of k-means.
         snr: signal-to-noise ratios in dB of q, v and v̇ of samples that are no time series, where they are known:
             coefficients are corrected for the noise after the terms are chosen.
-        physical: keep M(q) positive definite and friction from driving, where the library knows how to.
+        physical: keep friction from driving, and M(q) positive definite unless the data contradict that, where the
+            library knows how to.
+        insist: keep M(q) positive definite even then.
     """
 
     sparse: Sparse = field(default_factory=Sparse)
@@ -33,6 +35,7 @@ class Options:
     seed: int = 0
     snr: tuple[float, float, float] | None = None
     physical: bool = True
+    insist: bool = False
 
 
 @dataclass

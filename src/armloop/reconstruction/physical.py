@@ -44,12 +44,14 @@ class PhysicalSolution:
     contradicted: bool = False
 
 
-def physical_solution(solution: Solution, mass: Array, laws: list[list[FrictionTerm]]) -> PhysicalSolution:
+def physical_solution(
+    solution: Solution, mass: Array, laws: list[list[FrictionTerm]], insist: bool = False
+) -> PhysicalSolution:
     """The coefficients that solve the normal equations as well as physics allows.
 
     Where M(q) must be held back, it costs squared error. By chance alone that is a chi-square of as many degrees of
     freedom as conditions bind (Wilks 1938); more is the data's word against them: sensors that lag, an arm that is
-    not the URDF's. Then M stays free, for a wrong model predicts no better for being positive.
+    not the URDF's. Then M stays free, for a wrong model predicts no better for being positive, unless ``insist``.
 
     Raises:
         ExcitationError: there are none.
@@ -76,7 +78,7 @@ def physical_solution(solution: Solution, mass: Array, laws: list[list[FrictionT
     ]
     binding = int(np.linalg.matrix_rank(tight, tol=1e-3)) if len(tight) else 0
     cost = (_cost(solution, theta) - _cost(solution, solution.theta)) / solution.repeats
-    contradicted = bool(cost > chi2.ppf(_CHANCE, max(binding, 1)))
+    contradicted = not insist and bool(cost > chi2.ppf(_CHANCE, max(binding, 1)))
     return PhysicalSolution(solution.theta if contradicted else theta, binding, contradicted)
 
 

@@ -1,7 +1,8 @@
 """The rigid-body library: base parameters shared by all joints, with friction that has memory and feels load.
 
-It scales to seven joints: 40 shared parameters and seven friction columns a joint where the double feature
+It scales to seven joints: some 40 shared parameters and a few friction terms a joint where the double feature
 set would need tens of thousands. The regression is weighted by what each joint's residual turns out to be.
+What scarce data leave open is filled in from the URDF, as firmly as the data themselves speak for it.
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ def rigid_body(
         solution = pooled.solve(pooled.everything, ladder.prior)
         theta, physics = solution.theta, {}
         if options.physical:
-            physical = physical_solution(solution, mass, ladder.laws)
+            physical = physical_solution(solution, mass, ladder.laws, options.insist)
             theta = physical.theta
             physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
         values = theta[: base.count]

@@ -1,7 +1,7 @@
 """What the libraries that serve all joints with shared coefficients have in common.
 
-One regression over all moving samples of all joints, weighted by what each joint's residual turns out to be,
-with the same friction terms for every joint.
+Which samples they regress, what the motion must show for that, and the friction that stands in until each joint's
+own is chosen.
 """
 
 from __future__ import annotations

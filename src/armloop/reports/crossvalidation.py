@@ -13,6 +13,13 @@ if TYPE_CHECKING:
     from armloop.validation import CrossValidation, PhysicalComparison
 
 
+_DEGREES = {
+    "physical": "physical unless contradicted",
+    "insisted": "physical in any case",
+    "free": "free",
+}
+
+
 def crossvalidation_tables(result: CrossValidation) -> list[Table]:
     """nRMSE per log and joint of moving samples, with the means; then RMSE at standstill."""
     n = len(result.per_joint)
@@ -61,15 +68,15 @@ def ladder_table(result: CrossValidation) -> Table | None:
 
 
 def physical_table(comparison: PhysicalComparison) -> Table:
-    """Held-out error, constraints and mass matrix with physical consistency and without."""
-    rows = []
-    for physical, name in ((True, "physical"), (False, "free")):
-        within, beyond = comparison.within[physical], comparison.beyond[physical]
+    """Held-out error, constraints and mass matrix with different degrees of physical consistency."""
+    rows: list[list[object]] = []
+    for degree, run in comparison.runs.items():
+        within, beyond = comparison.within[degree], comparison.beyond[degree]
         rows.append(
             [
-                name,
-                number(comparison.runs[physical].mean, 4),
-                number(comparison.constraints if physical else 0.0),
+                _DEGREES[degree],
+                number(run.mean, 4),
+                number(comparison.constraints[degree]),
                 number(within.least),
                 percent(within.share_negative),
                 number(beyond.least),

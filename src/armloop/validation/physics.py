@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 #: Postures drawn within the range of the training data, and as many beyond it.
 POSTURES = 500
+#: Degrees of physical consistency that are compared.
+DEGREES = ("physical", "insisted", "free")
 
 
 @dataclass(frozen=True)
@@ -34,31 +36,32 @@ class MassMatrixCheck:
 
 @dataclass(frozen=True, eq=False)
 class PhysicalComparison:
-    """One cross-validation with physical consistency and one without.
+    """Cross-validations with physical consistency, to different degrees.
 
     Attributes:
-        runs: the two cross-validations, by whether they were physical.
+        runs: by degree: ``"physical"`` (the default: M(q) positive definite unless the data contradict it),
+            ``"insisted"`` (even then) and ``"free"``.
         within, beyond: the worst of the mass matrices over the splits, at postures within the range of the
-            motion and over the whole of the joints' ranges, by whether they were physical.
-        constraints: constraints that were needed, mean over the splits.
+            motion and over half a turn around its middle.
+        constraints: conditions on M(q) that bind, mean over the splits.
     """
 
-    runs: dict[bool, CrossValidation]
-    within: dict[bool, MassMatrixCheck]
-    beyond: dict[bool, MassMatrixCheck]
-    constraints: float
+    runs: dict[str, CrossValidation]
+    within: dict[str, MassMatrixCheck]
+    beyond: dict[str, MassMatrixCheck]
+    constraints: dict[str, float]
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values, under ``physical`` and ``free``."""
+        """JSON-ready values of each degree."""
         return {
-            name: {
-                "nrmse": self.runs[key].mean,
-                "nrmse_per_joint": self.runs[key].per_joint,
-                "constraints": self.constraints if key else 0.0,
-                "mass_matrix_within": vars(self.within[key]),
-                "mass_matrix_beyond": vars(self.beyond[key]),
+            degree: {
+                "nrmse": run.mean,
+                "nrmse_per_joint": run.per_joint,
+                "constraints": self.constraints[degree],
+                "mass_matrix_within": vars(self.within[degree]),
+                "mass_matrix_beyond": vars(self.beyond[degree]),
             }
-            for key, name in ((True, "physical"), (False, "free"))
+            for degree, run in self.runs.items()
         }
 
 
@@ -71,29 +74,33 @@ def compare_physical(
     seed: int = 0,
     **how: Any,
 ) -> PhysicalComparison:
-    """Cross-validate with and without physical consistency.
+    """Cross-validate with different degrees of physical consistency.
 
     Args:
-        options: what else to choose; their ``physical`` is overruled.
+        options: what else to choose; their ``physical`` and ``insist`` are overruled.
         seed: of the postures at which M(q) is tried.
         how: further arguments of :func:`crossvalidate`.
 
     Raises:
         InputError: as :func:`crossvalidate`.
     """
-    runs = {}
-    for physical, name in ((True, "physical"), (False, "free")):
-        progress(f"{name} coefficients")
-        chosen = replace(options or Options(), physical=physical)
-        runs[physical] = crossvalidate(logs, arm, options=chosen, progress=progress, **how)
-    q = condition(logs, runs[True].results[0][1].model.conditioning).motion.q
+    runs, constraints = {}, {}
+    for degree in DEGREES:
+        progress(f"coefficients: {degree}")
+        chosen = replace(options or Options(), physical=degree != "free", insist=degree == "insisted")
+        run = runs[degree] = crossvalidate(logs, arm, options=chosen, progress=progress, **how)
+        counts = [
+            0 if fit.model.history.get("contradicted") else fit.model.history.get("constraints", 0)
+            for _, fit in run.results
+        ]
+        constraints[degree] = float(np.mean(counts))
+    q = condition(logs, runs["physical"].results[0][1].model.conditioning).motion.q
     near, far = _postures(arm, q, seed)
     within, beyond = (
         {key: _worst([result.model for _, result in run.results], at) for key, run in runs.items()}
         for at in (near, far)
     )
-    counts = [result.model.history.get("constraints", 0) for _, result in runs[True].results]
-    return PhysicalComparison(runs, within, beyond, float(np.mean(counts)))
+    return PhysicalComparison(runs, within, beyond, constraints)
 
 
 def mass_matrix(model: ReconstructedModel, q: Array) -> Array:
