@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.components import Lagrangian
 from armloop.functions import Functions
-from armloop.newton_euler import inverse_dynamics
+from armloop.newton_euler import inverse_dynamics, mass_matrix
 
 Array = NDArray[np.float64]
 Numbers = Sequence[Any]
@@ -118,14 +118,11 @@ class BodyEquations(Equations):
         n = self.n = arm.n
         links = parameters[: 10 * n]
         self._dynamics = inverse_dynamics(arm, links, gravity, functions)
-        self._weightless = inverse_dynamics(arm, links, np.zeros(3), functions)
+        self._mass_matrix = mass_matrix(arm, links, functions)
         self._rotors = parameters[10 * n :].tolist() if len(parameters) == 11 * n else [0.0] * n
 
     def inertia(self, q: Numbers) -> Rows:
-        still = [0.0] * self.n
-        units = [[float(i == k) for i in range(self.n)] for k in range(self.n)]
-        columns = [self._weightless(q, still, unit) for unit in units]
-        M = [[columns[k][i] for k in range(self.n)] for i in range(self.n)]
+        M = self._mass_matrix(q)
         for i, rotor in enumerate(self._rotors):
             M[i][i] = M[i][i] + rotor
         return M
