@@ -37,7 +37,8 @@ REVOLUTE = (True, True, True)
 ONE_SHOT = (4, 2, "both")
 STEPS = ((2, 0, "none"), (4, 2, "velocity"), (4, 1, "acceleration"))
 CONTENDERS = ("moments", "lstsq", "pysindy")
-#: Ridge of pysindy's STLSQ, whose threshold is 0: without one its normal equations are singular.
+#: Ridge of pysindy's STLSQ, whose threshold is 0: without one its normal equations are singular. Its refit without
+#: the ridge is left out, which would be `lstsq` once more.
 RIDGE = 1e-9
 
 
@@ -103,7 +104,9 @@ def child(contender: str, task: str, data: Path, quick: bool) -> dict:
         text=True,
         check=True,
     )
-    return json.loads(answer.stdout)
+    result = json.loads(answer.stdout)
+    print(f"  … {task}, {contender}: {result['seconds']:.3g} s", file=sys.stderr)
+    return result
 
 
 def write_data(path: Path) -> None:
@@ -205,7 +208,8 @@ def by_pysindy(motion: Motion, tau: Array, orders: tuple[int, int, str]) -> tupl
         uses = [list(range(6)), list(range(6, columns))]
         library = TensoredLibrary(parts, uses)
     model = pysindy.SINDy(
-        optimizer=pysindy.STLSQ(threshold=0.0, alpha=RIDGE * len(tau), max_iter=1), feature_library=library
+        optimizer=pysindy.STLSQ(threshold=0.0, alpha=RIDGE * len(tau), max_iter=1, unbias=False),
+        feature_library=library,
     )
 
     def solve() -> object:

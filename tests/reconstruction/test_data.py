@@ -5,14 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+from synthetic import LOWER, UPPER, fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.conditions.indicators import size
+from armloop.excitation import MotionRanges
 from armloop.log import MotionLog, write_log
 from armloop.pieces import log_sources
 from armloop.reconstruction import Options, Reconstruction, reconstruct
 from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.sorter import Sorter
+from armloop.sampling import inverse_dynamics_samples
 from armloop.signals import Conditioning, ShortRunError, condition
 from armloop.workers import Processes, Workers
 
@@ -99,6 +101,23 @@ def test_the_reference_does_not_grow_with_the_data(
     assert 0.15 < reference.held_out.mean() < 0.25
     total = data.sum(lambda chunk: len(chunk.blocks))
     assert total >= 3 * len(reference.blocks)
+
+
+def test_the_reference_meets_every_fold_and_a_chunk_may_lack_a_condition(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # one file per condition, no time series, five times as many samples as the reference takes
+    monkeypatch.setattr("armloop.reconstruction.data.REFERENCE", 720)
+    ranges = MotionRanges(LOWER, UPPER, np.full(3, 1.5), np.full(3, 3.0))
+    logs = list(inverse_dynamics_samples(three_axis(), ranges, (600, 1500, 1500), seed=2).values())
+    data = Data.streamed(logs, Conditioning(cutoff_hz=0), OPTIONS)
+    assert 0.15 < data.reference.held_out.mean() < 0.25
+    assert 0.15 < data.reference.validation.mean() < 0.25
+    options = Options(max_order=2)
+    how = Conditioning(cutoff_hz=0)
+    streamed = reconstruct(logs, three_axis(), conditioning=how, options=options, in_memory=0)
+    assert streamed.reports[0].orders == [2, 0] and streamed.reports[0].terms == [0, 2, 1]
+    assert [report.samples[0] for report in streamed.reports] == [480, 1200, 1200]
 
 
 def test_a_log_too_short_for_the_filter_is_left_out_unless_all_are(logs: list[MotionLog]) -> None:

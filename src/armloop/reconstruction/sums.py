@@ -84,7 +84,8 @@ class Choice:
             rows &= np.isin(self.sorter(motion), self.conditions)
         part = _rows(motion, rows)
         tau = samples.tau[rows]
-        rest = tau - self.inherited.torque(part)
+        # A chunk may have no sample of a condition, and an empty motion has no first instant.
+        rest = tau - self.inherited.torque(part) if len(tau) else tau
         return Usable(part, tau, rest, samples.moving[rows], chunk.validation[rows], chunk.blocks[rows])
 
 
