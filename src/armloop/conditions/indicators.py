@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 #: Size that counts as exactly zero, relative to the largest.
 _NOTHING = 1e-6
 _ROUNDS = 3
+#: A joint whose RMS is this part of the largest is not enlarged further: it rests, and its signal is noise.
+_AT_REST = 0.02
 
 
 def paper_indicator(a: Array, h: float, weight: float) -> Array:
@@ -49,12 +51,12 @@ def units(a: Array) -> Array:
     The noise is that of the quiet samples, which are known once the size is: three rounds. The first is in units
     of each joint's RMS, so that joints of small numbers are seen; if a joint at rest then drowns the others in its
     noise and there seems to be no quiet part, it is in units common to all joints. The upper quartile, not the
-    RMS, because some motion may pass for noise in the first round. Where there is no quiet part at all, the unit
-    is the joint's RMS.
+    RMS, because some motion may pass for noise in the first round. Where there is no quiet part at all, the common
+    units stand.
     """
     rms = np.sqrt(np.mean(a**2, axis=0))
     least = max(_NOTHING * float(rms.max(initial=0.0)), 1e-300)
-    own = np.maximum(rms, least)
+    own = np.maximum(rms, max(least, _AT_REST * float(rms.max(initial=0.0))))
     for unit in (own, np.full_like(own, own.max())):
         total = np.linalg.norm(a / unit, axis=1)
         if noise_floor(total) is not None:
