@@ -81,7 +81,9 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         for unknown, error, freedom in zip(part.unknowns, part.std_error, part.freedom, strict=True):
             place = table[unknown.kind]
             where = place if unknown.joint is None else place[unknown.joint]
-            where[unknown.name] = _entry(error, freedom)
+            # what the fitted samples do not determine has no error; it must not spoil the model's file
+            if np.isfinite(error) and np.isfinite(freedom):
+                where[unknown.name] = _entry(error, freedom)
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
@@ -253,5 +255,6 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
             if chosen.any():
                 error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
                 freedom = float(part.freedom[chosen > 0].min())
-                found[key] = {"value": float(value), **_entry(error, freedom)}
+                if np.isfinite(error) and np.isfinite(freedom):
+                    found[key] = {"value": float(value), **_entry(error, freedom)}
     return found
