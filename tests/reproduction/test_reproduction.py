@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from armloop.reproduction.noise_study import least_counts
 from armloop.reproduction.outcome import Outcome
 from armloop.reproduction.readings import READINGS, Reading, collected
 from armloop.reproduction.sorting_motion import sorting_motion
+from armloop.reproduction.spread import in_words, spread
 
 
 def random_motion(n, samples, seed=0):
@@ -209,3 +211,22 @@ def test_the_place_and_the_number_of_draws_are_checked_first(tmp_path, capsys):
 def test_items_come_in_the_papers_order():
     assert chosen(["fig9", "table2"]) == ["table2", "fig9"]
     assert chosen([]) == list(registry.PAPER)
+
+
+def test_every_item_beyond_the_paper_has_its_module():
+    for name in registry.BEYOND:
+        assert name not in registry.PAPER
+        assert find_spec(f"armloop.reproduction.beyond_{name}") is not None
+    outcome = registry.run_item("friction", Context(draws=1, processes=1))
+    assert abs(outcome.ours["profile"]["median"][2] - 0.1) < 0.01
+
+
+def test_spread_leaves_out_what_is_not_finite():
+    assert spread([[1.0, np.nan], [3.0, np.nan]]) == {
+        "median": [2.0, None],
+        "least": [1.0, None],
+        "largest": [3.0, None],
+        "draws": 2,
+    }
+    assert in_words([4.0, 6.0, np.nan, 5.0]) == "5 (4–6)"
+    assert in_words([0.25, 1.0]) == "0.625 (0.250–1.00)"
