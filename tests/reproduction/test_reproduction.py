@@ -99,13 +99,18 @@ def test_the_literal_reading_minimises_the_norm_not_squared():
 
 def test_noise_has_the_stated_ratio():
     exact = collected(SCARA, None, 5, Reading())
-    for how in ("joint", "matrix", "unit"):
+    for how in ("joint", "matrix", "unit", "record"):
         noisy = collected(SCARA, (60.0, 40.0, 20.0), 5, Reading(noise=how))
         noise = np.asarray(noisy["varying"].vdot) - np.asarray(exact["varying"].vdot)
         power = np.mean(np.asarray(exact["varying"].vdot) ** 2, axis=0)
-        reference = {"joint": power, "matrix": np.full(4, power.mean()), "unit": np.ones(4)}[how]
+        reference = {
+            "joint": power,
+            "matrix": np.full(4, power.mean()),
+            "unit": np.ones(4),
+            "record": np.full(4, 0.4 * power.mean()),
+        }[how]
         np.testing.assert_allclose(np.mean(noise**2, axis=0), reference / 100, rtol=0.1)
-        assert not noisy["static"].v.any()
+        assert noisy["static"].v.any() == (how == "record")
         np.testing.assert_array_equal(noisy["varying"].tau, exact["varying"].tau)
 
 
