@@ -22,9 +22,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=MODEL.json",
-        help="step1 and step3 are the feedforwards of pid_step1 and pid_step3, `model` serves both; any other NAME "
-        "adds a controller pid_NAME. Without any, a model is reconstructed from data collected on the "
-        "scenario's arm first",
+        help="step1, step2 and step3 are the feedforwards of pid_step1, pid_step2 and pid_step3, computed_torque is that "
+        "controller's model, `model` serves all of them; any other NAME adds a controller pid_NAME. Without any, a "
+        "model is reconstructed from data collected on the scenario's arm first, if a controller needs it",
     )
     p.add_argument("--out", default=None, help="folder for tracking.json, plots and replay.html")
     add_json(p)
@@ -38,6 +38,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.loop import run_scenario
     from armloop.model import ReconstructedModel, load_model
     from armloop.reports.tables import eta_table
+    from armloop.reports.tracking_tables import metrics_table
 
     folder = out_folder(options.out) if options.out else None
     scenario = load_tracking(options.scenario)
@@ -46,6 +47,8 @@ def run(options: argparse.Namespace) -> None:
         name, equals, path = item.partition("=")
         if not equals or not name.replace("_", "").isalnum() or not path:
             raise InputError(f"--model {item!r}: write NAME=MODEL.json, such as step3=model.json")
+        if name == "exact":
+            raise InputError(f"--model {item!r}: exact is the simulated arm's own model; choose another name")
         if name in models:
             raise InputError(f"--model {item!r}: {name!r} is given twice")
         models[name] = load_model(path, scenario.plant.arm)
@@ -54,5 +57,6 @@ def run(options: argparse.Namespace) -> None:
         print_json(answer)
         return
     print(eta_table(results, paper=scenario.name == "three_axis_tracking"))
+    print(f"\n{metrics_table(results)}")
     if folder is not None:
         print(f"\nwritten: {folder}/tracking.json, tracking.png, replay.html")

@@ -7,8 +7,11 @@ knows `Optional[X]`, not `X | None`.
 from dataclasses import dataclass, field
 from typing import Optional
 
-CONTROLLERS = ("pid", "pid_step1", "pid_step3")
-"""The controllers of the paper: without a model, Eq. (35) and Eq. (36)."""
+CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "exact")
+"""PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with the
+simulated arm's own inverse dynamics, which no reconstruction can reach."""
+PAPER = ("pid", "pid_step1", "pid_step3")
+"""The controllers of Fig. 15."""
 
 
 @dataclass
@@ -87,5 +90,6 @@ class TrackingData:
     kd: list[float] = field(default_factory=lambda: [2.0])  # N*m*s/rad
     reference: ReferenceData = field(default_factory=ReferenceData)
     score: list[float] = field(default_factory=lambda: [20.0, 40.0])  # s, the interval that is scored
-    controllers: list[str] = field(default_factory=lambda: list(CONTROLLERS))
+    controllers: list[str] = field(default_factory=lambda: list(PAPER))
+    bandwidth: float = 20.0  # rad/s, of computed torque: errors decay critically damped
     random_seed: int = 0

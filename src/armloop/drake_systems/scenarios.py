@@ -20,7 +20,7 @@ from armloop.arm import Arm, load_arm
 from armloop.drake_systems.collection import CollectionPlan, PlantConfig
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
-from armloop.drake_systems.scenario_data import CONTROLLERS, PlanData, PlantData, TrackingData
+from armloop.drake_systems.scenario_data import CONTROLLERS, PAPER, PlanData, PlantData, TrackingData
 from armloop.drake_systems.speed_mode import Instruments
 from armloop.errors import ArmError, LogError, ScenarioError
 from armloop.excitation import (
@@ -52,6 +52,7 @@ class TrackingScenario:
     """A tracking experiment, validated.
 
     score : (start, end) s, the interval that is scored; controllers : names among `CONTROLLERS`
+    bandwidth : rad/s, of computed torque
     """
 
     name: str
@@ -59,8 +60,9 @@ class TrackingScenario:
     gains: PidGains
     reference: Reference
     score: tuple[float, float]
-    controllers: tuple[str, ...] = CONTROLLERS
+    controllers: tuple[str, ...] = PAPER
     seed: int = 0
+    bandwidth: float = 20.0
 
 
 def plant_names() -> list[str]:
@@ -142,6 +144,10 @@ def load_tracking(spec: str | Path) -> TrackingScenario:
         raise ScenarioError(
             f"{path}: score is {data.score}; it must be a start and an end in 0 to {reference.duration:g} s"
         )
+    if not 0 < data.bandwidth <= 1 / plant.config.time_step:
+        raise ScenarioError(
+            f"{path}: bandwidth is {data.bandwidth}; it must be above 0 and at most {1 / plant.config.time_step:g} rad/s"
+        )
     return TrackingScenario(
         path.stem,
         plant,
@@ -150,6 +156,7 @@ def load_tracking(spec: str | Path) -> TrackingScenario:
         (data.score[0], data.score[1]),
         tuple(dict.fromkeys(data.controllers)),
         data.random_seed,
+        data.bandwidth,
     )
 
 
