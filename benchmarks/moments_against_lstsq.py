@@ -86,7 +86,7 @@ def show(title: str, results: dict[str, dict]) -> None:
                 f"{result['seconds'] / ours['seconds']:.1f}",
                 f"{max(result['held_out']):.1e}",
                 f"{result['peak']:.0f} MB ({result['growth']:.0f})",
-                f"{result['peak'] / ours['peak']:.1f}",
+                f"{result['peak'] / ours['peak']:.1f} ({result['growth'] / ours['growth']:.1f})",
             ]
         )
     header = ["", "candidates", "CPU time", "times ours", "held-out error", "peak memory", "times ours"]
