@@ -15,7 +15,16 @@ EXAMPLE = (
 def arguments(p: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     p.add_argument(
-        "scenario", metavar="SCENARIO", help="a built-in scenario (three_axis_tracking) or a YAML file"
+        "scenario",
+        metavar="SCENARIO",
+        help="a built-in scenario (three_axis_tracking, scara_pick_and_place, ur10e_tracking, ..) or a YAML file; "
+        "FILE:NAME for one of several in a file (three_axis_tracking:all_controllers)",
+    )
+    p.add_argument(
+        "--arm",
+        default=None,
+        metavar="URDF",
+        help="the arm of a scenario that leaves it open (ur10e_tracking)",
     )
     p.add_argument(
         "--model",
@@ -41,7 +50,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.reports.tracking_tables import metrics_table
 
     folder = out_folder(options.out) if options.out else None
-    scenario = load_tracking(options.scenario)
+    scenario = load_tracking(options.scenario, options.arm)
     models: dict[str, ReconstructedModel] = {}
     for item in options.model:
         name, equals, path = item.partition("=")
