@@ -25,6 +25,9 @@ from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown
 
 Array = NDArray[np.float64]
 
+#: Part of the misfit that another iteration must remove to be worth one more.
+_WORTHWHILE = 1e-3
+
 
 def solve_given_terms(
     model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 3
@@ -58,8 +61,11 @@ def solve(
     for _ in range(iterations):
         model = moved(model, equations.steps())
         equations = assembled(model)
-        if equations.misfit() < error:
-            best, error = model, equations.misfit()
+        new, gained = equations.misfit(), error - equations.misfit()
+        if new < error:
+            best, error = model, new
+        if gained < _WORTHWHILE * start:
+            break
     return best, error < start
 
 

@@ -155,14 +155,14 @@ class Assembled:
         todo = [problem for problem in problems(model) if problem.unknowns]
         whole = np.zeros(samples.motion.samples, dtype=np.intp)
         spread = np.ones((len(fitted), model.arm.n))
-        sums = [_equations(problem, samples, fitted, whole, spread) for problem in todo]
-        residual, _ = _residuals(todo, samples, fitted)
+        squares = np.zeros(model.arm.n)
+        sums = [_equations(problem, samples, fitted, whole, spread, squares) for problem in todo]
         rows = np.logical_or.reduce([one.rows for one in fitted])
         return Assembled(
             [problem.unknowns for problem in todo],
             [_summed(e.jacobian, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
             [_summed(e.score, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
-            (residual**2).sum(axis=0),
+            squares,
             (samples.tau**2 * rows).sum(axis=0),
         )
 
@@ -266,11 +266,15 @@ def _equations(
     fitted: Sequence[Fitted],
     blocks: NDArray[np.intp],
     spread: Array,
+    squares: Array | None = None,
 ) -> Equations:
+    """The estimating equations by blocks; ``squares`` (n,) is given the squared residuals of each joint."""
     p, B = len(problem.unknowns), int(blocks[-1]) + 1
     stages = _stages(problem, fitted)
     jacobian, score, count = np.zeros((B, p, p)), np.zeros((B, p)), np.zeros((B, p))
     for portion in _walk(problem, samples, fitted):
+        if squares is not None:
+            squares[portion.joint] += portion.r @ portion.r
         weight = 1 / max(spread[portion.stage, portion.joint], 1e-300) if problem.weighted else 1.0
         own = stages[portion.where] == portion.stage
         seen = stages[portion.where] <= portion.stage
