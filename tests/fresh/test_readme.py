@@ -88,7 +88,7 @@ def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path,
         for line in commands("armloop")
         if "$UR10E" in line
     ]
-    assert len(outputs) == 3
+    assert len(outputs) == 4
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (mass,) = re.findall(r"`payload`, ([\d.]+) ± ", text)
     assert mass in outputs[2]
