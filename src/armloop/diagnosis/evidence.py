@@ -43,7 +43,9 @@ class Evidence:
     rows: NDArray[np.bool_]
     blocks: NDArray[np.intp]
     context: Context
-    _columns: dict[tuple[str, int | None, float], Array] = field(default_factory=dict, repr=False)
+    _columns: dict[tuple[tuple[str, int | None, int | None], float], Array] = field(
+        default_factory=dict, repr=False
+    )
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -59,6 +61,12 @@ class Evidence:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
         return Evidence(model, samples, scale, samples.moving, blocks, context)
+
+    def knowing(self, known: list[AddedEffect]) -> Evidence:
+        """The same run with columns as a model sees them that has ``known`` effects."""
+        model = self.model.with_effects(known)
+        context = model.context(self.samples.motion, [added.effect for added in known])
+        return replace(self, context=replace(context, period=self.context.period), _columns={})
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -79,7 +87,7 @@ class Evidence:
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) columns of an effect through the run's filter, computed once."""
-        key = (effect.name, effect.joint, shape)
+        key = (effect.place, shape)
         if key not in self._columns:
             self._columns[key] = smooth(self.samples, effect.full_columns(self.context, shape))
         return self._columns[key]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +30,7 @@ ALIKE = 1.0
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
 _MOST_EFFECTS = 4
+_REFITS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +77,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
     while len(found) < _MOST_EFFECTS:
         trials = []
         for effect in listed:
-            if any(f.effect.name == effect.name and f.effect.joint == effect.joint for f in found):
+            if any(f.effect.place == effect.place for f in found):
                 continue
             trial = _trial(evidence, residual, current, effect)
             if trial is None or not _worth(current, trial, rows_per_joint):
@@ -101,7 +103,8 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
 
 
 def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
-    if effect.joint is not None and not evidence.rows[:, effect.joint - 1].any():
+    joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
+    if not all(evidence.rows[:, j].any() for j in joints):
         return None  # a joint at rest shows nothing
     shapes = list(effect.shapes(evidence.context))
     if not shapes:
@@ -118,20 +121,13 @@ def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) ->
 def _best_shape(
     evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]
 ) -> Shape:
-    """The shape whose columns explain most of what the current effects leave on the effect's joint.
+    """The shape whose columns explain most of what the current effects leave on the effect's joints.
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold.
     """
-    assert effect.joint is not None
-    j = effect.joint - 1
-    left = np.array(residual[:, j])
-    rows = evidence.rows[:, j]
-    left[rows] = current.held_out[current.stacked.joint == j] * evidence.scale[j]
-    each = [effect.columns(evidence.context, shape) for shape in shapes]
-    X = smooth(evidence.samples, np.hstack(each))[rows]
-    width = each[0].shape[1]
-    X = X.reshape(len(X), len(shapes), width)
-    fold, y = evidence.fold[rows], left[rows]
+    joints = range(residual.shape[1]) if effect.other_joint or effect.joint is None else [effect.joint - 1]
+    X, y, fold = _shape_problem(evidence, current, effect, shapes, joints)
+    width = X.shape[2]
     G = [np.einsum("ksp,ksr->spr", X[fold == k], X[fold == k]) for k in range(FOLDS)]
     b = [np.einsum("ksp,k->sp", X[fold == k], y[fold == k]) for k in range(FOLDS)]
 
@@ -143,6 +139,22 @@ def _best_shape(
 
     every = list(range(FOLDS))
     return Shape(best(every), tuple(best([other for other in every if other != k]) for k in every))
+
+
+def _shape_problem(
+    evidence: Evidence, current: Fit, effect: Effect, shapes: list[float], joints: Iterable[int]
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Columns (R, S, p) of every shape, what is left (R,), and the fold of each row, of the effect's joints."""
+    each = [effect.columns(evidence.context, shape) for shape in shapes]
+    width = each[0].shape[-1]
+    parts, left, fold = [], [], []
+    for j in joints:
+        rows = evidence.rows[:, j]
+        columns = smooth(evidence.samples, np.hstack([c if c.ndim == 2 else c[:, j] for c in each]))[rows]
+        parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
+        left.append(current.held_out[current.stacked.joint == j])
+        fold.append(evidence.fold[rows])
+    return np.concatenate(parts), np.concatenate(left), np.concatenate(fold)
 
 
 def _gain(current: Fit, trial: Fit) -> float:
@@ -184,10 +196,13 @@ def _by_joint(worse: Fit, better: Fit, n: int) -> Array:
 
 
 def _refit(evidence: Evidence, current: Fit) -> Fit:
-    """Fit once more with the friction that the found loads cause, where the model's friction feels load."""
+    """Fit again with what the found effects change of each other: loads raise friction, gains scale both."""
     if not current.effects:
         return current
-    added = [AddedEffect(e, p) for e, p in zip(current.effects, current.parameters, strict=True)]
-    again = fit(evidence, evidence.residual(added), current.effects, current.shapes)
-    better = (again.held_out**2).sum() < (current.held_out**2).sum()
-    return again if better else current
+    for _ in range(_REFITS):
+        added = [AddedEffect(e, p) for e, p in zip(current.effects, current.parameters, strict=True)]
+        again = fit(evidence.knowing(added), evidence.residual(added), current.effects, current.shapes)
+        if (again.held_out**2).sum() >= (current.held_out**2).sum():
+            break
+        current = again
+    return current

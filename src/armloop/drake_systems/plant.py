@@ -95,11 +95,9 @@ class ArmPlant(Diagram):
 
     def _connect(self, builder: DiagramBuilder) -> None:
         plant, effects = self.plant, self.effects
-        loads = builder.AddNamedSystem(
+        loads = self._loads = builder.AddNamedSystem(
             "loads",
-            JointLoads(
-                plant, self.friction, servo=self._servo, springs=effects.springs, ripples=effects.ripples
-            ),
+            JointLoads(plant, self.friction, servo=self._servo, effects=effects, X_tool=self.arm.X_tool),
         )
         builder.Connect(plant.get_state_output_port(), loads.GetInputPort("state"))
         builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
@@ -129,6 +127,7 @@ class ArmPlant(Diagram):
         """Put the arm at positions `q` and velocities `v`, (n,) each, inside a diagram's context."""
         context = self.plant.GetMyMutableContextFromRoot(root_context)
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
+        self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
 
 
 def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = None) -> None:
@@ -166,9 +165,10 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
 
 
 def _with_effects(friction: Sequence[JointFriction], effects: Realisation) -> tuple[JointFriction, ...]:
+    """Friction of Eq. (34) with what effects change of its numbers; the rest of their friction is not of its form."""
     return tuple(
-        JointFriction(f.static + level, f.coulomb + level, f.stribeck_velocity, f.viscous + viscous)
-        for f, level, viscous in zip(friction, effects.coulomb, effects.viscous, strict=True)
+        JointFriction(f.static + dry.level, f.coulomb + dry.level, f.stribeck_velocity, f.viscous + viscous)
+        for f, dry, viscous in zip(friction, effects.dry, effects.viscous, strict=True)
     )
 
 
