@@ -5,15 +5,19 @@ import pytest
 from numpy.testing import assert_allclose
 
 from armloop.arm import load_arm
+from armloop.errors import InputError, LogError
 from armloop.excitation import (
     MotionRanges,
     constant_velocity_segments,
     fourier_reference,
     paper_reference,
+    ranges_with,
+    read_reference,
     speeds,
     static_poses,
     static_segments,
     within,
+    write_reference,
 )
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.sampling import inverse_dynamics_samples
@@ -159,3 +163,66 @@ def test_noise_has_the_stated_ratio():
         ratio = np.mean(clean**2, axis=0) / np.mean((dirty - clean) ** 2, axis=0)
         assert_allclose(10 * np.log10(ratio), decibel, atol=0.3)
     assert np.array_equal(exact.tau, noisy.tau)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_reference_survives_its_file(tmp_path, suffix):
+    made = fourier_reference(RANGES, 12.0, 5)
+    path = tmp_path / f"reference{suffix}"
+    assert write_reference(path, made, 100.0) == 1201
+    read = read_reference(path, 3)
+    assert read.duration == 12.0
+    t = np.linspace(0.0, 12.0, 3457)
+    # a quintic over 10 ms of a motion below 1 Hz
+    for ours, theirs, size in zip(read.evaluate(t), made.evaluate(t), (1e-9, 1e-8, 1e-6), strict=True):
+        assert_allclose(ours, theirs, atol=size)
+
+
+def test_a_reference_rests_outside_its_table(tmp_path):
+    write_reference(tmp_path / "r.csv", fourier_reference(RANGES, 6.0, 5), 50.0)
+    read = read_reference(tmp_path / "r.csv", 3)
+    q, v, vdot = read.evaluate([-1.0, 6.0, 9.0])
+    assert_allclose(q, [read.q[0], read.q[-1], read.q[-1]])
+    assert not v[[0, 2]].any() and not vdot[[0, 2]].any()
+    assert_allclose(v[1], read.v[-1])
+
+
+def _degrees(lines):
+    return [lines[0]] + [
+        ",".join([c[0], *(str(57.3 * float(x)) for x in c[1:4]), *c[4:]])
+        for c in (x.split(",") for x in lines[1:])
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda lines: [lines[0].replace("vdot2", "a2"), *lines[1:]], "column vdot2 is missing"),
+        (
+            lambda lines: [*lines[:3], lines[2], *lines[3:]],
+            r"column time, row 3 \(line 4\): .* does not rise",
+        ),
+        (lambda lines: [lines[0], *lines[2:]], "a reference starts at time 0"),
+        (lambda lines: lines[:2], "1 row; a reference has at least 2"),
+        (_degrees, r"column v\d, row \d+ .*must be the rate of change of q"),
+    ],
+)
+def test_faulty_references(tmp_path, change, says):
+    path = tmp_path / "r.csv"
+    write_reference(path, fourier_reference(RANGES, 6.0, 5), 50.0)
+    path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
+    with pytest.raises(LogError, match=says):
+        read_reference(path, 3)
+
+
+def test_stated_ranges():
+    arm = load_arm("three_axis")
+    ranges = ranges_with(arm, None, velocity=[1.0, 0.5, 0.25], lower=[-1, -1, -1])
+    assert_allclose(ranges.acceleration, [2.0, 1.0, 0.5])
+    assert_allclose(ranges.lower, -1)
+    assert_allclose(ranges.upper, MotionRanges.of(arm).upper)
+    assert_allclose(ranges_with(arm, RANGES_3, velocity=[1, 1, 1]).acceleration, np.pi)
+    with pytest.raises(InputError, match="joint 'joint_2' would go from -3 to"):
+        ranges_with(arm, None, lower=[-1, -3, -1])
+    with pytest.raises(InputError, match="no motion is within the ranges: each range must have lower below"):
+        ranges_with(arm, None, lower=[1, 1, 1], upper=[1, 1, 1])

@@ -76,6 +76,10 @@ class MotionLog:
         edges = [0, *(int(gap) + 1 for gap in gaps), self.samples]
         return [slice(first, last) for first, last in pairwise(edges)]
 
+    def read(self) -> "MotionLog":
+        """Return the log itself: in memory it is its own source (see `armloop.pieces`)."""
+        return self
+
     def select(self, rows: slice) -> "MotionLog":
         """Return the log of these samples only; the arrays are views."""
         vdot = None if self.vdot is None else self.vdot[rows]
@@ -90,29 +94,29 @@ def read_log(
     joints: int | None = None,
     tau_unit: str = "N*m",
     drive_gains: ArrayLike | None = None,
+    rows: tuple[int, int] | None = None,
 ) -> MotionLog:
     """Read a motion log and check that it is one.
 
     joints : how many joints the arm has; None takes what the file has
     tau_unit : what the columns `tau` hold, "N*m" or "A"
     drive_gains : (n,) N*m/A (N/A); `tau` is multiplied by them and the log's unit is "N*m"
+    rows : first row and the one after the last, counted from 0, of a Parquet file; None reads all
 
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
     """
     path = Path(path)
     if tau_unit not in TAU_UNITS:
         raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
-    header = read_header(path)
-    n, has_vdot = _check_header(path, header)
-    if joints is not None and n != joints:
-        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
+    n, has_vdot = check_header(path, joints)
     gains = None if drive_gains is None else _check_gains(path, drive_gains, n)
 
     quantities = ["q", "v", "tau", "vdot"] if has_vdot else ["q", "v", "tau"]
-    table = read_columns(path, ["time", *(f"{kind}{j}" for kind in quantities for j in range(1, n + 1))])
+    names = ["time", *(f"{kind}{j}" for kind in quantities for j in range(1, n + 1))]
+    table = read_columns(path, names, rows)
     stacked = {kind: np.stack([table[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in quantities}
     log = MotionLog(table["time"], **stacked, name=path.stem, tau_unit=tau_unit)
-    _check_time(path, log.time)
+    _check_time(path, log.time, rows[0] if rows else 0)
     _check_units(path, log)
     if gains is None:
         return log
@@ -131,8 +135,20 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     write_columns(Path(path), columns)
 
 
-def _check_header(path: Path, header: Sequence[str]) -> tuple[int, bool]:
-    """Return the number of joints and whether accelerations are there."""
+def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
+    """Return the number of joints of a file and whether accelerations are there, from its header alone.
+
+    joints : how many joints the arm has; None takes what the file has
+
+    Raises `LogError` when the file is missing or its columns are not those of a log.
+    """
+    n, has_vdot = _columns(path, read_header(path))
+    if joints is not None and n != joints:
+        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
+    return n, has_vdot
+
+
+def _columns(path: Path, header: Sequence[str]) -> tuple[int, bool]:
     if len(header) == 1 and re.search(r"[;\t ]", header[0]):
         raise LogError(f"{path}: the header is one column, {header[0][:40]!r}; put commas between the names")
     found: dict[str, set[int]] = {"q": set(), "v": set(), "tau": set(), "vdot": set()}
@@ -175,14 +191,14 @@ def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float
     return gains
 
 
-def _check_time(path: Path, time: NDArray[np.float64]) -> None:
+def _check_time(path: Path, time: NDArray[np.float64], first: int = 0) -> None:
     if len(time) < FEWEST_SAMPLES:
         raise LogError(f"{path}: {len(time)} rows; a motion log has at least {FEWEST_SAMPLES}")
     late = np.flatnonzero(np.diff(time) <= 0)
     if len(late):
         row = int(late[0]) + 1
         raise LogError(
-            f"{path}: column time, {place(path, row)}: {time[row]:.9g} follows {time[row - 1]:.9g}; "
+            f"{path}: column time, {place(path, first + row)}: {time[row]:.9g} follows {time[row - 1]:.9g}; "
             "time must rise strictly from row to row"
         )
 

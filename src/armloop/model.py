@@ -27,7 +27,7 @@ from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
 from armloop.log import TAU_UNITS
 from armloop.motion import Motion
-from armloop.pointwise import Pointwise, pointwise
+from armloop.pointwise import Drive, pointwise
 from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
@@ -85,6 +85,8 @@ class ReconstructedModel:
             ``rmse``, ``rms`` per joint, ``nrmse``.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
+        uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
+            empty where nobody computed them.
     """
 
     arm: Arm
@@ -95,6 +97,7 @@ class ReconstructedModel:
     baseline: dict[str, Any] = field(default_factory=dict)
     effects: tuple[AddedEffect, ...] = ()
     history: dict[str, Any] = field(default_factory=dict)
+    uncertainty: dict[str, Any] = field(default_factory=dict)
 
     def rigid_body(self, motion: Motion, step: int = 3) -> Array:
         """(N, n) torque of the components without friction and effects."""
@@ -171,10 +174,13 @@ class ReconstructedModel:
         rest = self.rigid_body(part).ravel() - Y @ nominal
         return nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
 
-    def feedforward(self, q: Array, v: Array, vdot: Array, step: int = 3) -> Array:
+    def feedforward(
+        self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
+    ) -> Array:
         """(n,) torque a controller should supply for one sample; sensor effects excluded.
 
-        Friction with memory acts as if fully slid: a single sample has no history.
+        Friction with memory acts as if fully slid: a single sample has no history. ``sliding`` (n,) are the
+        velocities to take friction at, by default v.
         """
         if step not in self._pointwise:
             added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
@@ -190,10 +196,10 @@ class ReconstructedModel:
                     terms[a.effect.joint - 1].append(term)
             friction = FrictionLaw(tuple(map(tuple, terms)))
             self._pointwise[step] = pointwise(self.arm, self.components, friction, effects, step)
-        return self._pointwise[step](q, v, vdot)
+        return self._pointwise[step](q, v, vdot, sliding)
 
     @cached_property
-    def _pointwise(self) -> dict[int, Pointwise]:
+    def _pointwise(self) -> dict[int, Drive]:
         return {}
 
     def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:
@@ -237,6 +243,7 @@ class ReconstructedModel:
             "recorded": self.recorded,
             "baseline": self.baseline,
             "history": self.history,
+            "uncertainty": self.uncertainty,
         }
 
     def _check(self, motion: Motion) -> None:
@@ -301,6 +308,7 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         baseline=_baseline(data["baseline"], arm.n),
         effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
         history=dict(data["history"]),
+        uncertainty=_uncertainty(data.get("uncertainty", {}), arm.n),
     )
     half = np.full((1, arm.n), 0.5)
     for added in model.effects:
@@ -332,4 +340,15 @@ def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
             raise ModelError(
                 f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"
             )
+    return dict(data)
+
+
+def _uncertainty(data: dict[str, Any], n: int) -> dict[str, Any]:
+    for key in {"joints", "friction", "stribeck"} & set(data):
+        if len(data[key]) != n:
+            raise ModelError(f"uncertainty: {key} has {len(data[key])} joints, the arm has {n}")
+    tables = [*data.get("joints", []), *data.get("friction", []), data.get("shared", {})]
+    for name, entry in (item for table in tables for item in table.items()):
+        if not all(0 <= float(entry[key]) < np.inf for key in ("std_error", "degrees_of_freedom")):
+            raise ModelError(f"uncertainty: {name}: std_error must be a number of at least 0, not {entry}")
     return dict(data)

@@ -1,30 +1,35 @@
-"""Inverse dynamics of one sample by the recursive Newton-Euler algorithm, in plain Python arithmetic.
+"""Inverse dynamics by the recursive Newton-Euler algorithm, in plain arithmetic.
 
 Luh, Walker and Paul 1980; Siciliano et al., Robotics, Sect. 7.5. One sample at 1 kHz is too little work for
-numpy: its call overhead alone costs several times what these few hundred multiplications do.
+numpy: its call overhead alone costs several times what these few hundred multiplications do. Plain arithmetic also
+takes other numbers than floats: arrays of samples, AutoDiffXd, symbolic Expressions.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.functions import MATH, Functions
 
 Array = NDArray[np.float64]
-Vector = tuple[float, float, float]
-InverseDynamics = Callable[[Array, Array, Array], list[float]]
+Vector = tuple[Any, Any, Any]
+InverseDynamics = Callable[[Sequence[Any] | Array, Sequence[Any] | Array, Sequence[Any] | Array], list[Any]]
 
 
-def inverse_dynamics(arm: Arm, parameters: Array, gravity: Array | None = None) -> InverseDynamics:
-    """A function (q, v, vdot), each (n,), -> n joint torques of links with these parameters.
+def inverse_dynamics(
+    arm: Arm, parameters: Array, gravity: Array | None = None, functions: Functions = MATH
+) -> InverseDynamics:
+    """A function (q, v, vdot), each of n numbers, -> n joint torques of links with these parameters.
 
     Args:
         parameters: (10 n,) link parameters in the order of :func:`armloop.kinematics.regressor`.
         gravity: (3,) m/s² in the base frame; the arm's own by default.
+        functions: for numbers other than floats; a "number" may be an array of samples.
     """
     n = arm.n
     g = arm.gravity if gravity is None else gravity
@@ -37,7 +42,11 @@ def inverse_dynamics(arm: Arm, parameters: Array, gravity: Array | None = None) 
     # Where a prismatic joint's axis points in the previous link: it does not turn with q.
     slides = [_times(fixed[i], axes[i]) for i in range(n)]
 
-    def torques(q: Array, v: Array, vdot: Array) -> list[float]:
+    sin, cos = functions.sin, functions.cos
+
+    def torques(q: Sequence[Any] | Array, v: Sequence[Any] | Array, vdot: Sequence[Any] | Array) -> list[Any]:
+        # Python's own floats: numpy's scalars take three times as long.
+        q, v, vdot = (x.tolist() if isinstance(x, np.ndarray) else x for x in (q, v, vdot))
         w: Vector = (0.0, 0.0, 0.0)
         wdot: Vector = (0.0, 0.0, 0.0)
         a = upward
@@ -46,11 +55,11 @@ def inverse_dynamics(arm: Arm, parameters: Array, gravity: Array | None = None) 
         forces: list[Vector] = []
         moments: list[Vector] = []
         for i in range(n):
-            axis, rate, accel = axes[i], float(v[i]), float(vdot[i])
+            axis, rate, accel = axes[i], v[i], vdot[i]
             if turning[i]:
-                R_i, p_i = _product(fixed[i], _rotation(axis, float(q[i]))), origins[i]
+                R_i, p_i = _product(fixed[i], _rotation(axis, sin(q[i]), cos(q[i]))), origins[i]
             else:
-                R_i, p_i = fixed[i], _plus(origins[i], slides[i], float(q[i]))
+                R_i, p_i = fixed[i], _plus(origins[i], slides[i], q[i])
             lever = _cross(w, p_i)
             swing, spin = _cross(wdot, p_i), _cross(w, lever)
             a = _into(R_i, (a[0] + swing[0] + spin[0], a[1] + swing[1] + spin[1], a[2] + swing[2] + spin[2]))
@@ -66,7 +75,7 @@ def inverse_dynamics(arm: Arm, parameters: Array, gravity: Array | None = None) 
             p.append(p_i)
             forces.append(force)
             moments.append(moment)
-        tau = [0.0] * n
+        tau: list[Any] = [0.0] * n
         f: Vector = (0.0, 0.0, 0.0)
         m: Vector = (0.0, 0.0, 0.0)
         for i in range(n - 1, -1, -1):
@@ -104,9 +113,9 @@ def _wrench(body: tuple[float, ...], w: Vector, wdot: Vector, a: Vector) -> tupl
     return force, moment
 
 
-def _rotation(axis: Vector, angle: float) -> tuple[Vector, Vector, Vector]:
+def _rotation(axis: Vector, s: Any, c: Any) -> tuple[Vector, Vector, Vector]:
+    """The rotation about a unit axis by an angle with sine s and cosine c (Rodrigues)."""
     x, y, z = axis
-    s, c = math.sin(angle), math.cos(angle)
     k = 1.0 - c
     return (
         (c + k * x * x, k * x * y - s * z, k * x * z + s * y),
@@ -144,7 +153,7 @@ def _cross(x: Vector, y: Vector) -> Vector:
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
 
 
-def _plus(x: Vector, y: Vector, factor: float) -> Vector:
+def _plus(x: Vector, y: Vector, factor: Any) -> Vector:
     return x[0] + factor * y[0], x[1] + factor * y[1], x[2] + factor * y[2]
 
 

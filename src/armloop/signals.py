@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,10 @@ class Conditioning:
         return asdict(self)
 
 
+class ShortRunError(LogError):
+    """No run of a log is long enough for the filter."""
+
+
 @dataclass(frozen=True)
 class LowPass:
     """Zero-phase Butterworth low-pass of order 4 on a uniform grid of ``period`` seconds."""
@@ -68,9 +73,15 @@ class LowPass:
         """Filter (N, ...) along the first axis; runs shorter than the padding get a shorter padding."""
         if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period:
             return x
-        sos = butter(4, self.cutoff_hz, fs=1 / self.period, output="sos")
+        sos = _sections(self.cutoff_hz, self.period)
         pad = min(len(x) - 1, int(np.ceil(1.5 / (self.cutoff_hz * self.period))))
         return sosfiltfilt(sos, x, axis=0, padlen=pad)
+
+
+@lru_cache(maxsize=16)
+def _sections(cutoff_hz: float, period: float) -> Array:
+    """The filter's second-order sections: their design takes longer than filtering a short run."""
+    return np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
 
 
 def uniform_period(time: Array) -> float:
@@ -86,23 +97,27 @@ def derivative(x: Array, period: float) -> Array:
     return np.gradient(x, period, axis=0, edge_order=2)
 
 
-def condition(logs: Sequence[MotionLog], how: Conditioning) -> Samples:
+def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
     ``oversampling`` samples per period of the corner. Half a period of the corner is cut at both ends.
     ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
 
+    Args:
+        noise: (n,) of :func:`velocity_noise`, where it is known from more logs than these.
+
     Returns:
         The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
         the corner of any instant at which the joint is inside its dead zone.
 
     Raises:
-        LogError: no run is long enough for the filter.
+        ShortRunError: no run is long enough for the filter.
     """
     if how.cutoff_hz <= 0:
         return _as_they_are(logs)
-    noise = np.max([_velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
+    if noise is None:
+        noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
     parts = []
     for log in logs:
         for run in log.runs():
@@ -111,7 +126,7 @@ def condition(logs: Sequence[MotionLog], how: Conditioning) -> Samples:
                 parts.append(part)
     if not parts:
         longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
-        raise LogError(
+        raise ShortRunError(
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
             f"{how.cutoff_hz:g} Hz a run must last at least {3 / how.cutoff_hz:.3g} s"
         )
@@ -119,6 +134,23 @@ def condition(logs: Sequence[MotionLog], how: Conditioning) -> Samples:
     time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = float(np.median(np.diff(parts[0][0])))
     return Samples(Motion(time, q, v, vdot, starts), tau, moving.astype(bool), period, how.cutoff_hz)
+
+
+def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
+    """(n,) standard deviation of the noise that a filter of this corner leaves in v.
+
+    It is taken to be as strong below the corner as in the octave above it, where there is hardly any
+    motion; the median over the run with the most samples keeps impacts and reversals out. It is never
+    less than what rounding the recorded v leaves.
+    """
+    run = max(log.runs(), key=lambda run: run.stop - run.start)
+    v, period = log.v[run], uniform_period(log.time[run])
+    octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
+    rough = np.median(np.abs(octave), axis=0) / 0.6745
+    steps = np.abs(np.diff(v, axis=0))
+    resolution = np.min(np.where(steps > 1e-12, steps, np.inf), axis=0)
+    rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)
+    return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
 
 
 def smooth(samples: Samples, x: Array) -> Array:
@@ -162,23 +194,6 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period)))
     keep = slice(trim, len(grid) - trim, stride)
     return grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
-
-
-def _velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
-    """(n,) standard deviation of the noise that a filter of this corner leaves in v.
-
-    It is taken to be as strong below the corner as in the octave above it, where there is hardly any
-    motion; the median over the run with the most samples keeps impacts and reversals out. It is never
-    less than what rounding the recorded v leaves.
-    """
-    run = max(log.runs(), key=lambda run: run.stop - run.start)
-    v, period = log.v[run], uniform_period(log.time[run])
-    octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
-    rough = np.median(np.abs(octave), axis=0) / 0.6745
-    steps = np.abs(np.diff(v, axis=0))
-    resolution = np.min(np.where(steps > 1e-12, steps, np.inf), axis=0)
-    rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)
-    return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
 
 
 def _as_they_are(logs: Sequence[MotionLog]) -> Samples:

@@ -15,6 +15,8 @@ from armloop.errors import LogError
 from armloop.files import replacing
 
 CSV, PARQUET = ".csv", ".parquet"
+#: Rows that a Parquet file keeps together: a reader of some rows has to decode no more than these.
+ROW_GROUP = 1 << 16
 # No time, position or force in SI units is as large; squares and products of what is smaller do not overflow.
 _LARGEST = 1e12
 
@@ -40,13 +42,29 @@ def read_header(path: Path) -> list[str]:
     return [name.strip() for name in names]
 
 
-def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def count_rows(path: Path) -> int | None:
+    """Return the number of rows of a Parquet file, which says it in its footer; None for a CSV.
+
+    The header must have been read. Raises `LogError` when the file is not Parquet.
+    """
+    if path.suffix == CSV:
+        return None
+    import pyarrow.parquet
+
+    return int(pyarrow.parquet.read_metadata(path).num_rows)
+
+
+def read_columns(
+    path: Path, names: Sequence[str], rows: tuple[int, int] | None = None
+) -> dict[str, NDArray[np.float64]]:
     """Return the columns `names` of a file whose header has been read and holds each of them once.
+
+    rows : first row and the one after the last, of a Parquet file only; None reads all
 
     Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
     not a finite number, or the first row that has too few or too many cells.
     """
-    table = _read_parquet(path, names) if path.suffix == PARQUET else _read_csv(path, names)
+    table = _read_parquet(path, names, rows) if path.suffix == PARQUET else _read_csv(path, names)
     faults = {
         name: int(np.argmin(good))
         for name, cells in table.items()
@@ -58,7 +76,8 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
         cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
         wrong = "too large a number" if np.isfinite(table[name][row]) else "not a finite number"
         raise LogError(
-            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
+            f"{path}: column {name}, {place(path, row + (rows[0] if rows else 0))}: {cell!r} is {wrong}; "
+            "correct it or drop the row"
         )
     return table
 
@@ -76,7 +95,7 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> Non
     table = pyarrow.table({name: np.ascontiguousarray(cells) for name, cells in columns.items()})
     with replacing(path) as draft:
         if path.suffix == PARQUET:
-            pyarrow.parquet.write_table(table, draft)
+            pyarrow.parquet.write_table(table, draft, row_group_size=ROW_GROUP)
         else:
             # pyarrow would put the names between quotes; the format shows them bare
             with draft.open("wb") as sink:
@@ -111,12 +130,23 @@ def _parquet_header(path: Path) -> list[str]:
         ) from error
 
 
-def _read_parquet(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def _read_parquet(
+    path: Path, names: Sequence[str], rows: tuple[int, int] | None
+) -> dict[str, NDArray[np.float64]]:
     import pyarrow
     import pyarrow.parquet
 
     try:
-        table = pyarrow.parquet.read_table(path, columns=list(names))
+        with pyarrow.parquet.ParquetFile(path, memory_map=True) as file:
+            if rows is None:
+                table = file.read(columns=list(names))
+            else:
+                ends = np.cumsum([file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)])
+                first, last = np.searchsorted(ends, [rows[0], rows[1] - 1], side="right")
+                # In a worker's process more threads only hinder.
+                table = file.read_row_groups(range(first, last + 1), columns=list(names), use_threads=False)
+                before = int(ends[first - 1]) if first else 0
+                table = table.slice(rows[0] - before, rows[1] - rows[0])
     except (pyarrow.ArrowException, OSError) as error:
         raise LogError(f"{path}: the Parquet data cannot be read; write the file anew") from error
     columns = {}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from armloop.design import Limits, Series, nominal_torque
 from armloop.drake_systems.collection import collect, measure_run
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.scenarios import load_plan, load_plant, plant_for
@@ -126,3 +127,19 @@ def test_any_urdf_has_a_plant(tmp_path):
             plant, part.q, np.sign(part.v.mean(axis=0)) * [np.deg2rad(0.1), 1e-4] + 0 * part.v, 0 * part.v
         )
         assert_allclose(part.tau.mean(axis=0), expected.mean(axis=0), rtol=0.02, atol=0.03)
+
+
+def test_a_motion_of_the_designed_family_is_followed():
+    """What `armloop excite` chooses from: fitted into all limits, from rest to rest."""
+    plant = load_plant("scara")
+    series = Series(4, 6, 6.0)
+    effort = np.array([joint.effort for joint in plant.arm.joints])
+    draft = series.reference(np.random.default_rng(3).normal(size=(4, series.free)))
+    made = Limits(plant.config.ranges, 0.8 * effort, nominal_torque(plant.arm)).fitted(draft, 1e-3)
+    log = measure_run(plant.arm, plant.config, 1, reference=made)
+    q, v, _ = made.evaluate(log.time)
+    assert log.time[-1] > 5.99
+    assert np.all(np.abs(v).max(axis=0) > 0.3 * plant.config.ranges.velocity)
+    assert np.abs(log.q - q).max() < 2e-4
+    assert np.sqrt(np.mean((log.v - v) ** 2, axis=0)).max() < 5e-3
+    assert np.all(np.abs(log.tau).max(axis=0) < effort)

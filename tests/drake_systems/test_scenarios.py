@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from armloop.drake_systems.scenarios import load_plan, load_plant, load_tracking, plant_names
 from armloop.errors import ScenarioError
+from armloop.excitation import fourier_reference, write_reference
 from armloop.resources import scenario_path
 
 OWN = """
@@ -64,6 +65,21 @@ def test_own_plant_and_urdf_beside_the_scenario(tmp_path):
     assert load(tmp_path, OWN.replace("arm: three_axis", "arm: beside.urdf")).plant.arm.n == 3
     scara = OWN.replace("three_axis", "scara").rstrip() + "\n    - {coulomb: 0.1, static: 0.1}\n"
     assert load(tmp_path, scara + "reference: {kind: fourier, duration: 40.0}\n").reference.duration == 40.0
+
+
+def test_a_reference_from_a_file(tmp_path):
+    made = fourier_reference(load_plant("scara").config.ranges, 6.0, seed=4)
+    write_reference(tmp_path / "mine.csv", made, 200.0)
+    scara = "plant: scara\nscore: [1.0, 6.0]\nreference: {kind: csv, file: mine.csv}\n"
+    scenario = load(tmp_path, scara)
+    assert scenario.reference.duration == 6.0
+    t = np.linspace(0, 6, 777)
+    for ours, theirs in zip(scenario.reference.evaluate(t), made.evaluate(t), strict=True):
+        assert_allclose(ours, theirs, atol=1e-6)
+    with pytest.raises(ScenarioError, match=r"reference.file: .*mine.csv: column q4 is of a joint"):
+        load(tmp_path, scara.replace("plant: scara", "plant: three_axis"))
+    with pytest.raises(ScenarioError, match=r"reference\.file is missing"):
+        load(tmp_path, "plant: scara\nreference: {kind: csv}\n")
 
 
 @pytest.mark.parametrize(

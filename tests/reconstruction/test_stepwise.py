@@ -1,7 +1,5 @@
 """The stepwise method finds the paper's orders, hands on what it found, and never sees what is held out."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, conditioned_samples, three_axis
@@ -13,8 +11,8 @@ from armloop.motion import Motion, Samples
 from armloop.progress import silent
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
-from armloop.reconstruction.step import _choose
 from armloop.reconstruction.stepwise import stepwise
+from armloop.reconstruction.trials import HeldOut
 from armloop.regression.sparse import Sparse
 
 # the synthetic states are independent of one another: no correlation between samples
@@ -155,34 +153,23 @@ def test_orders_are_chosen_on_samples_the_trial_did_not_fit(noisy: Samples):
     assert trials[0][1] > 10 * trials[1][1]
 
 
-class _Trial:
-    """A joint whose held-out error per block is known for every library: columns stand for the library."""
-
-    fit = SimpleNamespace(solve=lambda support: None)
-
-    def __init__(self, errors: dict[int, list[float]]) -> None:
-        self.errors = {size: np.array(error) / len(error) for size, error in errors.items()}
-
-    def select(self, moments, columns, size, sparse):
-        return columns
-
-    def held_out(self, support, beta):
-        return float(self.errors[len(support)].sum()), self.errors[len(support)]
-
-
 @pytest.mark.parametrize(
     ("small", "chosen"),
     [
-        ([1.1, 0.9, 1.2, 1.0], (1, 0)),  # worse by less than its spread over the blocks: the smaller library
-        ([1.5, 1.4, 1.6, 1.5], (2, 0)),  # clearly worse: the larger one
+        ([1.1, 0.9, 1.2, 1.0], 0),  # worse by less than its spread over the blocks: the smaller library
+        ([1.5, 1.4, 1.6, 1.5], 1),  # clearly worse: the larger one
     ],
 )
-def test_the_smallest_library_within_a_standard_error_of_the_best_is_chosen(small, chosen):
-    joint = _Trial({1: small, 2: [1.0, 1.0, 1.0, 1.0]})
-    subsets = [((1, 0), np.arange(1)), ((2, 0), np.arange(2))]
-    orders, trials = _choose([joint], subsets, 9, Options())
-    assert orders == chosen
-    assert trials[1] == ([2, 0], 1.0)
+def test_the_smallest_library_within_a_standard_error_of_the_best_is_chosen(
+    small: list[float], chosen: int
+) -> None:
+    # two chunks of two blocks each, one joint
+    parts = []
+    for blocks in (slice(0, 2), slice(2, 4)):
+        errors = np.array([small[blocks], [1.0, 1.0]])
+        squares = ((errors[:, None] - errors[None, :]) ** 2).sum(axis=2)
+        parts.append(HeldOut(errors.sum(axis=1, keepdims=True), squares, 2))
+    assert (parts[0] + parts[1]).smallest() == chosen
 
 
 def test_a_joint_that_never_moves_is_named(noisy: Samples):

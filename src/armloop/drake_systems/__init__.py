@@ -1,24 +1,53 @@
 """Everything that runs in Drake: the plant with friction, data collection, controllers, tracking, replay.
 
-The only room that imports pydrake's systems. A diagram of one's own starts with `add_arm_with_controller`, or
-with the systems it is made of.
+The only room that imports pydrake's systems. A diagram of one's own starts with `add_arm_with_controller`, or with
+the systems it is made of. Names that end in an underscore are templates, `Feedforward_[AutoDiffXd]` for instance.
 """
 
-from armloop.drake_systems.closed_loop import ControlledArm, add_arm_with_controller
-from armloop.drake_systems.feedforward import Feedforward, FeedforwardModel
+from armloop.drake_systems.closed_loop import CONTROLLERS, ControlledArm, add_arm_with_controller
+from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque, ComputedTorque_
+from armloop.drake_systems.effect_system import EffectTorque, EffectTorque_, add_joint_forces
+from armloop.drake_systems.feedforward import Feedforward, Feedforward_, FeedforwardModel
+from armloop.drake_systems.forward_dynamics import ForwardDynamics, ForwardDynamics_
 from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.friction_system import (
+    JointFrictionSystem,
+    JointFrictionSystem_,
+    PreslidingFriction,
+    PreslidingFriction_,
+    Stop,
+    presliding_of,
+)
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.reference import ReferenceSource
+from armloop.drake_systems.sticking import StickingForwardDynamics
 
 __all__ = [
+    "CONTROLLERS",
+    "AccelerationGains",
     "ArmPlant",
+    "ComputedTorque",
+    "ComputedTorque_",
     "ControlledArm",
+    "EffectTorque",
+    "EffectTorque_",
     "Feedforward",
     "FeedforwardModel",
+    "Feedforward_",
+    "ForwardDynamics",
+    "ForwardDynamics_",
     "JointFriction",
+    "JointFrictionSystem",
+    "JointFrictionSystem_",
     "PidController",
     "PidGains",
+    "PreslidingFriction",
+    "PreslidingFriction_",
     "ReferenceSource",
+    "StickingForwardDynamics",
+    "Stop",
     "add_arm_with_controller",
+    "add_joint_forces",
+    "presliding_of",
 ]

@@ -1,22 +1,25 @@
-"""An arm under control, added to any diagram in one call: plant with friction, reference, feedforward, PID."""
+"""An arm under control, added to any diagram in one call: plant with friction, reference, model, controller."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
+from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque
 from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.feedforward import Feedforward, FeedforwardModel
+from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.reference import ReferenceSource
 from armloop.drake_systems.scenarios import Plant, plant_for
 from armloop.excitation import Reference
+
+CONTROLLERS = ("pid", "computed_torque")
+"""The controllers that `add_arm_with_controller` knows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,48 +27,64 @@ class ControlledArm:
     """The systems that `add_arm_with_controller` added, to connect more to, or to log.
 
     plant : output ports `state` (2n,), `tau_drive` (n,)
-    reference : `q_ref`, `v_ref`, `vdot_ref` (n,); pid : `tau` (n,)
-    feedforward : output port 0, (n,); a constant zero without a model
+    reference : `q_ref`, `v_ref`, `vdot_ref`, `tau_ff` (n,); `tau_ff` is zero without a model or where the
+        controller holds the model itself
+    controller : `tau` (n,)
     """
 
     plant: ArmPlant
     reference: ReferenceSource
-    feedforward: Feedforward | ConstantVectorSource
-    pid: PidController
+    controller: PidController | LeafSystem
 
     def start_on_reference(self, root_context: Context) -> None:
         """Put the arm where the reference begins, at its velocity, inside the diagram's context."""
         q_ref, v_ref, _ = self.reference.tables
         self.plant.set_state(root_context, q_ref[0], v_ref[0])
 
+    def set_model(self, model: Any, step: int = 3) -> None:
+        """Exchange the model in a running simulation, between two calls of `Simulator.AdvanceTo`.
+
+        step : how much of it PID is fed; computed torque takes the whole
+        """
+        if isinstance(self.controller, PidController):
+            self.reference.set_model(model, step)
+        else:
+            self.controller.set_model(model)
+
 
 def add_arm_with_controller(
     builder: DiagramBuilder,
     arm: str | Path | Plant,
-    gains: PidGains,
+    gains: PidGains | AccelerationGains,
     reference: Reference,
     model: FeedforwardModel | None = None,
     step: int = 3,
     *,
+    controller: str = "pid",
     effects: Sequence[UndeclaredEffect] = (),
 ) -> ControlledArm:
-    """Add an arm that follows a reference by Eq. (35), (36) or, without a model, by PID alone.
+    """Add an arm that follows a reference: a plant with sticking friction under the controller of your choice.
 
-    The wires: `ReferenceSource` -> `Feedforward` -> `PidController` -> `ArmPlant` in torque mode -> back. The
-    arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
+    `"pid"`: Eqs. (35), (36), or PID alone without a model. `ReferenceSource` (with the model's feedforward) ->
+    `PidController` -> `ArmPlant` in torque mode -> back.
+    `"computed_torque"`: `ReferenceSource` -> `ComputedTorque` -> `ArmPlant` -> back; it needs a model that
+    predicts at velocities of the caller's choice, such as one of `armloop.model.load_model`.
+
+    The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
 
     arm : a plant of `scenarios.load_plant`; or a built-in name or the path of a URDF, then with the friction
         and encoders of `scenarios.plant_for`
-    gains : of the arm's n joints, `PidGains.paper(n)` for instance
-    model : feedforward of the reference by its terms up to `step` (1, 2 or 3), such as one of
-        `armloop.model.load_model`
+    gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
+    model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
 
-    Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains or reference do not fit it.
+    Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains, reference, model and controller do
+    not fit each other.
     """
     spec = arm if isinstance(arm, Plant) else plant_for(arm)
     n, config, period = spec.arm.n, spec.config, spec.config.time_step
-    source = ReferenceSource(reference, period)
+    _check_controller(controller, gains, model, step)
+    source = ReferenceSource(reference, period, model if controller == "pid" else None, step)
     followed = source.tables[0].shape[1]
     if not len(gains.kp) == followed == n:
         raise ValueError(
@@ -73,17 +92,27 @@ def add_arm_with_controller(
         )
     plant = builder.AddSystem(ArmPlant(spec.arm, config.friction, effects=effects, time_step=period))
     builder.AddNamedSystem("reference", source)
-    resolution = config.instruments.resolution(spec.arm)
-    pid = builder.AddNamedSystem("pid", PidController(gains, period, resolution))
-    if model is None:
-        feedforward = builder.AddNamedSystem("feedforward", ConstantVectorSource(np.zeros(n)))
+    if isinstance(gains, PidGains):
+        resolution = config.instruments.resolution(spec.arm)
+        law = builder.AddNamedSystem("pid", PidController(gains, period, resolution))
+        needed = ("q_ref", "v_ref", "tau_ff")
     else:
-        feedforward = builder.AddNamedSystem("feedforward", Feedforward(model, n, step))
-        for port in ("q_ref", "v_ref", "vdot_ref"):
-            builder.Connect(source.GetOutputPort(port), feedforward.GetInputPort(port))
-    for port in ("q_ref", "v_ref"):
-        builder.Connect(source.GetOutputPort(port), pid.GetInputPort(port))
-    builder.Connect(feedforward.get_output_port(0), pid.GetInputPort("tau_ff"))
-    builder.Connect(plant.GetOutputPort("state"), pid.GetInputPort("state"))
-    builder.Connect(pid.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    return ControlledArm(plant, source, feedforward, pid)
+        law = builder.AddNamedSystem("computed_torque", ComputedTorque(model, gains, period=period))
+        needed = ("q_ref", "v_ref", "vdot_ref")
+    for port in needed:
+        builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
+    builder.Connect(plant.GetOutputPort("state"), law.GetInputPort("state"))
+    builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
+    return ControlledArm(plant, source, law)
+
+
+def _check_controller(
+    controller: str, gains: PidGains | AccelerationGains, model: FeedforwardModel | None, step: int
+) -> None:
+    if controller not in CONTROLLERS:
+        raise ValueError(f"controller is {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    wanted = PidGains if controller == "pid" else AccelerationGains
+    if not isinstance(gains, wanted):
+        raise ValueError(f"{controller} takes {wanted.__name__}; the gains are {type(gains).__name__}")
+    if controller == "computed_torque" and (model is None or step != 3):
+        raise ValueError("computed_torque needs a model, and all three steps of it")

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from armloop.drake_systems.scalars import functions_of, vector
+from armloop.dynamics import ModelEquations
+from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 
@@ -19,30 +24,67 @@ class FeedforwardModel(Protocol):
         """Return (n,) torques at q, v, vdot (n,) by the terms of the first `step` steps (1, 2 or 3)."""
 
 
-class Feedforward(LeafSystem):
-    """Torque that a model says the reference needs: the sum of Y^S Xi^S over steps in Eqs. (35), (36).
+@TemplateSystem.define("Feedforward_")
+def Feedforward_(T: type) -> Any:
+    """Return the class for one scalar type."""
 
-    tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with
-    velocity terms, 3 with acceleration terms.
+    class Impl(LeafSystem_[T]):
+        """Torque that a model says the reference needs: the sum of Y^S Xi^S over steps in Eqs. (35), (36).
 
-    Input ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each. Output port: `tau_ff` (n,), N*m (N).
-    Stateless, direct feedthrough; scalar type float only. A prediction that is not finite raises
-    `RuntimeError`: an unset or NaN torque would silently spoil a simulation.
-    """
+        tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with
+        velocity terms, 3 with acceleration terms.
 
-    def __init__(self, model: FeedforwardModel, n: int, step: int = 3) -> None:
-        """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3."""
-        super().__init__()
-        self._model = model
-        self._step = step
-        self._inputs = [self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")]
-        self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff)
+        Input ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each. Output port: `tau_ff` (n,), N*m (N).
 
-    def _calc_tau_ff(self, context: Context, output: BasicVector) -> None:
-        q, v, vdot = (port.Eval(context) for port in self._inputs)
-        tau = self._model.feedforward(q, v, vdot, self._step)
-        if not isfinite(
-            sum(tau.tolist())
-        ):  # a NaN or an infinity shows in the sum; several times faster than numpy
-            raise RuntimeError(f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}")
-        output.SetFromVector(tau)
+        Stateless, direct feedthrough. Scalar types float, AutoDiffXd and Expression; for the last two the model
+        must be a `ReconstructedModel`, and dry friction has the derivative 0, which is wrong at rest. Friction
+        with memory acts as if fully slid. A prediction that is not finite raises `RuntimeError`: an unset or
+        NaN torque would silently spoil a simulation.
+        """
+
+        def _construct(
+            self, model: FeedforwardModel, n: int, step: int = 3, *, converter: Any = None
+        ) -> None:
+            """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3."""
+            if not isinstance(model, ReconstructedModel):
+                converter = (
+                    SystemScalarConverter()
+                )  # numbers alone can be neither differentiated nor written out
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = model, n, step
+            self._model = model
+            self._step = step
+            if T is not float:
+                assert isinstance(model, ReconstructedModel)
+                self._equations = ModelEquations(model, functions_of(T), step=step)
+            self._inputs = [self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")]
+            calc = self._calc_tau_ff if T is float else self._calc_symbolic_tau_ff
+            # Named, or Drake would find out by writing all the formulas out.
+            self.DeclareVectorOutputPort("tau_ff", n, calc, {self.all_input_ports_ticket()})
+
+        def set_model(self, model: FeedforwardModel) -> None:
+            """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            self._model = model
+            self._arguments = model, *self._arguments[1:]
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, converter=converter)
+
+        def _calc_tau_ff(self, context: Any, output: Any) -> None:
+            q, v, vdot = (port.Eval(context) for port in self._inputs)
+            tau = self._model.feedforward(q, v, vdot, self._step)
+            # A NaN or an infinity shows in the sum; several times faster than numpy's test.
+            if not isfinite(sum(tau.tolist())):
+                raise RuntimeError(
+                    f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}"
+                )
+            output.SetFromVector(tau)
+
+        def _calc_symbolic_tau_ff(self, context: Any, output: Any) -> None:
+            q, v, vdot = (port.Eval(context).tolist() for port in self._inputs)
+            output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
+
+    return Impl
+
+
+Feedforward = Feedforward_[None]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_, SystemScalarConverter
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator
+from pydrake.systems.scalar_conversion import TemplateSystem
 
 Array = NDArray[np.float64]
 
@@ -48,7 +50,8 @@ class PidController(Diagram):
     integral is the sum of e times the period (forward Euler).
 
     Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output port: `tau` (n,), held by the discrete
-    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar type float only.
+    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar types float and, with
+    ideal encoders, AutoDiffXd and Expression.
     """
 
     def __init__(self, gains: PidGains, period: float, resolution: ArrayLike = 0.0) -> None:
@@ -68,30 +71,48 @@ class PidController(Diagram):
         builder.BuildInto(self)
 
 
-class _PidLaw(LeafSystem):
-    """The law without its memory. Output port: (2n,) the torques, then e; one port, so that e is found once."""
+@TemplateSystem.define("_PidLaw_")
+def _PidLaw_(T: type) -> Any:
+    """Return the class for one scalar type."""
 
-    def __init__(self, gains: PidGains, resolution: ArrayLike) -> None:
-        super().__init__()
-        n = len(gains.kp)
-        counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
-        self._joints = list(zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), counts, strict=True))
-        self._n = n
-        self._ports = [
-            self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "tau_ff", "integral")
-        ]
-        self._state = self.DeclareVectorInputPort("state", 2 * n)
-        self.DeclareVectorOutputPort("tau_and_e", 2 * n, self._calc)
+    class Impl(LeafSystem_[T]):
+        """The law without its memory. Output port: (2n,) torques, then e; one port, so that e is found once."""
 
-    def _calc(self, context: Context, output: BasicVector) -> None:
-        # Called every step: for a handful of joints plain floats are several times faster than arrays.
-        state = self._state.Eval(context).tolist()
-        signals = [port.Eval(context).tolist() for port in self._ports]
-        tau, errors = [], []
-        for (kp, ki, kd, count), q, v, q_ref, v_ref, tau_ff, integral in zip(
-            self._joints, state[: self._n], state[self._n :], *signals, strict=True
-        ):
-            e = q_ref - (round(q / count) * count if count else q)
-            errors.append(e)
-            tau.append(kp * e + ki * integral + kd * (v_ref - v) + tau_ff)
-        output.SetFromVector(tau + errors)
+        def _construct(self, gains: PidGains, resolution: ArrayLike, *, converter: Any = None) -> None:
+            n = len(gains.kp)
+            counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
+            if any(counts):  # what rounds can be neither differentiated nor written out
+                converter = SystemScalarConverter()
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = gains, resolution
+            self._joints = list(
+                zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), counts, strict=True)
+            )
+            self._n = n
+            self._ports = [
+                self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "tau_ff", "integral")
+            ]
+            self._state = self.DeclareVectorInputPort("state", 2 * n)
+            sources = {self.all_input_ports_ticket()}
+            self.DeclareVectorOutputPort("tau_and_e", 2 * n, self._calc, sources)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, converter=converter)
+
+        def _calc(self, context: Any, output: Any) -> None:
+            # Called every step: for a handful of joints plain floats are several times faster than arrays.
+            state = self._state.Eval(context).tolist()
+            signals = [port.Eval(context).tolist() for port in self._ports]
+            tau, errors = [], []
+            for (kp, ki, kd, count), q, v, q_ref, v_ref, tau_ff, integral in zip(
+                self._joints, state[: self._n], state[self._n :], *signals, strict=True
+            ):
+                e = q_ref - (round(q / count) * count if count else q)
+                errors.append(e)
+                tau.append(kp * e + ki * integral + kd * (v_ref - v) + tau_ff)
+            output.SetFromVector(tau + errors)
+
+    return Impl
+
+
+_PidLaw = _PidLaw_[None]

@@ -7,9 +7,15 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import Demultiplexer
 
+from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.dynamics import ModelEquations
 from armloop.excitation import Reference
+from armloop.functions import NUMPY
+from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
+
+_CHUNK = 1000  # rows of feedforward evaluated at once, when the first of them is needed
 
 
 class TableSource(LeafSystem):
@@ -35,22 +41,76 @@ class TableSource(LeafSystem):
 
 
 class ReferenceSource(Diagram):
-    """Give q_ref(t), v_ref(t), vdot_ref(t) of a reference, held over each period.
+    """Give q_ref(t), v_ref(t), vdot_ref(t) of a reference, held over each period, and a model's feedforward of it.
 
-    Output ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, in rad, rad/s, rad/s^2 (m, ..). After the
-    reference's duration the last values are held. The reference is evaluated once, on construction.
+    tau_ff = model(q_ref, v_ref, vdot_ref), as from the system `Feedforward`, but as the reference is known ahead it is
+    evaluated for a thousand periods at once: during a simulation it costs next to nothing.
+
+    Output ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, in rad, rad/s, rad/s^2 (m, ..); `tau_ff` (n,), N*m (N),
+    zero without a model. After the reference's duration the last values are held. Scalar type float only.
+    A torque that is not finite raises `RuntimeError` when its time has come.
     """
 
-    def __init__(self, reference: Reference, period: float) -> None:
-        """reference : what to follow; period : s."""
+    def __init__(
+        self, reference: Reference, period: float, model: FeedforwardModel | None = None, step: int = 3
+    ) -> None:
+        """reference : what to follow; period : s; model, step : see `Feedforward`."""
         super().__init__()
         self.tables = reference.evaluate(period * np.arange(round(reference.duration / period) + 1))
         n = self.tables[0].shape[1]
         builder = DiagramBuilder()
-        source = builder.AddNamedSystem("table", TableSource(3 * n, period))
-        source.set_rows(np.hstack(self.tables))
-        split = builder.AddNamedSystem("split", Demultiplexer([n, n, n]))
-        builder.Connect(source.get_output_port(), split.get_input_port())
-        for index, name in enumerate(("q_ref", "v_ref", "vdot_ref")):
+        self._table = builder.AddNamedSystem("table", _ReferenceTable(self.tables, period))
+        self._table.set_model(model, step)
+        split = builder.AddNamedSystem("split", Demultiplexer([n, n, n, n]))
+        builder.Connect(self._table.get_output_port(), split.get_input_port())
+        for index, name in enumerate(("q_ref", "v_ref", "vdot_ref", "tau_ff")):
             builder.ExportOutput(split.get_output_port(index), name)
         builder.BuildInto(self)
+
+    def set_model(self, model: FeedforwardModel | None, step: int = 3) -> None:
+        """Take another model from the next period on; between two calls of `Simulator.AdvanceTo`."""
+        self._table.set_model(model, step)
+
+
+class _ReferenceTable(TableSource):
+    """A table whose last n columns are filled in, chunk by chunk, when they are needed."""
+
+    def __init__(self, tables: tuple[Array, Array, Array], period: float) -> None:
+        n = tables[0].shape[1]
+        super().__init__(4 * n, period)
+        self._n = n
+        self.set_rows(np.hstack([*tables, np.zeros_like(tables[0])]))
+
+    def set_model(self, model: FeedforwardModel | None, step: int) -> None:
+        self._model, self._step = model, step
+        self._equations = (
+            ModelEquations(model, NUMPY, step=step) if isinstance(model, ReconstructedModel) else None
+        )
+        self._rows[:, 3 * self._n :] = 0.0
+        self._filled = [model is None] * (len(self._rows) // _CHUNK + 1)
+
+    def _calc_row(self, context: Context, output: BasicVector) -> None:
+        row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)
+        if not self._filled[row // _CHUNK]:
+            self._fill(row // _CHUNK)
+        output.SetFromVector(self._rows[row])
+
+    def _fill(self, chunk: int) -> None:
+        part = slice(chunk * _CHUNK, (chunk + 1) * _CHUNK)
+        rows, n = self._rows[part], self._n
+        q, v, vdot = rows[:, :n], rows[:, n : 2 * n], rows[:, 2 * n : 3 * n]
+        if self._equations is not None:
+            columns = self._equations.torque(*(list(x.T) for x in (q, v, vdot)))
+            rows[:, 3 * n :] = np.stack([np.broadcast_to(x, len(rows)) for x in columns], axis=1)
+        else:
+            assert self._model is not None
+            rows[:, 3 * n :] = [
+                self._model.feedforward(*state, self._step) for state in zip(q, v, vdot, strict=True)
+            ]
+        wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+        if len(wrong):
+            time = self._period * (part.start + wrong[0])
+            raise RuntimeError(
+                f"the model's torque is not finite at t = {time:.4f} s: {rows[wrong[0], 3 * n :]}"
+            )
+        self._filled[chunk] = True

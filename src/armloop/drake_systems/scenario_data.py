@@ -69,7 +69,8 @@ class PlanData:
 class ReferenceData:
     """What to track."""
 
-    kind: str = "paper"  # paper: Fig. 14, three joints; fourier: random within the plant's ranges
+    kind: str = "paper"  # paper: Fig. 14, three joints; fourier: random within the ranges; csv: of `file`
+    file: str = ""  # of a csv one, as `armloop excite` writes it; its path from the scenario's folder
     unit: float = 0.1  # rad, of the paper's k
     periods: int = 2  # of 20 s, of the paper's
     duration: float = 40.0  # s, of a fourier one

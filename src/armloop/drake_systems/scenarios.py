@@ -22,8 +22,14 @@ from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.scenario_data import CONTROLLERS, PlanData, PlantData, TrackingData
 from armloop.drake_systems.speed_mode import Instruments
-from armloop.errors import ArmError, ScenarioError
-from armloop.excitation import MotionRanges, Reference, fourier_reference, paper_reference
+from armloop.errors import ArmError, LogError, ScenarioError
+from armloop.excitation import (
+    MotionRanges,
+    Reference,
+    fourier_reference,
+    paper_reference,
+    read_reference,
+)
 from armloop.resources import scenario_names, scenario_path
 
 T = TypeVar("T")
@@ -162,15 +168,17 @@ def _reference(data: TrackingData, plant: Plant, path: Path) -> Reference:
             raise ScenarioError(
                 f"{path}: reference.unit is {wanted.unit}; it must be above 0 and at most 1 rad"
             )
-        reference = paper_reference(wanted.unit, wanted.periods)
+        reference: Reference = paper_reference(wanted.unit, wanted.periods)
     elif wanted.kind == "fourier":
         if not 5 <= wanted.duration <= _LONGEST:
             raise ScenarioError(
                 f"{path}: reference.duration is {wanted.duration}; it must be 5 to {_LONGEST:g} s"
             )
         reference = fourier_reference(plant.config.ranges, wanted.duration, data.random_seed)
+    elif wanted.kind == "csv":
+        reference = _table(wanted.file, plant, path)
     else:
-        raise ScenarioError(f"{path}: reference.kind is {wanted.kind!r}; it must be paper or fourier")
+        raise ScenarioError(f"{path}: reference.kind is {wanted.kind!r}; it must be paper, fourier or csv")
     q, _, _ = reference.evaluate(np.arange(0.0, reference.duration, 0.01))
     for j, joint in enumerate(plant.arm.joints):
         if q[:, j].min() < joint.lower or q[:, j].max() > joint.upper:
@@ -178,6 +186,20 @@ def _reference(data: TrackingData, plant: Plant, path: Path) -> Reference:
                 f"{path}: reference: joint {j + 1} would go from {q[:, j].min():.3g} to {q[:, j].max():.3g}; "
                 f"its limits are {joint.lower:.3g} to {joint.upper:.3g}"
             )
+    return reference
+
+
+def _table(file: str, plant: Plant, path: Path) -> Reference:
+    if not file:
+        raise ScenarioError(f"{path}: reference.file is missing; a csv reference needs the path of its file")
+    try:
+        reference = read_reference(path.parent / file, plant.arm.n)
+    except LogError as error:
+        raise ScenarioError(f"{path}: reference.file: {error}") from error
+    if not reference.duration <= _LONGEST:
+        raise ScenarioError(
+            f"{path}: reference.file lasts {reference.duration:g} s; it must be at most {_LONGEST:g} s"
+        )
     return reference
 
 

@@ -50,11 +50,11 @@ class Payload(Effect):
         return beta, J
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        return self.columns(context, 0.0) @ _link_parameters(context.arm, parameters)
+        return self.columns(context, 0.0) @ link_parameters(context.arm, parameters)
 
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
         others = np.zeros(10 * (arm.n - 1))
-        return inverse_dynamics(arm, np.concatenate([others, _link_parameters(arm, parameters)]))
+        return inverse_dynamics(arm, np.concatenate([others, link_parameters(arm, parameters)]))
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         mass = max(float(x[0]), 1e-3)
@@ -83,7 +83,7 @@ class Payload(Effect):
         return f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m"
 
 
-def _link_parameters(arm: Arm, parameters: dict[str, Value]) -> Array:
+def link_parameters(arm: Arm, parameters: dict[str, Value]) -> Array:
     """(10,) parameters about the last link's origin, in its frame."""
     mass, com_tool = number(parameters["mass"]), np.asarray(parameters["com"], dtype=float)
     com = arm.X_tool[:3, :3] @ com_tool + arm.X_tool[:3, 3]

@@ -4,7 +4,7 @@ Plain arrays, no simulator. A reference is anything with `evaluate(t) -> q, v, v
 """
 
 from armloop.excitation.fourier import FourierReference, fourier_reference, paper_reference
-from armloop.excitation.ranges import MotionRanges, speeds
+from armloop.excitation.ranges import MotionRanges, ranges_with, speeds
 from armloop.excitation.reference import Reference, within
 from armloop.excitation.segments import (
     Segment,
@@ -12,17 +12,22 @@ from armloop.excitation.segments import (
     static_poses,
     static_segments,
 )
+from armloop.excitation.table import TableReference, read_reference, write_reference
 
 __all__ = [
     "FourierReference",
     "MotionRanges",
     "Reference",
     "Segment",
+    "TableReference",
     "constant_velocity_segments",
     "fourier_reference",
     "paper_reference",
+    "ranges_with",
+    "read_reference",
     "speeds",
     "static_poses",
     "static_segments",
     "within",
+    "write_reference",
 ]

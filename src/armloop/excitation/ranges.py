@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -62,6 +64,33 @@ class MotionRanges:
         limited = np.isfinite(velocity)
         speed = np.where(limited, 0.5 * np.where(limited, velocity, 0.0), np.where(turns, 1.0, 0.1))
         return MotionRanges(centre - half, centre + half, speed, 2.0 * speed)
+
+
+def ranges_with(arm: Arm, ranges: MotionRanges | None, **stated: Sequence[float] | None) -> MotionRanges:
+    """Return ranges in which what is stated (`lower`, `upper`, `velocity`, `acceleration`) stands instead.
+
+    ranges : what else holds; `MotionRanges.of` the arm when None, and then accelerations follow a stated
+        velocity
+
+    Raises `InputError` when a range is empty or beyond the limits of the arm's URDF.
+    """
+    given = {key: np.array(values, dtype=float) for key, values in stated.items() if values is not None}
+    if ranges is None:
+        ranges = MotionRanges.of(arm)
+        if "velocity" in given:
+            given = {"acceleration": 2.0 * given["velocity"]} | given
+    try:
+        ranges = replace(ranges, **given)
+    except ValueError as error:
+        raise InputError(f"{arm.name}: no motion is within the ranges: {error}") from error
+    for joint, low, high, speed in zip(arm.joints, ranges.lower, ranges.upper, ranges.velocity, strict=True):
+        if low < joint.lower or high > joint.upper or speed > joint.velocity:
+            raise InputError(
+                f"{arm.name}: joint {joint.name!r} would go from {low:.4g} to {high:.4g} {joint.position_unit} at "
+                f"up to {speed:.4g} a second; its URDF allows {joint.lower:.4g} to {joint.upper:.4g} at "
+                f"{joint.velocity:.4g}"
+            )
+    return ranges
 
 
 def speeds(arm: Arm, revolute: float, prismatic: float) -> Array:

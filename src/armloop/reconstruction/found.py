@@ -13,6 +13,7 @@ from armloop.components import Component
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.motion import Motion
 from armloop.reconstruction.options import StepReport
+from armloop.reconstruction.sorter import Sorter
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,9 @@ Array = NDArray[np.float64]
 class Found:
     """Components, friction terms per joint, one report per step, and notes for the user.
 
-    ``history`` is kept in the model file; ``condition`` (N,) is set where the samples were sorted.
+    ``history`` is kept in the model file; ``sorter`` is set where the samples were sorted. ``final`` is
+    what becomes the model, where a method regresses its terms once more on all data after the held-out ones
+    have judged them.
     """
 
     arm: Arm
@@ -30,7 +33,8 @@ class Found:
     reports: list[StepReport] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     history: dict[str, Any] = field(default_factory=dict)
-    condition: NDArray[np.int_] | None = None
+    sorter: Sorter | None = None
+    final: Found | None = None
 
     @property
     def law(self) -> FrictionLaw:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,21 +13,26 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.errors import InputError
-from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
+from armloop.pieces import LogSource
 from armloop.progress import Progress, silent
+from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
 from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.reconstruction.sindy import sindy
-from armloop.reconstruction.stepwise import stepwise
-from armloop.scoring import Score, score
+from armloop.reconstruction.stepwise import stepwise_on
+from armloop.reconstruction.tally import Tally
+from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
+from armloop.workers import Cluster, Workers
 
 METHODS = ("stepwise", "sindy")
+#: Samples of all logs together up to which they are kept in memory.
+IN_MEMORY = 500_000
 LIBRARIES = ("double-feature-set", "rigid-body", "lagrangian")
 
 
@@ -65,7 +71,7 @@ def default_conditioning(library: str) -> Conditioning:
 
 
 def reconstruct(
-    logs: Sequence[MotionLog],
+    logs: Sequence[LogSource],
     arm: Arm,
     method: str = "stepwise",
     library: str | None = None,
@@ -73,15 +79,22 @@ def reconstruct(
     options: Options | None = None,
     progress: Progress = silent,
     recorded: dict[str, Any] | None = None,
+    workers: Workers | None = None,
 ) -> Reconstruction:
     """Reconstruct a model of an arm's joint torques from its logs.
 
     Args:
-        logs: runs of the same arm; which sample serves which step is found from the samples.
+        logs: runs of the same arm, in memory or read when needed (:mod:`armloop.pieces`); which sample serves
+            which step is found from the samples.
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
         library: one of :data:`LIBRARIES`; by default what suits the number of joints.
         conditioning: filter; by default what suits the library.
         recorded: how the logs recorded the torque, kept in the model for later logs.
+        workers: who passes over logs of more than :data:`IN_MEMORY` samples (or, for a cluster, over any); by
+            default this process.
+
+    More samples than that are read and conditioned anew on every pass by the stepwise method on the double
+    feature set, in memory that does not grow with them; the other libraries read everything.
 
     Raises:
         InputError: logs that do not fit the arm, an unknown method, or too little excitation.
@@ -99,9 +112,12 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     progress(f"conditioning {len(logs)} log(s), low-pass {conditioning.cutoff_hz:g} Hz")
-    samples = condition(logs, conditioning)
+    if method == "stepwise" and library == "double-feature-set" and _is_streamed(logs, workers):
+        data = Data.streamed(logs, conditioning, options, workers)
+    else:
+        data = Data.of(condition([log.read() for log in logs], conditioning), options)
+    samples, held_out = data.reference.samples, data.reference.held_out
     check_recorded(arm, samples)
-    held_out = held_out_rows(samples, options)
     if library == "rigid-body":
         found = rigid_body(arm, samples, held_out, options, progress)
     elif library == "lagrangian":
@@ -109,7 +125,7 @@ def reconstruct(
     elif method == "sindy":
         found = sindy(arm, samples, held_out, options, progress)
     else:
-        found = stepwise(arm, samples, held_out, options, progress)
+        found = stepwise_on(arm, data, options, progress)
     model = ReconstructedModel(
         arm=arm,
         components=tuple(found.components),
@@ -119,37 +135,24 @@ def reconstruct(
         history={
             "method": method,
             "library": library,
-            "logs": [log.name for log in logs],
+            "logs": list(dict.fromkeys(log.name for log in logs)),
             "steps": [report.to_dict() for report in found.reports],
             "notes": found.notes,
             "range": _range(samples.motion),
             **found.history,
         },
     )
-    held = score(model, samples, held_out)
-    model = replace(model, baseline=_baseline(model, samples, held_out, found.condition))
-    return Reconstruction(model, found.reports, held, found.notes)
+    tally = data.sum(partial(Tally.of, model=model, sorter=found.sorter))
+    model = replace(model, baseline=tally.baseline())
+    if found.final is not None:
+        history = {**model.history, **found.final.history}
+        components = tuple(found.final.components)
+        model = replace(model, components=components, friction=found.final.law, history=history)
+    return Reconstruction(model, found.reports, tally.score(), found.notes)
 
 
-def _baseline(
-    model: ReconstructedModel,
-    samples: Samples,
-    held_out: NDArray[np.bool_],
-    conditions: NDArray[np.int_] | None,
-) -> dict[str, Any]:
-    """What the model leaves on held-out data, per joint: of the condition that it explains worst.
-
-    A later run is one of motion; easy data (creeping, steady) must not make the model look better than
-    it is on those.
-    """
-    labels = np.zeros(samples.motion.samples, dtype=int) if conditions is None else conditions
-    scores = [score(model, samples, held_out & (labels == label)) for label in np.unique(labels[held_out])]
-    table = np.array([[np.nan if x is None else x for x in s.moving["rmse"]] for s in scores])
-    usable = np.isfinite(table).any(axis=0)
-    rmse = [float(np.nanmax(column)) if ok else None for column, ok in zip(table.T, usable, strict=True)]
-    rms = score(model, samples, held_out).rms
-    nrmse = [e / scale if e is not None and scale else None for e, scale in zip(rmse, rms, strict=True)]
-    return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "samples": int(held_out.sum())}
+def _is_streamed(logs: Sequence[LogSource], workers: Workers | None) -> bool:
+    return isinstance(workers, Cluster) or sum(log.samples for log in logs) > IN_MEMORY
 
 
 def _range(motion: Motion) -> list[list[float]]:

@@ -7,31 +7,36 @@ the paper's grid, one exponential instead of a hundred collinear ones.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers, block_sums
 from armloop.components import SparseTerms
 from armloop.errors import ExcitationError
 from armloop.library.angle_sums import AngleSums
-from armloop.library.double_feature_set import DoubleFeatureSet, Factors, products
+from armloop.library.double_feature_set import DoubleFeatureSet, Factors
 from armloop.library.friction import FrictionTerm
-from armloop.motion import Motion, Samples
+from armloop.library.wave_moments import WaveProducts
+from armloop.reconstruction.data import Data
 from armloop.reconstruction.options import Options, StepReport
+from armloop.reconstruction.sums import Choice, Columns, Problems, StepSums
+from armloop.reconstruction.trials import Correction, Fit, HeldOut
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 #: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
 STRIBECK_GRID = tuple(float(v) for v in np.round(np.geomspace(0.01, 1.0, 60), 4))
 
 _FEWEST_SAMPLES = 30
+#: Relative squared error at which what is left may be round-off of the normal equations.
+_EXACT = 1e-9
+_CORRECTIONS = 3
 
 
 @dataclass(frozen=True)
@@ -117,75 +122,56 @@ def _second_order(part: Part, N2: int) -> int:
 
 @dataclass
 class _Joint:
-    """One joint's regression problem: rows that count, library columns first, friction columns after."""
+    """One joint's regression problem: library columns first, friction columns after.
 
-    X: Array
-    y: Array
-    blocks: Index
-    train: Mask
-    fixed: list[FrictionTerm]
-    profile: list[FrictionTerm]
+    Attributes:
+        fit, all: normal equations of the samples that do not choose orders, and of all.
+        size: number of library columns.
+        fixed, profile: friction columns that are always there, and those of which one is chosen.
+        scale: root mean square of the torque.
+    """
+
+    fit: Moments
+    all: Moments
+    size: int
+    fixed: Index
+    profile: Index
     scale: float
 
-    def __post_init__(self) -> None:
-        self.fit = Moments.of(self.X[self.train], self.y[self.train])
-        self.all = self.fit + Moments.of(self.X[~self.train], self.y[~self.train])
-
-    def friction_columns(self, library: int) -> tuple[Index, Index]:
-        first = np.arange(library, library + len(self.fixed))
-        second = np.arange(library + len(self.fixed), self.X.shape[1])
-        return first, second
-
-    def select(self, moments: Moments, library: Index, size: int, sparse: Sparse) -> Index:
+    def select(self, moments: Moments, library: Index, sparse: Sparse) -> Index:
         """Support among the library columns ``library`` and the friction columns."""
-        fixed, profile = self.friction_columns(size)
         chosen = np.zeros(0, dtype=np.intp)
         best: Index = np.zeros(0, dtype=np.intp)
         for _ in range(3):
             previous = best
-            best = self._profiled(moments, np.concatenate([fixed, chosen]), profile)
-            forced = np.concatenate([fixed, best])
+            best = self._profiled(moments, np.concatenate([self.fixed, chosen]))
+            forced = np.concatenate([self.fixed, best])
             columns = np.concatenate([library, forced]).astype(np.intp)
             doubtless = np.arange(len(library), len(columns))
             local = sparse.support(moments.take(columns), doubtless, self.scale**2)
             support = columns[local]
-            chosen = support[support < size]
+            chosen = support[support < self.size]
             if np.array_equal(best, previous):
                 break
-        support = np.concatenate([chosen, fixed, best]).astype(np.intp)
-        return sparse.prune(moments, support, support[support >= size], self.scale**2)
+        support = np.concatenate([chosen, self.fixed, best]).astype(np.intp)
+        return sparse.prune(moments, support, support[support >= self.size], self.scale**2)
 
-    @staticmethod
-    def _profiled(moments: Moments, base: Index, profile: Index) -> Index:
+    def _profiled(self, moments: Moments, base: Index) -> Index:
         """The one profiled column that, with the base, leaves the smallest squared error."""
-        if len(profile) == 0:
-            return profile
-        _, gains = moments.gains(base.astype(np.intp), profile)
-        return profile[[int(np.argmax(gains))]]
-
-    def held_out(self, support: Index, beta: Array) -> tuple[float, Array]:
-        """Mean squared error on the validation blocks, relative to the torque, and its block sums."""
-        rest = ~self.train
-        error = (self.y[rest] - self.X[np.ix_(np.flatnonzero(rest), support)] @ beta) ** 2 / self.scale**2
-        return float(error.mean()), block_sums(error, self.blocks[rest]) / max(int(rest.sum()), 1)
+        if len(self.profile) == 0:
+            return self.profile
+        _, gains = moments.gains(base.astype(np.intp), self.profile)
+        return self.profile[[int(np.argmax(gains))]]
 
 
 def regress_step(
-    samples: Samples,
-    revolute: tuple[bool, ...],
-    inherited: Array,
-    rows: Mask,
-    validation: Mask,
-    plan: StepPlan,
-    options: Options,
+    data: Data, revolute: tuple[bool, ...], choice: Choice, plan: StepPlan, options: Options
 ) -> tuple[list[SparseTerms], list[list[FrictionTerm]], list[StepReport]]:
     """Regress one step (or several together) for all joints.
 
     Args:
         revolute: which joints turn.
-        inherited: (N, n) torque of the steps before.
-        rows: (N, n) samples that may be used for each joint, held-out ones excluded.
-        validation: (N,) samples that choose the orders; they are used for the final fit too.
+        choice: the samples of this step, and what is subtracted from their torque.
 
     Returns:
         Sparse terms and a report for each step, and friction terms per joint.
@@ -194,22 +180,24 @@ def regress_step(
         ExcitationError: too few samples for a joint.
     """
     candidates = _candidates(revolute, plan)
-    used: Mask = np.any(rows, axis=1)
-    X_all = products(candidates.factors.evaluate(_rows(samples.motion, used)), candidates.index)
-    joints = []
-    for j in range(samples.motion.joints):
-        mine = rows[used, j]
-        if mine.sum() < _FEWEST_SAMPLES:
-            raise ExcitationError(
-                f"{plan.name}: joint {j + 1} has {int(mine.sum())} usable samples, at least {_FEWEST_SAMPLES} "
-                "are needed; log more motion of this joint in this condition"
-            )
-        joints.append(_joint(samples, inherited, used, mine, validation, j, X_all, plan, options))
+    library = WaveProducts(candidates.factors, candidates.index)
+    columns = Columns(library, _friction(data, choice, plan))
+    sums = data.sum(partial(StepSums.of, choice=choice, columns=columns))
+    joints = _joints(columns, sums, plan)
     subsets = [(orders, candidates.subset(orders)) for orders in plan.orders]
-    orders, trials = _choose(joints, subsets, candidates.size, options)
-    columns = dict(subsets)[orders]
-    supports = [joint.select(joint.all, columns, candidates.size, options.sparse) for joint in joints]
-    terms, friction = _collect(joints, supports, candidates, plan)
+    fits = [[_fit(joint, joint.fit, library, options) for _, library in subsets] for joint in joints]
+    weights = [
+        1 / (joint.scale**2 * max(sums.samples(j, choosing=True), 1)) for j, joint in enumerate(joints)
+    ]
+    tried = data.sum(
+        partial(HeldOut.of, choice=choice, columns=columns, fits=fits, weights=np.array(weights))
+    )
+    orders, chosen = subsets[tried.smallest()]
+    errors = np.sqrt(tried.errors.mean(axis=1)).tolist()
+    trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
+    final = [_fit(joint, joint.all, chosen, options) for joint in joints]
+    final = _corrected(final, joints, partial(_gradients, data, choice, columns))
+    terms, friction = _collect(final, candidates, columns, plan)
     reports = []
     for part, found in zip(plan.parts, terms, strict=True):
         N2 = _second_order(part, orders[1])
@@ -218,85 +206,86 @@ def regress_step(
             for j in range(len(joints))
         ]
         full = DoubleFeatureSet(revolute, orders[0], N2, part.second, independent=False).size
-        reduced = int(np.count_nonzero(candidates.step[columns] == part.step))
-        samples_used = [len(joint.y) for joint in joints]
-        reports.append(StepReport(part.step, [orders[0], N2], full, reduced, counts, samples_used, trials))
+        reduced = int(np.count_nonzero(candidates.step[chosen] == part.step))
+        used = [sums.samples(j) for j in range(len(joints))]
+        reports.append(StepReport(part.step, [orders[0], N2], full, reduced, counts, used, trials))
     return terms, friction, reports
 
 
-def _joint(
-    samples: Samples,
-    inherited: Array,
-    used: Mask,
-    mine: Mask,
-    validation: Mask,
-    j: int,
-    X_all: Array,
-    plan: StepPlan,
-    options: Options,
-) -> _Joint:
-    fixed = [FrictionTerm(kind) for kind in plan.friction if kind != "stribeck"]
-    profile: list[FrictionTerm] = []
-    v = samples.motion.v[used][mine, j]
-    if "stribeck" in plan.friction:
+def _friction(data: Data, choice: Choice, plan: StepPlan) -> tuple[tuple[FrictionTerm, ...], ...]:
+    """Friction terms of every joint: the fixed ones, then the profile over the Stribeck velocity."""
+    fixed = tuple(FrictionTerm(kind) for kind in plan.friction if kind != "stribeck")
+    if "stribeck" not in plan.friction:
+        return (fixed,) * len(choice.inherited.arm.joints)
+    usable, found = choice(data.reference), []
+    for j in range(usable.moving.shape[1]):
+        speeds = np.abs(usable.motion.v[usable.moving[:, j], j])
         # Below the slowest reliable speed an exponential cannot be told from the level itself.
-        slowest = float(np.quantile(np.abs(v), 0.02))
-        profile = [FrictionTerm("stribeck", parameter=vs) for vs in STRIBECK_GRID if vs > slowest]
-    motion = _rows(samples.motion, used)
-    friction = [term.column(motion, j)[mine] for term in (*fixed, *profile)]
-    alive = [np.ptp(column) > 0 or np.abs(column).max(initial=0) > 0 for column in friction]
-    fixed_alive = [term for term, ok in zip(fixed, alive[: len(fixed)], strict=True) if ok]
-    profile_alive = [term for term, ok in zip(profile, alive[len(fixed) :], strict=True) if ok]
-    X = np.column_stack([X_all[mine], *[c for c, ok in zip(friction, alive, strict=True) if ok]])
-    tau = samples.tau[used][mine, j]
-    y = tau - inherited[used][mine, j]
-    blocks = block_numbers(samples.motion, options.block_seconds)[used][mine]
-    scale = float(np.sqrt(np.mean(tau**2))) or 1.0
-    return _Joint(X, y, blocks, ~validation[used][mine], fixed_alive, profile_alive, scale)
+        slowest = float(np.quantile(speeds, 0.02)) if len(speeds) else 0.0
+        profile = (FrictionTerm("stribeck", parameter=vs) for vs in STRIBECK_GRID if vs > slowest)
+        found.append((*fixed, *profile))
+    return tuple(found)
 
 
-def _choose(
-    joints: Sequence[_Joint], subsets: Sequence[tuple[tuple[int, int], Index]], size: int, options: Options
-) -> tuple[tuple[int, int], list[tuple[list[int], float]]]:
-    """The smallest library whose held-out error is within one standard error of the best."""
-    trials: list[tuple[list[int], float]] = []
-    blocks: list[Array] = []
-    for orders, columns in subsets:
-        errors, sums = [], []
-        for joint in joints:
-            support = joint.select(joint.fit, columns, size, options.sparse)
-            error, by_block = joint.held_out(support, joint.fit.solve(support))
-            errors.append(error)
-            sums.append(by_block)
-        trials.append((list(orders), float(np.sqrt(np.mean(errors)))))
-        blocks.append(np.concatenate(sums))
-    means = np.array([float(b.sum()) for b in blocks])
-    best = int(np.argmin(means))
-    for k, (orders, _) in enumerate(subsets):
-        excess = blocks[k] - blocks[best]
-        spread = float(np.sqrt(len(excess)) * excess.std())
-        if excess.sum() <= spread or means[k] <= 1e-20:
-            return orders, trials
-    return subsets[best][0], trials
+def _joints(columns: Columns, sums: StepSums, plan: StepPlan) -> list[_Joint]:
+    problems, joints, size = Problems(columns, sums), [], columns.library.size
+    for j, laws in enumerate(columns.friction):
+        if sums.samples(j) < _FEWEST_SAMPLES:
+            raise ExcitationError(
+                f"{plan.name}: joint {j + 1} has {sums.samples(j)} usable samples, at least {_FEWEST_SAMPLES} "
+                "are needed; log more motion of this joint in this condition"
+            )
+        every = problems.moments(j)
+        alive = np.flatnonzero(np.diag(every.G)[size:] > 0)
+        profiled = np.array([laws[k].kind == "stribeck" for k in alive], dtype=bool)
+        places = (size + alive).astype(np.intp)
+        fit = problems.moments(j, choosing=False)
+        joints.append(_Joint(fit, every, size, places[~profiled], places[profiled], sums.scale(j)))
+    return joints
+
+
+def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> Fit:
+    support = joint.select(moments, library, options.sparse)
+    return Fit(support, moments.solve(support))
+
+
+def _gradients(data: Data, choice: Choice, columns: Columns, fits: list[Fit]) -> tuple[Array, ...]:
+    return data.sum(partial(Correction.of, choice=choice, columns=columns, fits=fits)).gradients
+
+
+def _corrected(
+    fits: list[Fit], joints: Sequence[_Joint], gradients: Callable[[list[Fit]], tuple[Array, ...]]
+) -> list[Fit]:
+    """The fits, refined on the samples themselves where so little is left that it may be round-off.
+
+    The normal equations square the condition number; without noise their round-off is all that is left, and a
+    later step would look for terms in it.
+    """
+    left = [
+        joint.all.squared_error(fit.beta, fit.support) / (joint.scale**2 * joint.all.count)
+        for joint, fit in zip(joints, fits, strict=True)
+    ]
+    if min(left) > _EXACT:
+        return fits
+    for _ in range(_CORRECTIONS):
+        fits = [
+            Fit(fit.support, fit.beta + replace(joint.all.take(fit.support), b=gradient).solve())
+            for joint, fit, gradient in zip(joints, fits, gradients(fits), strict=True)
+        ]
+    return fits
 
 
 def _collect(
-    joints: Sequence[_Joint], supports: Sequence[Index], candidates: _Candidates, plan: StepPlan
+    fits: Sequence[Fit], candidates: _Candidates, columns: Columns, plan: StepPlan
 ) -> tuple[list[SparseTerms], list[list[FrictionTerm]]]:
     size = candidates.size
-    coefficients = np.zeros((size, len(joints)))
+    coefficients = np.zeros((size, len(fits)))
     friction: list[list[FrictionTerm]] = []
-    for j, (joint, support) in enumerate(zip(joints, supports, strict=True)):
-        beta = joint.all.solve(support)
-        coefficients[support[support < size], j] = beta[support < size]
-        laws = joint.fixed + joint.profile
-        friction.append(
-            [
-                FrictionTerm(laws[column - size].kind, float(value), laws[column - size].parameter)
-                for column, value in zip(support, beta, strict=True)
-                if column >= size
-            ]
-        )
+    for j, fit in enumerate(fits):
+        mine = fit.support < size
+        coefficients[fit.support[mine], j] = fit.beta[mine]
+        laws = zip(fit.support[~mine] - size, fit.beta[~mine].tolist(), strict=True)
+        friction.append([replace(columns.friction[j][k], coefficient=value) for k, value in laws])
     kept = coefficients.any(axis=1)
     terms = []
     for part in plan.parts:
@@ -305,8 +294,3 @@ def _collect(
             SparseTerms(part.step, candidates.index[mine], coefficients[mine], candidates.factors.waves)
         )
     return terms, friction
-
-
-def _rows(motion: Motion, rows: Mask) -> Motion:
-    """Some samples as one run; only for columns without memory."""
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))

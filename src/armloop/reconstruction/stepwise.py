@@ -6,16 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
-from armloop.blocks import folds
 from armloop.conditions import Clusters, Condition, sort_samples
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
+from armloop.reconstruction.sorter import Sorter
 from armloop.reconstruction.step import Part, StepPlan, regress_step
-from armloop.signals import independent_rows
+from armloop.reconstruction.sums import Choice
 
 # A condition counts as met if what should be absent in it is this much weaker than where it is present.
 _PURITY = 0.1
@@ -24,10 +25,12 @@ _PURITY = 0.1
 def stepwise(
     arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
 ) -> Found:
-    """Reconstruct in three steps (Sect. 3.2, 3.3).
+    """Reconstruct in three steps from samples in memory; ``held_out`` (N,) must not be fitted."""
+    return stepwise_on(arm, Data.of(samples, options, held_out), options, progress)
 
-    Args:
-        held_out: (N,) samples that must not be fitted.
+
+def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
+    """Reconstruct in three steps (Sect. 3.2, 3.3).
 
     Where the log has no clean static or constant-velocity data, hard clusters would feed a step with
     what it must not see; then the three libraries are regressed together on all samples, their terms
@@ -36,21 +39,22 @@ def stepwise(
     Raises:
         ExcitationError: a joint does not move, or a condition has too few samples.
     """
+    samples = data.reference.samples
     check_excitation(arm, samples)
     clusters = sort_samples(samples.motion, seed=options.seed)
     note = _impure(samples.motion, clusters)
-    validation = folds(samples.motion, options.folds, options.block_seconds) == 1
     found = Found(arm, friction=[[] for _ in arm.joints], notes=[note] if note else [])
+    sorter = Sorter(samples.motion, clusters.condition)
     if not note:
-        found.condition = clusters.condition
+        found.sorter = sorter
     revolute = tuple(bool(r) for r in arm.revolute)
-    thin = independent_rows(samples)
     for plan in _together(revolute, options) if note else _steps(revolute, options):
-        condition = np.isin(clusters.condition, plan.conditions)
-        rows = (condition & thin)[:, None] & samples.moving & ~held_out[:, None]
-        progress(f"step {'+'.join(str(p.step) for p in plan.parts)}: {int(condition.sum())} samples")
-        inherited = found.torque(samples.motion)
-        terms, friction, report = regress_step(samples, revolute, inherited, rows, validation, plan, options)
+        share = float(np.isin(clusters.condition, plan.conditions).mean())
+        progress(f"{plan.name}: {share:.0%} of the samples")
+        # A copy: what is found now must not be inherited by itself.
+        inherited = Found(arm, list(found.components), [list(law) for law in found.friction])
+        choice = Choice(None if note else sorter, plan.conditions, inherited)
+        terms, friction, report = regress_step(data, revolute, choice, plan, options)
         found.components += terms
         for law, more in zip(found.friction, friction, strict=True):
             law += more

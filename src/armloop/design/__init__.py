@@ -1,0 +1,41 @@
+"""Experiment design: references that determine the coefficients of a later regression as well as the arm allows.
+
+The columns whose information is made large are handed in as a function of the motion, so that a library, or two
+competing effects that a run should tell apart (`criteria.told_apart`), are designed for alike.
+"""
+
+from armloop.design.criteria import CRITERIA, Criterion, condition_number, told_apart
+from armloop.design.data_ratio import DataRatio, amount_needed, data_ratio
+from armloop.design.excite import Excitation, Measure, excite, measured
+from armloop.design.information import Columns, Regression
+from armloop.design.limits import Limits, TorqueLaw, nominal_torque
+from armloop.design.optimise import Design, Problem
+from armloop.design.random import random_references
+from armloop.design.series import Series, sampled
+from armloop.design.settings import Settings, Timing
+
+__all__ = [
+    "CRITERIA",
+    "Columns",
+    "Criterion",
+    "DataRatio",
+    "Design",
+    "Excitation",
+    "Limits",
+    "Measure",
+    "Problem",
+    "Regression",
+    "Series",
+    "Settings",
+    "Timing",
+    "TorqueLaw",
+    "amount_needed",
+    "condition_number",
+    "data_ratio",
+    "excite",
+    "measured",
+    "nominal_torque",
+    "random_references",
+    "sampled",
+    "told_apart",
+]

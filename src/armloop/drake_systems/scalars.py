@@ -1,0 +1,32 @@
+"""What the systems need for each of Drake's scalar types: elementary functions, and vectors of one type."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pydrake.math as drake_math
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.symbolic import Expression, if_then_else
+
+from armloop.functions import MATH, Functions
+
+_COMMON = (drake_math.sin, drake_math.cos, drake_math.exp, drake_math.tanh, drake_math.sqrt)
+_FUNCTIONS: dict[type, Functions] = {
+    float: MATH,
+    AutoDiffXd: Functions(*_COMMON, lambda x: float(x > 0.0) - float(x < 0.0)),
+    Expression: Functions(*_COMMON, lambda x: if_then_else(x > 0.0, 1.0, if_then_else(x < 0.0, -1.0, 0.0))),
+}
+
+
+def functions_of(T: type) -> Functions:
+    """Return the elementary functions of one of Drake's scalar types; sign has the derivative 0."""
+    return _FUNCTIONS[T]
+
+
+def vector(T: type, values: Sequence[Any]) -> np.ndarray:
+    """Return (n,) values of one type, plain numbers among them converted."""
+    if T is float:
+        return np.array(values, dtype=float)
+    return np.array([x if isinstance(x, T) else T(x) for x in values], dtype=object)

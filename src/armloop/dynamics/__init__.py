@@ -1,0 +1,7 @@
+"""A reconstructed model as equations of motion: mass matrix, bias, gravity, friction, forward dynamics."""
+
+from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
+from armloop.dynamics.effects import EffectLaw, effect_law
+from armloop.dynamics.model import ModelEquations
+
+__all__ = ["Dynamics", "EffectLaw", "ModelEquations", "effect_law", "require_mass_matrix", "training_range"]

@@ -1,0 +1,122 @@
+"""M(q), bias, gravity and friction of a reconstructed model for arrays of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armloop.dynamics.model import ModelEquations
+from armloop.errors import ModelError
+from armloop.functions import MATH, NUMPY
+from armloop.model import ReconstructedModel
+
+Array = NDArray[np.float64]
+
+_POSTURES = 2000
+
+
+class Dynamics:
+    """The equations of motion tau = M(q) vdot + bias(q, v) + gravity(q) + friction(v) of a model.
+
+    Every method takes vectors (n,) of one sample or (N, n) of many, and answers in kind. What belongs to which
+    part, and what is left out, is said at :class:`ModelEquations`.
+    """
+
+    def __init__(self, model: ReconstructedModel, *, symmetric: bool = False) -> None:
+        """Take a model; ``symmetric`` replaces M by (M + M^T) / 2, as for sparse terms one may want."""
+        self.n = model.arm.n
+        self._one = ModelEquations(model, MATH, symmetric=symmetric)
+        self._many = ModelEquations(model, NUMPY, symmetric=symmetric)
+
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """M(q), (n, n) or (N, n, n), kg m² (kg m, kg).
+
+        M_ij is the torque of joint i per unit of acceleration of joint j. It is symmetric for rigid bodies and
+        energies; sparse terms are found joint by joint, and theirs is symmetric only as far as they are right.
+        Raises ``ModelError`` where a term (of one-shot SINDy) is not linear in the acceleration alone.
+        """
+        return self._answer(lambda e, x: e.mass_matrix(x), q)
+
+    def gravity(self, q: ArrayLike) -> Array:
+        """The torques that hold the arm still at q, friction apart; springs, ripples and tilts included."""
+        return self._answer(lambda e, x: e.gravity(x), q)
+
+    def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """C(q, v) v, the torques of the motion at constant velocities."""
+        return self._answer(lambda e, x, y: e.bias(x, y), q, v)
+
+    def friction(self, v: ArrayLike, load: ArrayLike | None = None) -> Array:
+        """Friction at velocities v, 0 at rest; ``load`` for friction that grows with it (0 by default)."""
+        if load is None:
+            return self._answer(lambda e, x: e.friction(x), v)
+        return self._answer(lambda e, x, y: e.friction(x, y), v, load)
+
+    def torque(self, q: ArrayLike, v: ArrayLike, vdot: ArrayLike) -> Array:
+        """Inverse dynamics: what the drives supply."""
+        return self._answer(lambda e, x, y, z: e.torque(x, y, z), q, v, vdot)
+
+    def acceleration(self, q: ArrayLike, v: ArrayLike, tau: ArrayLike) -> Array:
+        """Forward dynamics, with dry friction by the sign of v.
+
+        Whether M can be inverted is not looked at here: :func:`require_mass_matrix` does, over a whole range.
+        """
+        return self._answer(lambda e, x, y, z: e.acceleration(x, y, z), q, v, tau)
+
+    def _answer(self, law: Callable[..., Any], *arguments: ArrayLike) -> Array:
+        arrays = [np.asarray(x, dtype=float) for x in arguments]
+        shape = arrays[0].shape
+        if shape[-1:] != (self.n,) or len(shape) not in (1, 2) or any(x.shape != shape for x in arrays):
+            shapes = ", ".join(str(x.shape) for x in arrays)
+            raise ValueError(f"vectors must all be ({self.n},) or (N, {self.n}); they are {shapes}")
+        if len(shape) == 1:
+            return np.array(law(self._one, *(x.tolist() for x in arrays)), dtype=float)
+        found = law(self._many, *([x[:, j] for j in range(self.n)] for x in arrays))
+        return _stack(found, shape[0])
+
+
+def _stack(values: Sequence[Any], N: int) -> Array:
+    """Vectors or matrices of (N,) arrays and plain numbers, samples first."""
+    if isinstance(values[0], list):
+        return np.stack([_stack(row, N) for row in values], axis=1)
+    return np.stack([np.broadcast_to(np.asarray(x, dtype=float), (N,)) for x in values], axis=1)
+
+
+def training_range(model: ReconstructedModel) -> tuple[Array, Array]:
+    """Lower and upper positions (n,) that the model was fitted on; a radian (metre) about zero if it does not say."""
+    n = model.arm.n
+    size = np.array(model.history.get("range", [[1.0] * n] * 3 + [[0.0] * n]), dtype=float)
+    return size[3] - size[0], size[3] + size[0]
+
+
+def require_mass_matrix(
+    model: ReconstructedModel, *, postures: int = _POSTURES, seed: int = 0
+) -> tuple[float, Array]:
+    """Check that forward dynamics is possible: (M + M^T) / 2 is positive definite over the training range.
+
+    Then M itself can be inverted too, and a torque always accelerates its own joint its own way.
+
+    Args:
+        postures: how many random ones within :func:`training_range` are tried.
+
+    Returns:
+        The smallest eigenvalue found and the posture (n,) it was found at.
+
+    Raises:
+        ModelError: it is not, or the model has no mass matrix.
+    """
+    lower, upper = training_range(model)
+    q = np.random.default_rng(seed).uniform(lower, upper, (postures, model.arm.n))
+    smallest = np.linalg.eigvalsh(Dynamics(model, symmetric=True).mass_matrix(q))[:, 0]
+    worst = int(np.argmin(smallest))
+    value, at = float(smallest[worst]), q[worst]
+    if not value > 0:
+        posture = ", ".join(f"{x:.2f}" for x in at)
+        raise ModelError(
+            f"the model's mass matrix is not positive definite: its smallest eigenvalue is {value:.3g} at q = ({posture}), "
+            "within the range it was fitted on; forward dynamics is impossible. Reconstruct with more data of "
+            "acceleration, or with the library rigid-body or lagrangian"
+        )
+    return value, at

@@ -1,0 +1,135 @@
+"""The listed effects' laws in plain arithmetic: what the drive must supply because of them.
+
+The laws are those of :mod:`armloop.effects`, whose columns serve arrays; here they take any kind of number, for
+systems that are differentiated or written out as formulas. Sensor effects act on records, not on arms, and have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
+from armloop.effects.base import Value, number
+from armloop.effects.gravity_tilt import tilted_gravity
+from armloop.effects.payload import link_parameters
+from armloop.errors import ModelError
+from armloop.functions import Functions
+
+#: (v, sign(v) or its smooth stand-in, load torque, time) of one joint -> its friction.
+FrictionOfJoint = Callable[[Any, Any, Any, Any], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class EffectLaw:
+    """What one effect adds to the equations of motion.
+
+    Attributes:
+        equations: inertia and what depends on q and v smoothly; None where there is none.
+        friction: the friction it adds at joint ``joint`` (0-based); None where there is none.
+        load: whether its torque loads the joints, so that friction grows with it.
+    """
+
+    equations: Equations | None = None
+    joint: int = 0
+    friction: FrictionOfJoint | None = None
+    load: bool = False
+
+
+class _JointEquations(Equations):
+    """An inertia and a law of the angle at one joint."""
+
+    def __init__(self, n: int, joint: int, inertia: float, law: Callable[[Any], Any] | None) -> None:
+        self.n, self._joint, self._inertia, self._law = n, joint, inertia, law
+
+    def inertia(self, q: Numbers) -> Rows:
+        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        M[self._joint][self._joint] = self._inertia
+        return M
+
+    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
+        tau: list[Any] = [0.0] * self.n
+        if self._law is not None:
+            tau[self._joint] = self._law(q[self._joint])
+        return tau
+
+
+class _PoseEquations(Equations):
+    """Links as their weight alone: no inertia, no Coriolis torques."""
+
+    def __init__(self, links: BodyEquations) -> None:
+        self.n, self._links = links.n, links
+
+    def inertia(self, q: Numbers) -> Rows:
+        return [[0.0] * self.n for _ in range(self.n)]
+
+    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
+        return self._links.rest(q, [0.0] * self.n)
+
+
+def effect_law(
+    arm: Arm,
+    name: str,
+    joint: int | None,
+    parameters: Mapping[str, Value],
+    functions: Functions,
+    inertial: Array | None = None,
+) -> EffectLaw:
+    """The law of an effect with given parameters.
+
+    Args:
+        joint: 1-based; None for effects of the whole arm.
+        inertial: (10 n,) link parameters of the model, which ``gravity_tilt`` needs.
+
+    Raises:
+        ModelError: the effect has no law in this form (a sensor's, or one that is an event in time).
+    """
+    n, j = arm.n, (joint or 1) - 1
+    p = {key: number(value) for key, value in parameters.items() if np.ndim(value) == 0}
+
+    def one_joint(
+        inertia: float = 0.0, law: Callable[[Any], Any] | None = None, load: bool = False
+    ) -> EffectLaw:
+        return EffectLaw(_JointEquations(n, j, inertia, law), j, load=load)
+
+    if name == "payload":
+        links = np.concatenate([np.zeros(10 * (n - 1)), link_parameters(arm, dict(parameters))])
+        return EffectLaw(BodyEquations(arm, links, functions), load=True)
+    if name == "gravity_tilt":
+        if inertial is None:
+            raise ModelError("effect gravity_tilt: its law needs the model's inertial parameters")
+        change = tilted_gravity(arm.gravity, p["roll"], p["pitch"]) - arm.gravity
+        # Gravity torques are linear in gravity: the difference of the two directions is one of them.
+        return EffectLaw(_PoseEquations(BodyEquations(arm, inertial, functions, change)), load=True)
+    if name == "rotor_inertia":
+        return one_joint(inertia=p["inertia"])
+    if name == "joint_spring":
+        return one_joint(law=lambda q: p["stiffness"] * (q - p["rest"]), load=True)
+    if name == "torque_ripple":
+        return one_joint(law=lambda q: p["amplitude"] * functions.sin(p["order"] * q + p["phase"]))
+    if name in _FRICTION:
+        law = _FRICTION[name]
+        return EffectLaw(None, j, lambda v, sign, load, t: law(p, functions, v, sign, load, t))
+    raise ModelError(
+        f"effect {name}: no law of q, v and vdot; those with one are: "
+        + ", ".join(["payload", "gravity_tilt", "rotor_inertia", "joint_spring", "torque_ripple", *_FRICTION])
+    )
+
+
+_FRICTION: dict[str, Callable[[dict[str, float], Functions, Any, Any, Any, Any], Any]] = {
+    "viscous_friction": lambda p, f, v, sign, load, t: p["coefficient"] * v,
+    "coulomb_friction": lambda p, f, v, sign, load, t: p["level"] * sign,
+    "stribeck_friction": lambda p, f, v, sign, load, t: (
+        p["static_excess"] * f.exp(-(v / p["velocity"]) * (v / p["velocity"])) * sign
+    ),
+    "friction_asymmetry": lambda p, f, v, sign, load, t: p["level"] * (sign * sign),
+    "load_dependent_friction": lambda p, f, v, sign, load, t: p["coefficient"] * abs(load) * sign,
+    "quadratic_drag": lambda p, f, v, sign, load, t: p["coefficient"] * v * abs(v),
+    "friction_drift": lambda p, f, v, sign, load, t: p["level"] * f.exp(-(t / p["time_constant"])) * sign,
+    # As if fully slid: what it is before that depends on the past (see the Drake system of presliding).
+    "presliding_hysteresis": lambda p, f, v, sign, load, t: p["level"] * sign,
+}

@@ -1,0 +1,233 @@
+"""A reconstructed model as equations of motion: M(q), bias, gravity and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from armloop.components import SparseTerms
+from armloop.dynamics.effects import EffectLaw, effect_law
+from armloop.dynamics.equations import Equations, Numbers, Rows, equations
+from armloop.errors import ModelError
+from armloop.functions import Functions
+from armloop.model import ReconstructedModel
+from armloop.pointwise import FRICTION_LAWS
+
+_LOAD_ROUNDS = 3
+
+
+class ModelEquations:
+    """tau = M(q) vdot + bias(q, v) + gravity(q) + friction(v), for any kind of number.
+
+    tau is what the drives supply. A payload, a rotor's inertia, a spring, a ripple and a tilted base, where a
+    diagnosis added them, are in M, bias and gravity (all that depends on position alone); friction effects are
+    in friction. What a sensor adds to the record is left out.
+
+    Friction with memory acts as if fully slid. Friction that grows with the load takes the torque of all but
+    friction as the load.
+
+    Vectors are sequences of n numbers, matrices lists of n rows; the numbers may be floats, arrays of samples,
+    AutoDiffXd or symbolic Expressions, with `functions` to match.
+    """
+
+    def __init__(
+        self,
+        model: ReconstructedModel,
+        functions: Functions,
+        *,
+        step: int = 3,
+        smoothing: float = 0.0,
+        sharp: bool = False,
+        symmetric: bool = False,
+    ) -> None:
+        """Take a model.
+
+        Args:
+            step: what of it: 1 gravity and dry friction, 2 with velocity terms, 3 the whole with its effects.
+            smoothing: speed, rad/s or m/s, within which dry friction changes sign as tanh(v / smoothing);
+                0 for the sign itself, which has no derivative at rest.
+            sharp: take smoothed dry friction of the model, tanh(v / p), as sign(v), for a plant that sticks.
+            symmetric: take (M + M^T) / 2 for M. The mass matrix of sparse terms is not symmetric by itself.
+
+        Raises:
+            ModelError: an added effect has no law of q, v and vdot.
+        """
+        self.n = model.arm.n
+        self.step = step
+        self.symmetric = symmetric
+        self.functions = functions
+        added = [(a.effect, a.parameters) for a in model.effects if step >= 3 and not a.effect.sensor]
+        inertial = model.inertial_parameters() if any(e.needs_inertial for e, _ in added) else None
+        laws = [
+            effect_law(
+                model.arm,
+                effect.name,
+                effect.joint,
+                {key: estimate.value for key, estimate in parameters.items()},
+                functions,
+                inertial,
+            )
+            for effect, parameters in added
+        ]
+        self._parts: list[tuple[Equations, bool]] = [
+            (equations(model.arm, component, functions), True)
+            for component in model.components
+            if not isinstance(component, SparseTerms) or component.step <= step
+        ]
+        self._parts += [(law.equations, law.load) for law in laws if law.equations is not None]
+        self._effects: list[EffectLaw] = [law for law in laws if law.friction is not None]
+        self._friction = [
+            [
+                (
+                    float(t.coefficient),
+                    FRICTION_LAWS[t.kind.replace("smooth_", "") if sharp else t.kind],
+                    float(t.parameter),
+                    t.by_load,
+                )
+                for t in joint
+                if t.step <= step
+            ]
+            for joint in model.friction.terms
+        ]
+        self._smoothing = smoothing
+        self.load_matters = any(by_load for joint in self._friction for *_, by_load in joint) or any(
+            effect.name == "load_dependent_friction" for effect, _ in added
+        )
+
+    def mass_matrix(self, q: Numbers) -> Rows:
+        """The n rows of M(q), kg m² (kg, kg m).
+
+        Raises ``ModelError`` where a term is not linear in the acceleration alone.
+        """
+        if self.step < 3:
+            raise ModelError(f"the terms up to step {self.step} hold no inertia; take step 3")
+        return self._inertia(q)
+
+    def gravity(self, q: Numbers) -> list[Any]:
+        """The n torques that hold the arm still at q, friction apart."""
+        return self._rest(q, [0.0] * self.n)
+
+    def bias(self, q: Numbers, v: Numbers) -> list[Any]:
+        """The n torques C(q, v) v of the motion at constant velocities."""
+        return [x - y for x, y in zip(self._rest(q, v), self.gravity(q), strict=True)]
+
+    def rigid(self, q: Numbers, v: Numbers, vdot: Numbers) -> list[Any]:
+        """M(q) vdot + bias(q, v) + gravity(q). Needs no mass matrix, so that every model has it."""
+        return self._torque(q, v, vdot, loads_only=False)
+
+    def load(self, q: Numbers, v: Numbers, vdot: Numbers) -> list[Any]:
+        """The n torques that load the joints, which friction may grow with."""
+        return self._torque(q, v, vdot, loads_only=True)
+
+    def friction(
+        self,
+        v: Numbers,
+        load: Sequence[Any] | None = None,
+        t: Any = 0.0,
+        signs: Sequence[Any] | None = None,
+    ) -> list[Any]:
+        """The n friction torques at velocities v; at rest, where they are not determined, 0.
+
+        Args:
+            load: n torques, for friction that grows with them; 0 by default.
+            t: time, s, for friction that changes with it.
+            signs: n directions to take instead of those of v.
+        """
+        f = self.functions
+        loads = [0.0] * self.n if load is None else load
+        if signs is None:
+            signs = [f.tanh(x / self._smoothing) if self._smoothing else f.sign(x) for x in v]
+        total: list[Any] = []
+        for speed, sign, torque, laws in zip(v, signs, loads, self._friction, strict=True):
+            own: Any = 0.0
+            for coefficient, law, parameter, by_load in laws:
+                value = coefficient * law(speed, sign, parameter, f)
+                own = own + (value * abs(torque) if by_load else value)
+            total.append(own)
+        for effect in self._effects:
+            j = effect.joint
+            assert effect.friction is not None
+            total[j] = total[j] + effect.friction(v[j], signs[j], loads[j], t)
+        return total
+
+    def torque(self, q: Numbers, v: Numbers, vdot: Numbers, t: Any = 0.0) -> list[Any]:
+        """Inverse dynamics: the n torques of the drives."""
+        rigid = self.rigid(q, v, vdot)
+        load = self.load(q, v, vdot) if self.load_matters else None
+        return [x + y for x, y in zip(rigid, self.friction(v, load, t), strict=True)]
+
+    def acceleration(self, q: Numbers, v: Numbers, tau: Numbers, t: Any = 0.0) -> list[Any]:
+        """Forward dynamics: vdot of M(q) vdot = tau - bias(q, v) - gravity(q) - friction(v).
+
+        Friction that grows with the load depends on vdot in turn, c |M vdot + rest|. Where the loads' signs are
+        known it is linear in vdot; they are taken from the solution before, three times.
+
+        M must have a positive definite symmetric part (see :func:`armloop.dynamics.require_mass_matrix`).
+        """
+        M, joints = self.mass_matrix(q), range(self.n)
+        friction = self.friction(v, None, t)
+        drive = [x - y - z for x, y, z in zip(tau, self._rest(q, v), friction, strict=True)]
+        vdot = solve(M, drive)
+        if not self.load_matters:
+            return vdot
+        slopes = [x - y for x, y in zip(self.friction(v, [1.0] * self.n, t), friction, strict=True)]
+        load_M, load_rest = self._inertia(q, loads_only=True), self._rest(q, v, loads_only=True)
+        for _ in range(_LOAD_ROUNDS):
+            loads = [
+                sum((m * a for m, a in zip(row, vdot, strict=True)), x)
+                for row, x in zip(load_M, load_rest, strict=True)
+            ]
+            signed = [slope * self.functions.sign(x) for slope, x in zip(slopes, loads, strict=True)]
+            A = [[M[i][j] + signed[i] * load_M[i][j] for j in joints] for i in joints]
+            vdot = solve(A, [drive[i] - signed[i] * load_rest[i] for i in joints])
+        return vdot
+
+    def _inertia(self, q: Numbers, loads_only: bool = False) -> Rows:
+        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        for part, is_load in self._parts:
+            if is_load or not loads_only:
+                M = [
+                    [x + y for x, y in zip(a, b, strict=True)]
+                    for a, b in zip(M, part.inertia(q), strict=True)
+                ]
+        if self.symmetric:
+            n = range(self.n)
+            M = [[M[i][j] if i == j else 0.5 * (M[i][j] + M[j][i]) for j in n] for i in n]
+        return M
+
+    def _rest(self, q: Numbers, v: Numbers, loads_only: bool = False) -> list[Any]:
+        tau: list[Any] = [0.0] * self.n
+        for part, is_load in self._parts:
+            if is_load or not loads_only:
+                tau = [x + y for x, y in zip(tau, part.rest(q, v), strict=True)]
+        return tau
+
+    def _torque(self, q: Numbers, v: Numbers, vdot: Numbers, loads_only: bool) -> list[Any]:
+        still: Numbers = [0.0] * self.n
+        v, vdot = v if self.step >= 2 else still, vdot if self.step >= 3 else still
+        tau: list[Any] = [0.0] * self.n
+        for part, is_load in self._parts:
+            if is_load or not loads_only:
+                tau = [x + y for x, y in zip(tau, part.torque(q, v, vdot), strict=True)]
+        return tau
+
+
+def solve(A: Rows, b: Sequence[Any]) -> list[Any]:
+    """The solution of A x = b for any kind of number, by elimination in the given order.
+
+    Without a choice of pivots, since symbols cannot be compared: for a matrix with a positive definite symmetric
+    part all pivots are positive.
+    """
+    n = len(b)
+    A, x = [list(row) for row in A], list(b)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = A[i][k] / A[k][k]
+            for j in range(k + 1, n):
+                A[i][j] = A[i][j] - factor * A[k][j]
+            x[i] = x[i] - factor * x[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            x[k] = x[k] - A[k][j] * x[j]
+        x[k] = x[k] / A[k][k]
+    return x

@@ -1,0 +1,198 @@
+"""The samples of a reconstruction, chunk by chunk: in memory, or conditioned anew on every pass over the logs.
+
+Whatever a method needs of them is a sum over chunks, computed by workers, or a look at the reference: all samples of
+small logs, an even selection from large ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_numbers
+from armloop.motion import Motion, Samples
+from armloop.pieces import LogSource
+from armloop.reconstruction.options import Options
+from armloop.signals import Conditioning, ShortRunError, condition, independent_rows, velocity_noise
+from armloop.workers import Serial, Workers, map_reduce
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Answer = TypeVar("Answer")
+
+#: Samples of the reference: enough for clusters and quantiles.
+REFERENCE = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Conditioned samples of whole runs, with the parts they play.
+
+    Attributes:
+        samples: N of them.
+        blocks: (N,) number of the block each lies in, rising over the chunks.
+        held_out: (N,) those that no step may fit.
+        validation: (N,) those that choose orders; they are used for the final fit, too.
+        independent: (N,) so many of them that four are left per period of the filter's corner.
+    """
+
+    samples: Samples
+    blocks: NDArray[np.intp]
+    held_out: Mask
+    validation: Mask
+    independent: Mask
+
+    @staticmethod
+    def of(samples: Samples, options: Options, first: int = 0, held_out: Mask | None = None) -> Chunk:
+        """Deal samples into folds by blocks, the first of them numbered ``first``."""
+        blocks = first + block_numbers(samples.motion, options.block_seconds)
+        fold = blocks % options.folds
+        held_out = fold == 0 if held_out is None else held_out
+        return Chunk(samples, blocks, held_out, fold == 1, independent_rows(samples))
+
+    def take(self, rows: NDArray[np.intp]) -> Chunk:
+        """Some samples, in order; each run keeps at least one."""
+        old, motion = self.samples, self.samples.motion
+        starts = np.searchsorted(rows, motion.starts).astype(np.intp)
+        taken = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
+        samples = Samples(taken, old.tau[rows], old.moving[rows], old.period, old.cutoff_hz)
+        return Chunk(
+            samples, self.blocks[rows], self.held_out[rows], self.validation[rows], self.independent[rows]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Conditioned:
+    """A chunk that is made when it is needed."""
+
+    source: LogSource
+    how: Conditioning
+    noise: Array | None
+    options: Options
+    first: int = 0
+
+    def chunk(self) -> Chunk | None:
+        """None where no run is long enough for the filter."""
+        try:
+            samples = condition([self.source.read()], self.how, self.noise)
+        except ShortRunError:
+            return None
+        return Chunk.of(samples, self.options, self.first)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A chunk in memory."""
+
+    kept: Chunk
+
+    def chunk(self) -> Chunk:
+        return self.kept
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """All samples of a reconstruction.
+
+    Attributes:
+        parts: what the chunks are made from.
+        reference: samples for global statistics: all of them, or an even selection.
+        workers: who computes sums over the chunks.
+    """
+
+    parts: Sequence[_Conditioned | _Kept]
+    reference: Chunk
+    workers: Workers
+
+    @staticmethod
+    def of(samples: Samples, options: Options, held_out: Mask | None = None) -> Data:
+        """Samples in memory; ``held_out`` (N,) by default is every ``folds``-th block."""
+        chunk = Chunk.of(samples, options, held_out=held_out)
+        return Data([_Kept(chunk)], chunk, Serial())
+
+    @staticmethod
+    def streamed(
+        logs: Sequence[LogSource], how: Conditioning, options: Options, workers: Workers | None = None
+    ) -> Data:
+        """Samples that are read and conditioned anew on every pass, each log apart from the others.
+
+        The dead zones of the velocities come from the noisiest log, as they do in memory.
+
+        Raises:
+            ShortRunError: no log has a run long enough for the filter.
+        """
+        workers = workers or Serial()
+        noise = None
+        if how.cutoff_hz > 0:
+            noise = np.max(list(workers.map(partial(_noise, how.cutoff_hz), logs)), axis=0)
+        stride = max(1, sum(log.samples for log in logs) // REFERENCE)
+        parts, reference, first = [], [], 0
+        surveyed = workers.map(
+            partial(_survey, stride), [_Conditioned(log, how, noise, options) for log in logs]
+        )
+        for log, survey in zip(logs, surveyed, strict=True):
+            if survey is not None:
+                parts.append(_Conditioned(log, how, noise, options, first))
+                thinned, blocks = survey
+                fold = (first + thinned.blocks) % options.folds
+                reference.append(
+                    replace(thinned, blocks=first + thinned.blocks, held_out=fold == 0, validation=fold == 1)
+                )
+                first += blocks
+        if not parts:
+            condition([logs[0].read()], how, noise)  # says which run is too short
+        return Data(parts, _joined(reference), workers)
+
+    def map(self, function: Callable[[Chunk], Answer]) -> Iterator[Answer]:
+        """The function's answers for all chunks, in order."""
+        return self.workers.map(partial(_on_chunk, function), self.parts)
+
+    def sum(self, function: Callable[[Chunk], Answer]) -> Answer:
+        """Sum of the function's answers over all chunks."""
+        return map_reduce(self.workers, partial(_on_chunk, function), self.parts)
+
+
+def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | _Kept) -> Answer:
+    chunk = part.chunk()
+    assert chunk is not None, "a log changed between two passes"
+    return function(chunk)
+
+
+def _noise(cutoff_hz: float, log: LogSource) -> Array:
+    return velocity_noise(log.read(), cutoff_hz)
+
+
+def _survey(stride: int, part: _Conditioned) -> tuple[Chunk, int] | None:
+    """An even selection of a chunk's samples, and its number of blocks."""
+    chunk = part.chunk()
+    if chunk is None:
+        return None
+    runs = chunk.samples.motion.runs()
+    rows = np.concatenate([np.arange(run.start, run.stop, stride) for run in runs]).astype(np.intp)
+    return chunk.take(rows), int(chunk.blocks[-1]) + 1
+
+
+def _joined(chunks: Sequence[Chunk]) -> Chunk:
+    """One chunk of several."""
+    samples = [chunk.samples for chunk in chunks]
+    motions = [s.motion for s in samples]
+    before = np.cumsum([0, *(m.samples for m in motions[:-1])])
+    starts = np.concatenate([m.starts + n for m, n in zip(motions, before, strict=True)])
+    time, q, v, vdot = (
+        np.concatenate([getattr(m, key) for m in motions]) for key in ("time", "q", "v", "vdot")
+    )
+    tau, moving = (np.concatenate([getattr(s, key) for s in samples]) for key in ("tau", "moving"))
+    first = samples[0]
+    whole = Samples(Motion(time, q, v, vdot, starts), tau, moving, first.period, first.cutoff_hz)
+    return Chunk(
+        whole,
+        np.concatenate([c.blocks for c in chunks]),
+        np.concatenate([c.held_out for c in chunks]),
+        np.concatenate([c.validation for c in chunks]),
+        np.concatenate([c.independent for c in chunks]),
+    )

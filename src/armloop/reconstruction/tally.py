@@ -1,0 +1,88 @@
+"""How well a model predicts held-out samples, summed chunk by chunk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.model import ReconstructedModel
+from armloop.reconstruction.data import Chunk
+from armloop.reconstruction.sorter import Sorter
+from armloop.scoring import Score, residual
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Sums over held-out samples; they add over chunks.
+
+    Attributes:
+        sums: per working condition (0 where samples are not sorted), (2, 3, n): of samples at rest and of
+            moving ones, the squared errors, the squared torques and the number.
+        samples: number of held-out samples.
+    """
+
+    sums: dict[int, Array]
+    samples: int
+
+    def __add__(self, other: Tally) -> Tally:
+        sums = dict(self.sums)
+        for label, values in other.sums.items():
+            sums[label] = sums[label] + values if label in sums else values
+        return Tally(sums, self.samples + other.samples)
+
+    @staticmethod
+    def of(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None) -> Tally:
+        """Sums of one chunk, of all runs as they are: prediction and filter need every sample."""
+        samples, held = chunk.samples, chunk.held_out
+        squares = residual(model, samples)[held] ** 2
+        torques, moving = samples.tau[held] ** 2, samples.moving[held]
+        labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples.motion)
+        sums = {}
+        for label in np.unique(labels[held]):
+            rows = labels[held] == label
+            masks = (rows[:, None] & ~moving, rows[:, None] & moving)
+            parts = [
+                [(squares * m).sum(axis=0), (torques * m).sum(axis=0), m.sum(axis=0).astype(float)]
+                for m in masks
+            ]
+            sums[int(label)] = np.array(parts)
+        return Tally(sums, int(held.sum()))
+
+    def score(self) -> Score:
+        """Score of all held-out samples."""
+        rest, moving = np.sum(list(self.sums.values()), axis=0)
+        rms = [_root(t, c) for t, c in zip(moving[1], moving[2], strict=True)]
+        return Score(_errors(rest + moving), _errors(moving), _errors(rest), rms, self.samples)
+
+    def baseline(self) -> dict[str, Any]:
+        """What the model leaves, per joint: of the condition that it explains worst.
+
+        A later run is one of motion; easy data (creeping, steady) must not make the model look better than
+        it is on those.
+        """
+        per_condition = [_errors(moving)["rmse"] for _, moving in self.sums.values()]
+        rmse = [
+            max((x for x in joint if x is not None), default=None)
+            for joint in zip(*per_condition, strict=True)
+        ]
+        rms = self.score().rms
+        nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
+        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "samples": self.samples}
+
+
+def _errors(sums: Array) -> dict[str, Any]:
+    rmse = [_root(e, c) for e, c in zip(sums[0], sums[2], strict=True)]
+    rms = [_root(t, c) for t, c in zip(sums[1], sums[2], strict=True)]
+    return {
+        "rmse": rmse,
+        "nrmse": [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)],
+    }
+
+
+def _root(total: float, count: float) -> float | None:
+    return float(np.sqrt(total / count)) if count else None

@@ -1,0 +1,77 @@
+"""What `armloop excite` prints: how informative the reference is beside random ones, and what it uses of the limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armloop.reports.tables import Table, make_table
+from armloop.reports.words import number
+
+if TYPE_CHECKING:
+    from armloop.design import DataRatio, Excitation
+
+_LIMITS = ("position", "velocity", "acceleration", "torque")
+
+
+def measures_table(result: Excitation) -> Table:
+    """Condition number and log-determinant of the reference and of random ones within the same limits."""
+    rows: list[list[object]] = [
+        ["optimised", result.measure.condition, result.measure.logdet, result.measure.error]
+    ]
+    table = np.array([[m.condition, m.logdet, m.error] for m in result.random])
+    for name, part in (
+        ("random, median", 0.5),
+        ("random, least tenth", 0.1),
+        ("random, greatest tenth", 0.9),
+    ):
+        rows.append([name, *(float(x) for x in np.quantile(table, part, axis=0, method="nearest"))])
+    timing = result.timing
+    title = (
+        f"{result.arm.name}: {result.regression.count} coefficients ({result.settings.library}), "
+        f"{timing.duration:g} s, {timing.harmonics} harmonics of {number(1 / timing.period)} Hz, criterion "
+        f"{result.settings.criterion}"
+    )
+    return make_table(["reference", "condition number", "log-determinant", "coefficient error"], rows, title)
+
+
+def use_table(result: Excitation) -> Table:
+    """The largest part of each limit that the reference uses, per joint."""
+    rows = []
+    for name, parts, bounded in zip(_LIMITS, result.use, _bounded(result), strict=True):
+        rows.append(
+            [
+                name,
+                *(
+                    f"{100 * x:.0f} %" if known else "no limit"
+                    for x, known in zip(parts, bounded, strict=True)
+                ),
+            ]
+        )
+    title = f"Largest part used of the limits ({100 * result.settings.reserve:.0f} % of the effort kept in reserve)"
+    return make_table(["limit", *(f"joint {j + 1}" for j in range(result.arm.n))], rows, title)
+
+
+def ratio_words(ratio: DataRatio, result: Excitation) -> str:
+    """The comparison in a sentence."""
+    values = ratio.to_dict()
+    most = int(ratio.trajectories[-1])
+    if values["median"] is None:
+        need = f"more than {most} times as much data"
+    else:
+        low, high = (
+            number(values["low"], 2),
+            number(values["high"], 2) if values["high"] else f"more than {most}",
+        )
+        need = f"{number(values['median'], 2)} times as much data ({low} to {high})"
+    return (
+        f"For the coefficient error that {result.timing.period:g} s of it give, random references need {need}, each "
+        f"{result.timing.period:g} s a new one"
+    )
+
+
+def _bounded(result: Excitation) -> np.ndarray:
+    known = np.ones_like(result.use, dtype=bool)
+    known[3] = np.isfinite(result.limits.effort)
+    return known

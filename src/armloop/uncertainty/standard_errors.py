@@ -1,0 +1,246 @@
+"""Standard errors of all coefficients of a reconstructed model, from the samples it was fitted on.
+
+The terms are taken as given: that they were chosen by the same data is not part of the errors, nor is what a
+wrong term or noise in the motion shifts. A column that depends on the torque passing a joint is taken at the
+estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.model import ReconstructedModel
+from armloop.motion import Motion, Samples
+from armloop.uncertainty.blocking import block_length, correlation_time, covered_time, independent_blocks
+from armloop.uncertainty.sandwich import Equations
+from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
+
+Array = NDArray[np.float64]
+
+#: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
+_PIECE, _MARGIN = 8192, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Samples that one regression used.
+
+    Attributes:
+        steps: the steps whose terms it found, (1, 2, 3) where they were regressed together.
+        rows: (N, n) the samples fitted, per joint.
+    """
+
+    steps: tuple[int, ...]
+    rows: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """One problem's unknowns with their covariance (p, p) and degrees of freedom (p,)."""
+
+    unknowns: list[Unknown]
+    covariance: Array
+    freedom: Array
+    equations: Equations
+
+    @property
+    def std_error(self) -> Array:
+        """(p,) standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+
+def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> dict[str, Any]:
+    """What the model file keeps under ``uncertainty``.
+
+    Args:
+        samples: the training samples, conditioned as for the fit.
+        fitted: the regressions in their order.
+
+    Returns:
+        ``joints`` and ``friction``: per joint, for every term's name (and ``v_s``) its ``std_error`` and
+        ``degrees_of_freedom`` of Student's t; ``shared``: the same for terms that serve all joints;
+        ``stribeck``: per joint f_s, f_c, f_v, v_s of Eq. (34), where the law has that form;
+        ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
+    """
+    parts, seconds, correlation = covariances(model, samples, fitted)
+    n = model.arm.n
+    table: dict[str, Any] = {
+        "joints": [{} for _ in range(n)],
+        "friction": [{} for _ in range(n)],
+        "shared": {},
+    }
+    for part in parts:
+        for unknown, error, freedom in zip(part.unknowns, part.std_error, part.freedom, strict=True):
+            place = table[unknown.kind]
+            where = place if unknown.joint is None else place[unknown.joint]
+            where[unknown.name] = _entry(error, freedom)
+    table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
+    return {
+        "method": "jackknife over blocks of samples; the terms are taken as given",
+        "block_seconds": seconds,
+        "correlation_seconds": correlation,
+        **table,
+    }
+
+
+def covariances(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]
+) -> tuple[list[Errors], float, float]:
+    """Covariance of every problem's unknowns, the blocks' length and the residual's correlation time, s."""
+    todo = problems(model)
+    residual, spread = _residuals(todo, samples, fitted)
+    rows = np.logical_or.reduce([part.rows for part in fitted])
+    correlation = max(
+        correlation_time(residual[:, j], rows[:, j], samples.motion, samples.period)
+        for j in range(model.arm.n)
+    )
+    covered = [
+        covered_time(samples.motion.time, np.any(one.rows, axis=1, keepdims=True)[:, 0]) for one in fitted
+    ]
+    seconds = block_length(correlation, min(covered))
+    blocks = independent_blocks(samples.motion, seconds)
+    found = []
+    for problem in todo:
+        if problem.unknowns:
+            sums = _equations(problem, samples, fitted, blocks, spread)
+            found.append(Errors(problem.unknowns, sums.covariance(), sums.degrees_of_freedom(), sums))
+    return found, seconds, correlation
+
+
+def gauss_newton_steps(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]
+) -> list[tuple[list[Unknown], Array]]:
+    """Every problem's unknowns with the step (p,) that solves their linearised estimating equations."""
+    todo = problems(model)
+    _, spread = _residuals(todo, samples, fitted)
+    whole = np.zeros(samples.motion.samples, dtype=np.intp)
+    return [
+        (problem.unknowns, _equations(problem, samples, fitted, whole, spread).step())
+        for problem in todo
+        if problem.unknowns
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Portion:
+    """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,)."""
+
+    index: NDArray[np.intp]
+    joint: int
+    stage: int
+    where: NDArray[np.intp]
+    X: Array
+    r: Array
+
+
+def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Iterator[_Portion]:
+    stages = _stages(problem, fitted)
+    theta = np.array([u.value if u.linear else 0.0 for u in problem.unknowns])
+    for part, core, start in _pieces(samples):
+        for design in problem.designs(part):
+            stage = stages[design.where]
+            for s, one in enumerate(fitted):
+                inside = np.flatnonzero(one.rows[start : start + core.stop - core.start, design.joint])
+                if len(inside) == 0:
+                    continue
+                X = design.X[core][inside]
+                known = np.where(stage <= s, theta[design.where], 0.0)
+                r = part.tau[core][inside, design.joint] - X @ known
+                yield _Portion(start + inside, design.joint, s, design.where, X, r)
+
+
+def _stages(problem: Problem, fitted: Sequence[Fitted]) -> NDArray[np.intp]:
+    order = {step: s for s, one in enumerate(fitted) for step in one.steps}
+    return np.array([order[unknown.step] for unknown in problem.unknowns], dtype=np.intp)
+
+
+def _pieces(samples: Samples) -> Iterator[tuple[Samples, slice, int]]:
+    """Consecutive samples with a margin on both sides, the part that counts, and where it starts."""
+    motion, N = samples.motion, samples.motion.samples
+    margin = int(np.ceil(_MARGIN / samples.period))
+    for start in range(0, N, _PIECE):
+        stop = min(start + _PIECE, N)
+        low, high = max(0, start - margin), min(N, stop + margin)
+        inner = motion.starts[(motion.starts > low) & (motion.starts < high)] - low
+        cut = slice(low, high)
+        part = Motion(
+            motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
+        )
+        yield (
+            Samples(part, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz),
+            slice(start - low, stop - low),
+            start,
+        )
+
+
+def _residuals(todo: Sequence[Problem], samples: Samples, fitted: Sequence[Fitted]) -> tuple[Array, Array]:
+    """(N, n) residual of the last regression that used a sample, and (S, n) mean squares per regression."""
+    residual = np.zeros_like(samples.tau)
+    squares, counts = np.zeros((2, len(fitted), samples.motion.joints))
+    for problem in todo:
+        for portion in _walk(problem, samples, fitted):
+            residual[portion.index, portion.joint] = portion.r
+            squares[portion.stage, portion.joint] += portion.r @ portion.r
+            counts[portion.stage, portion.joint] += len(portion.r)
+    return residual, squares / np.maximum(counts, 1.0)
+
+
+def _equations(
+    problem: Problem,
+    samples: Samples,
+    fitted: Sequence[Fitted],
+    blocks: NDArray[np.intp],
+    spread: Array,
+) -> Equations:
+    p, B = len(problem.unknowns), int(blocks[-1]) + 1
+    stages = _stages(problem, fitted)
+    jacobian, score, count = np.zeros((B, p, p)), np.zeros((B, p)), np.zeros((B, p))
+    for portion in _walk(problem, samples, fitted):
+        weight = 1 / max(spread[portion.stage, portion.joint], 1e-300) if problem.weighted else 1.0
+        own = stages[portion.where] == portion.stage
+        seen = stages[portion.where] <= portion.stage
+        rows, columns = portion.where[own], portion.where[seen]
+        mine = blocks[portion.index]
+        edges = np.flatnonzero(np.diff(mine, prepend=-1, append=B))
+        for first, last in pairwise(edges):
+            b, X = mine[first], portion.X[first:last]
+            jacobian[b][np.ix_(rows, columns)] += weight * X[:, own].T @ X[:, seen]
+            score[b, rows] += weight * X[:, own].T @ portion.r[first:last]
+            count[b, rows] += last - first
+    used = count.any(axis=1)
+    joint = problem.unknowns[0].joint
+    variance = np.ones(p) if problem.weighted else spread[stages, joint]
+    return Equations(jacobian[used], score[used], count[used], stages, variance)
+
+
+def _entry(error: float, freedom: float) -> dict[str, float]:
+    return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
+
+
+def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
+    """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
+    kinds = {term.kind: term.name(joint + 1) for term in model.friction.terms[joint]}
+    sums = {"static": ("sign",), "coulomb": ("sign", "stribeck"), "viscous": ("viscous",)}
+    if "sign" not in kinds:
+        return {}
+    found = {}
+    for key, value in model.friction.stribeck_parameters(joint).items():
+        if key == "stribeck_velocity":
+            names = {STRIBECK_VELOCITY}
+        else:
+            names = {kinds[kind] for kind in sums.get(key, ()) if kind in kinds}
+        for part in parts:
+            chosen = np.array(
+                [u.kind == "friction" and u.joint == joint and u.name in names for u in part.unknowns], float
+            )
+            if chosen.any():
+                error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
+                freedom = float(part.freedom[chosen > 0].min())
+                found[key] = {"value": float(value), **_entry(error, freedom)}
+    return found

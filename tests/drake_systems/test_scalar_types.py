@@ -1,0 +1,166 @@
+"""Every system of a model gives one answer in float, AutoDiffXd and Expression, and the right derivative."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from exact_parts import energies, model_of, rigid_body, scara_terms
+from numpy.testing import assert_allclose
+from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
+from pydrake.symbolic import Expression, Variable
+from pydrake.systems.framework import DiagramBuilder
+
+from armloop.arm import load_arm
+from armloop.drake_systems import (
+    AccelerationGains,
+    ComputedTorque,
+    EffectTorque,
+    Feedforward,
+    ForwardDynamics,
+    JointFriction,
+    JointFrictionSystem,
+    PidController,
+    PidGains,
+    PreslidingFriction,
+    Stop,
+)
+from armloop.drake_systems.effects import EFFECTS
+from armloop.errors import ModelError
+
+ARM, SCARA = load_arm("three_axis"), load_arm("scara")
+PARAMETERS = {
+    "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001},
+    "viscous_friction": {"coefficient": 0.3},
+    "coulomb_friction": {"level": 0.2},
+    "stribeck_friction": {"static_excess": 0.2, "velocity": 0.1},
+    "friction_asymmetry": {"level": 0.1},
+    "load_dependent_friction": {"coefficient": 0.1},
+    "quadratic_drag": {"coefficient": 0.2},
+    "friction_drift": {"level": 0.3, "time_constant": 50.0},
+    "joint_spring": {"stiffness": 1.5, "rest": 0.3},
+    "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
+    "presliding_hysteresis": {"level": 0.2, "width": 0.01},
+    "rotor_inertia": {"inertia": 0.05},
+    "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
+}
+LOADED = tuple(
+    (name, None if name in ("payload", "gravity_tilt") else 2, PARAMETERS[name])
+    for name in ("payload", "coulomb_friction", "joint_spring", "rotor_inertia", "gravity_tilt")
+)
+STILL_MODELS = {
+    "rigid body": lambda: model_of(ARM, rigid_body(ARM), effects=LOADED),
+    "energies": lambda: model_of(SCARA, energies(SCARA)),
+    "sparse terms": lambda: model_of(SCARA, *scara_terms(SCARA)),
+}
+FRICTION = [JointFriction(1.3, 1.0, 0.1, 2.0)] * 3
+ELEMENTS = [Stop(1, 0.5, 0.01), Stop(1, 0.2, 0.3), Stop(3, 0.4, 0.05)]
+
+
+def effect_torque(name):
+    joint = None if name in ("payload", "gravity_tilt") else 2
+    inertial = model_of(ARM).inertial_parameters() if name == "gravity_tilt" else None
+    return EffectTorque(ARM, name, joint, PARAMETERS[name], inertial=inertial, smoothing=0.2)
+
+
+SYSTEMS = {
+    **{f"feedforward of {k}": lambda m=m: Feedforward(m(), m().arm.n) for k, m in STILL_MODELS.items()},
+    "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 3, 2),
+    **{
+        f"computed torque of {k}": lambda m=m: ComputedTorque(m(), AccelerationGains.critical(m().arm.n))
+        for k, m in STILL_MODELS.items()
+    },
+    "computed torque with integral": lambda: ComputedTorque(
+        model_of(ARM),
+        AccelerationGains([400.0] * 3, [40.0] * 3, [100.0] * 3),
+        friction_at="state",
+        period=0.01,
+    ),
+    **{
+        f"forward dynamics of {k}": lambda m=m: ForwardDynamics(m(), smoothing=0.2)
+        for k, m in STILL_MODELS.items()
+    },
+    "friction": lambda: JointFrictionSystem(FRICTION, 0.2),
+    "presliding": lambda: PreslidingFriction(3, ELEMENTS, 0.01),
+    "pid": lambda: PidController(PidGains.paper(3), 0.01),
+    **{f"effect {name}": lambda name=name: effect_torque(name) for name in PARAMETERS},
+}
+
+
+class Answer:
+    """Outputs and time derivatives of a system as one function of all its inputs and states."""
+
+    def __init__(self, system):
+        self.system = system
+        self.context = system.CreateDefaultContext()
+        self.inputs = [system.get_input_port(i) for i in range(system.num_input_ports())]
+        self.continuous = self.context.num_continuous_states()
+        self.discrete = self.context.num_discrete_state_groups()
+        sizes = [port.size() for port in self.inputs] + [self.continuous]
+        sizes += [self.context.get_discrete_state(g).size() for g in range(self.discrete)]
+        self.ends = np.cumsum(sizes)
+
+    def __call__(self, x):
+        parts = np.split(x, self.ends[:-1])
+        for port in self.inputs:
+            port.FixValue(self.context, parts.pop(0))
+        if self.continuous:
+            self.context.SetContinuousState(parts[0])
+        for group in range(self.discrete):
+            self.context.SetDiscreteState(group, parts[1 + group])
+        outputs = [self.system.get_output_port(i) for i in range(self.system.num_output_ports())]
+        values = [port.Eval(self.context) for port in outputs]
+        if self.continuous:
+            values.append(self.system.EvalTimeDerivatives(self.context).CopyToVector())
+        if self.discrete:
+            update = self.system.EvalUniquePeriodicDiscreteUpdate(self.context)
+            values += [update.get_vector(group).CopyToVector() for group in range(self.discrete)]
+        return np.concatenate(values)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_one_answer_and_its_derivative(name):
+    system = SYSTEMS[name]()
+    answer = Answer(system)
+    x = np.random.default_rng(7).uniform(0.1, 0.9, answer.ends[-1])
+    expected, h = answer(x), 1e-6
+    slopes = np.stack([(answer(x + h * e) - answer(x - h * e)) / (2 * h) for e in np.eye(len(x))], axis=1)
+    dual = Answer(system.ToAutoDiffXd())(InitializeAutoDiff(x).ravel())
+    assert_allclose(ExtractValue(dual).ravel(), expected, rtol=1e-9, atol=1e-9)
+    scale = np.abs(slopes).max()
+    assert scale > 0
+    # what does not depend on x has no derivatives at all
+    gradient = np.stack([y.derivatives() if len(y.derivatives()) else np.zeros(len(x)) for y in dual])
+    assert_allclose(gradient, slopes, atol=1e-6 * max(scale, 1.0))
+    symbols = [Variable(f"x{i}") for i in range(len(x))]
+    formulas = Answer(system.ToSymbolic())(np.array([Expression(s) for s in symbols]))
+    values = dict(zip(symbols, x, strict=True))
+    assert_allclose([f.Evaluate(values) for f in formulas], expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_a_diagram_with_it_can_be_cloned(name):
+    system = SYSTEMS[name]()
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("it", system)
+    for i in range(system.num_input_ports()):
+        builder.ExportInput(system.get_input_port(i))
+    builder.ExportOutput(system.get_output_port(0))
+    diagram = builder.Build()
+    first, second = Answer(diagram), Answer(diagram.Clone())
+    x = np.random.default_rng(8).uniform(0.1, 0.9, first.ends[-1])
+    assert_allclose(second(x), first(x), rtol=1e-12)
+
+
+def test_every_effect_of_the_plant_but_the_sensors_has_a_system():
+    assert set(EFFECTS) - {"torque_offset"} <= set(PARAMETERS)
+    with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
+        EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
+
+
+def test_a_model_of_numbers_alone_stays_float():
+    class Numbers:
+        def feedforward(self, q, v, vdot, step):
+            return q
+
+    assert Feedforward(Numbers(), 2).ToAutoDiffXdMaybe() is None
+    assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToAutoDiffXdMaybe() is None

@@ -1,0 +1,112 @@
+"""M(q), bias, gravity and friction of a model against Drake's own rigid bodies and the model's own predictions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from exact_parts import energies, model_of, random_motion, rigid_body, scara_terms
+from numpy.testing import assert_allclose
+from pydrake.multibody.plant import MultibodyPlant
+
+from armloop.arm import Arm, load_arm
+from armloop.components import SparseTerms
+from armloop.drake_systems.plant import add_links
+from armloop.dynamics import Dynamics, require_mass_matrix
+from armloop.errors import ModelError
+from armloop.library.friction import FrictionTerm
+
+ARMS = {name: load_arm(name) for name in ("three_axis", "scara")}
+KINDS = {
+    "rigid body": lambda: (ARMS["three_axis"], (rigid_body(ARMS["three_axis"]),)),
+    "energies": lambda: (ARMS["three_axis"], (energies(ARMS["three_axis"]),)),
+    "energies of a prismatic joint": lambda: (ARMS["scara"], (energies(ARMS["scara"]),)),
+    "sparse terms": lambda: (ARMS["scara"], scara_terms(ARMS["scara"])),
+}
+EFFECTS = (
+    ("payload", None, {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001}),
+    ("viscous_friction", 1, {"coefficient": 0.3}),
+    ("coulomb_friction", 2, {"level": 0.2}),
+    ("joint_spring", 2, {"stiffness": 1.5, "rest": 0.3}),
+    ("torque_ripple", 1, {"amplitude": 0.2, "order": 7.0, "phase": 0.4}),
+    ("rotor_inertia", 3, {"inertia": 0.05}),
+    ("gravity_tilt", None, {"roll": 0.1, "pitch": -0.05}),
+    ("torque_offset", 1, {"offset": 0.7}),
+)
+
+
+def drake(arm: Arm) -> MultibodyPlant:
+    plant = MultibodyPlant(0.0)
+    add_links(plant, arm)
+    plant.Finalize()
+    return plant
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parts_are_those_of_drake(kind):
+    arm, components = KINDS[kind]()
+    model, plant = model_of(arm, *components), drake(arm)
+    context = plant.CreateDefaultContext()
+    dynamics, motion = Dynamics(model), random_motion(arm.n, 5, seed=3)
+    M, bias = dynamics.mass_matrix(motion.q), dynamics.bias(motion.q, motion.v)
+    for k in range(motion.samples):
+        plant.SetPositions(context, motion.q[k])
+        plant.SetVelocities(context, motion.v[k])
+        assert_allclose(M[k], plant.CalcMassMatrix(context), atol=1e-9)
+        assert_allclose(bias[k], plant.CalcBiasTerm(context), atol=1e-9)
+        gravity = -plant.CalcGravityGeneralizedForces(context)
+        assert_allclose(dynamics.gravity(motion.q[k]), gravity, atol=1e-9)
+        assert_allclose(dynamics.mass_matrix(motion.q[k]), M[k], atol=1e-12)
+    assert M.shape == (5, arm.n, arm.n)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_parts_add_up_to_the_prediction_and_invert_it(kind):
+    arm, components = KINDS[kind]()
+    effects = EFFECTS if kind != "energies" else ()
+    friction = (*model_of(arm).friction.terms[0], FrictionTerm("load_sign", 0.05), FrictionTerm("root", 0.1))
+    model = model_of(arm, *components, friction=friction, effects=effects)
+    dynamics, motion = Dynamics(model), random_motion(arm.n, 7, seed=4)
+    q, v, vdot = motion.q, motion.v, motion.vdot
+    tau = dynamics.torque(q, v, vdot)
+    assert_allclose(tau, model.predict(motion, sensors=False), atol=1e-9)
+    assert_allclose(dynamics.acceleration(q, v, tau), vdot, atol=1e-8)
+    for k in range(motion.samples):
+        assert_allclose(dynamics.torque(q[k], v[k], vdot[k]), tau[k], atol=1e-9)
+
+
+def test_without_load_dependence_forward_is_exactly_inverse():
+    arm = ARMS["three_axis"]
+    dynamics, motion = Dynamics(model_of(arm, effects=EFFECTS)), random_motion(3, 20, seed=5)
+    tau = dynamics.torque(motion.q, motion.v, motion.vdot)
+    assert_allclose(dynamics.acceleration(motion.q, motion.v, tau), motion.vdot, atol=1e-9)
+
+
+def test_an_unsymmetric_mass_matrix_is_told_apart_from_an_impossible_one():
+    arm = ARMS["scara"]
+    *others, inertia = scara_terms(arm)
+    wrong = inertia.coefficients.copy()
+    wrong[:, 1] *= 1.1
+    model = model_of(arm, *others, SparseTerms(3, inertia.index, wrong))
+    q = np.full(arm.n, 0.1)
+    M, symmetric = (Dynamics(model, symmetric=s).mass_matrix(q) for s in (False, True))
+    assert np.abs(M - M.T).max() > 1e-3
+    assert_allclose(symmetric, 0.5 * (M + M.T))
+    assert require_mass_matrix(model)[0] > 0
+    negative = model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients))
+    with pytest.raises(ModelError, match="not positive definite: its smallest eigenvalue is -"):
+        require_mass_matrix(negative)
+
+
+def test_terms_that_no_mass_matrix_holds_are_named():
+    arm = ARMS["three_axis"]
+    # factors of three joints: 1, three sines, three cosines, q, v, vdot; vdot1 squared
+    model = model_of(arm, SparseTerms(3, np.array([[13, 13], [4, 13]]), np.array([[0.5, 0, 0], [1.0, 0, 0]])))
+    dynamics, motion = Dynamics(model), random_motion(3, 4)
+    assert_allclose(dynamics.torque(motion.q, motion.v, motion.vdot), model.predict(motion), atol=1e-12)
+    with pytest.raises(ModelError, match=r"the term vdot1\^2 is not linear"):
+        dynamics.mass_matrix(motion.q)
+
+
+def test_vectors_of_another_length_are_refused():
+    with pytest.raises(ValueError, match=r"\(3,\) or \(N, 3\); they are \(2,\)"):
+        Dynamics(model_of(ARMS["three_axis"])).gravity([0.0, 1.0])

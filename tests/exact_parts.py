@@ -1,0 +1,82 @@
+"""Reconstructed models with nothing to reconstruct: each kind of component fitted to an arm's exact torques."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
+from armloop.effects import Estimate, effect
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.double_feature_set import DoubleFeatureSet
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.library.lagrangian import candidates
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.motion import Motion
+
+Array = NDArray[np.float64]
+STRIBECK = (
+    FrictionTerm("sign", 0.72),
+    FrictionTerm("stribeck", -0.17, 0.1),
+    FrictionTerm("viscous", 2.65),
+)
+
+
+def random_motion(n: int, samples: int, seed: int = 0) -> Motion:
+    q, v, vdot = np.random.default_rng(seed).uniform(-2, 2, (3, samples, n))
+    return Motion(np.arange(float(samples)), q, v, vdot, np.array([0]))
+
+
+def rigid_body(arm: Arm) -> RigidBody:
+    return RigidBody(nominal_parameters(arm), ("m1",), np.array([1.0]))
+
+
+def energies(arm: Arm) -> Lagrangian:
+    """The exact energies of an arm with few joints."""
+    library, motion = candidates(arm), random_motion(arm.n, 600)
+    tau = regressor(arm, motion.q, motion.v, motion.vdot) @ nominal_parameters(arm)
+    columns = library.columns(motion).reshape(-1, library.count)
+    c = np.linalg.lstsq(columns, tau.ravel(), rcond=None)[0]
+    used = np.flatnonzero(np.abs(c) > 1e-9)
+    return Lagrangian(library.take(used), c[used])
+
+
+def scara_terms(arm: Arm) -> tuple[SparseTerms, ...]:
+    """The exact terms of the SCARA arm at the paper's orders (1, 0), (1, 2), (1, 1)."""
+    revolute, motion = tuple(bool(r) for r in arm.revolute), random_motion(arm.n, 600)
+    tau = regressor(arm, motion.q, motion.v, motion.vdot) @ nominal_parameters(arm)
+    sets = [
+        DoubleFeatureSet(revolute, 1, *rest) for rest in ((0, "none"), (2, "velocity"), (1, "acceleration"))
+    ]
+    parts: list[SparseTerms] = []
+    columns = np.hstack([library.columns(motion) for library in sets])
+    c = np.linalg.lstsq(columns, tau, rcond=None)[0]
+    first = 0
+    for step, library in enumerate(sets, 1):
+        own = c[first : first + library.size]
+        first += library.size
+        used = np.flatnonzero(np.abs(own).max(axis=1) > 1e-9)
+        parts.append(
+            SparseTerms(step, library.index[used], np.where(np.abs(own[used]) > 1e-9, own[used], 0.0))
+        )
+    return tuple(parts)
+
+
+def model_of(
+    arm: Arm,
+    *components: Component,
+    friction: tuple[FrictionTerm, ...] = STRIBECK,
+    effects: tuple[tuple[str, int | None, dict[str, float | list[float]]], ...] = (),
+) -> ReconstructedModel:
+    """A model with the same friction at every joint."""
+    return ReconstructedModel(
+        arm,
+        components or (rigid_body(arm),),
+        FrictionLaw((friction,) * arm.n),
+        history={"range": [[1.0] * arm.n] * 3 + [[0.0] * arm.n]},
+        effects=tuple(
+            AddedEffect(effect(name, joint), {k: Estimate(x, 0.0, "") for k, x in parameters.items()})
+            for name, joint, parameters in effects
+        ),
+    )
