@@ -13,7 +13,7 @@ from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
-from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.search import Outcome, search, without_forced
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.effects import hypotheses
 from armloop.errors import InputError
@@ -187,7 +187,11 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     if (without(whole, again).rows != evidence.rows).any():
         contacts, evidence = again, without(whole, again)
         outcome = search(evidence, progress)
-    unlisted = find_law(evidence, outcome.after, progress)
+    unlisted = find_law(evidence, outcome.before, outcome.after, progress)
+    if unlisted is not None:
+        outcome, forced = without_forced(evidence, outcome, unlisted.joint - 1)
+        if forced:
+            unlisted = find_law(evidence, outcome.before, outcome.after, progress)
     found = bool(outcome.found or contacts)
     verdict = "effects_found" if found else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]

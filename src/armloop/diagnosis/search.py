@@ -29,6 +29,8 @@ LEAST_SHARE = 0.01
 ALIKE = 1.0
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
+#: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
+FORCED = 0.3
 _MOST_EFFECTS = 4
 _REFITS = 2
 
@@ -100,6 +102,35 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
         current = best
     after = _refit(evidence, current)
     return Outcome(found, before, after, residual)
+
+
+def without_forced(evidence: Evidence, outcome: Outcome, joint: int) -> tuple[Outcome, bool]:
+    """The outcome without effects that were only the nearest names for a law that is not listed.
+
+    Where a real residual is left on a joint (0-based), and the effects that act there have removed no more than
+    a part of its energy, none of them is what is there.
+
+    Returns:
+        The outcome with the other effects alone, and whether any was struck off.
+    """
+    mine = outcome.before.stacked.joint == joint
+    before, after = (float((f.held_out[mine] ** 2).sum()) for f in (outcome.before, outcome.after))
+    if after < FORCED * before:
+        return outcome, False
+    kept = [k for k, f in enumerate(outcome.found) if not _acts_mainly_on(evidence, f.effect, f.shape, joint)]
+    if len(kept) == len(outcome.found):
+        return outcome, False
+    effects = [outcome.found[k].effect for k in kept]
+    again = fit(evidence, outcome.residual, effects, [outcome.found[k].shape for k in kept])
+    return Outcome([outcome.found[k] for k in kept], outcome.before, again, outcome.residual), True
+
+
+def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:
+    """Whether an effect's columns, weighted, are largest on a joint."""
+    if effect.joint is not None:
+        return joint + 1 in (effect.joint, effect.other_joint)
+    columns = evidence.columns(effect, shape.final) / evidence.scale[:, None]
+    return int(np.argmax((columns**2).sum(axis=(0, 2)))) == joint
 
 
 def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
