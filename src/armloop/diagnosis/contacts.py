@@ -177,6 +177,9 @@ def _bursts(motion: Motion, level: Array, threshold: float) -> list[slice]:
             peak = float(level[group[0] : group[-1] + 1].max())
             inside = np.flatnonzero(level[group[0] : group[-1] + 1] > _EDGE * peak) + group[0]
             burst = slice(int(inside[0]), int(inside[-1]) + 1)
+            # An event is seen to begin; what is there from a run's start is a past that friction remembers.
+            if motion.time[burst.start] - motion.time[run.start] < _PAUSE:
+                continue
             if motion.time[burst.stop - 1] - motion.time[burst.start] >= _SHORTEST:
                 bursts.append(burst)
     return bursts

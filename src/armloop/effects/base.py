@@ -105,6 +105,11 @@ class Effect(ABC):
         del context
         return (0.0,)
 
+    def refined(self, x: Array, shape: float) -> float:
+        """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
+        del x
+        return shape
+
     @abstractmethod
     def columns(self, context: Context, shape: float) -> Array:
         """(N, n, p) torque per unit of each coefficient, or (N, p) on the effect's own joint."""
@@ -245,6 +250,10 @@ class ProfiledJointEffect(Effect):
         low, middle, high = (self.column(context.motion, j, shape * float(np.exp(x))) for x in (-h, 0.0, h))
         return np.column_stack([middle, (high - low) / (2 * h)])
 
+    def refined(self, x: Array, shape: float) -> float:
+        size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
+        return shape * float(np.exp(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
+
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         assert self.joint is not None
         tau = np.zeros_like(context.motion.q)
@@ -254,9 +263,8 @@ class ProfiledJointEffect(Effect):
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
-        shift = float(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST))
         slope = np.array([-x[1] / size**2, 1 / size])
-        value = shape * float(np.exp(shift))
+        value = self.refined(x, shape)
         error = value * float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
         return {
             self.parameter: Estimate(
