@@ -24,7 +24,7 @@ $(PACKAGES): requirements.lock
 	  || { echo "armloop needs Python 3.11 or later: make PYTHON=/path/to/python3" >&2; exit 1; }
 	@echo "Setting up $(VENV) from requirements.lock; this takes about half a minute"
 	@$(PYTHON) -m venv --clear $(VENV)
-	@grep '^[^#]' requirements.lock | xargs -P 2 -n 13 $(BIN)/pip install -qq --no-deps --no-compile
+	@grep '^[^#]' requirements.lock | xargs -P 2 -n 16 $(BIN)/pip install -qq --no-deps --no-compile
 	@export PYTHONDONTWRITEBYTECODE=; \
 	$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
 	$(BIN)/python -c 'import matplotlib.pyplot, control, osqp, jinja2, pyarrow.csv, pyarrow.parquet' \

@@ -125,9 +125,10 @@ def closed_loop(name: str, made: Excitation) -> None:
             f"{name} in closed loop, errors of base parameters",
         )
     )
-    needs = [amount_needed(row, float(np.median(goal))) for row in errors]
+    needs = sorted(amount_needed(row, float(np.median(goal))) for row in errors)
+    each = ", ".join(number(need, 2) if np.isfinite(need) else f"more than {LONGEST}" for need in needs)
     print(
-        f"random references need {median_and_spread(needs)} times as much data for the error of the optimised one\n"
+        f"for the optimised one's error, random references need {each} times as much data (each sequence)\n"
     )
 
 

@@ -23,6 +23,7 @@ LAYERS = (
     {"kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},
     {"components", "effects", "sampling"},
+    {"wave_table"},
     {"pointwise"},
     {"model"},
     {"dynamics", "scoring", "uncertainty"},

@@ -6,10 +6,12 @@ import pytest
 from armloop.arm import load_arm
 from armloop.components import RigidBody, SparseTerms
 from armloop.effects import Estimate, effect
+from armloop.functions import MATH
 from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.library.friction import _KINDS, FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel, load_model
 from armloop.motion import Motion
+from armloop.pointwise import FRICTION_LAWS
 
 PARAMETERS = {
     "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001},
@@ -50,6 +52,17 @@ def test_pointwise_is_the_vectorised_prediction(name, step, tmp_path):
         expected = model.predict(motion, step)[0]
         np.testing.assert_allclose(model.feedforward(q, v, vdot, step), expected, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(again.predict(motion, step)[0], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_every_kind_of_friction_has_its_law_for_one_sample():
+    v = np.array([-0.7, -0.02, 0.3])
+    motion = Motion(np.arange(3.0), np.cumsum(v)[:, None], v[:, None], v[:, None], np.array([0, 1, 2]))
+    assert set(FRICTION_LAWS) == set(_KINDS)
+    for kind, law in FRICTION_LAWS.items():
+        if "hysteresis" not in kind:  # one sample has no past
+            found = [law(x, np.sign(x), 0.1, MATH) for x in v.tolist()]
+            expected = FrictionTerm(kind, 1.0, 0.1).column(motion, 0, np.ones((3, 1)))
+            np.testing.assert_allclose(found, expected, rtol=1e-9, err_msg=kind)
 
 
 def test_a_sensor_effect_is_predicted_but_not_supplied():

@@ -15,7 +15,18 @@ from armloop import __version__
 from armloop.errors import InputError
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
-COMMANDS = ("loop", "collect", "excite", "cluster", "reconstruct", "evaluate", "diagnose", "track")
+COMMANDS = (
+    "loop",
+    "collect",
+    "excite",
+    "cluster",
+    "reconstruct",
+    "crossvalidate",
+    "evaluate",
+    "diagnose",
+    "track",
+    "reproduce",
+)
 
 
 class _Parser(argparse.ArgumentParser):

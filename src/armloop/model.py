@@ -182,6 +182,10 @@ class ReconstructedModel:
         Friction with memory acts as if fully slid: a single sample has no history. ``sliding`` (n,) are the
         velocities to take friction at, by default v.
         """
+        return self.drive(step)(q, v, vdot, sliding)
+
+    def drive(self, step: int = 3) -> Drive:
+        """The function behind :meth:`feedforward`, for loops in which a look-up counts."""
         if step not in self._pointwise:
             added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
             inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
@@ -196,7 +200,7 @@ class ReconstructedModel:
                     terms[a.effect.joint - 1].append(term)
             friction = FrictionLaw(tuple(map(tuple, terms)))
             self._pointwise[step] = pointwise(self.arm, self.components, friction, effects, step)
-        return self._pointwise[step](q, v, vdot, sliding)
+        return self._pointwise[step]
 
     @cached_property
     def _pointwise(self) -> dict[int, Drive]:

@@ -18,6 +18,7 @@ from armloop.functions import MATH, Functions
 
 Array = NDArray[np.float64]
 Vector = tuple[Any, Any, Any]
+MassMatrix = Callable[[Sequence[Any] | Array], list[list[Any]]]
 InverseDynamics = Callable[[Sequence[Any] | Array, Sequence[Any] | Array, Sequence[Any] | Array], list[Any]]
 
 
@@ -87,6 +88,84 @@ def inverse_dynamics(
         return tau
 
     return torques
+
+
+def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> MassMatrix:
+    """A function q of n numbers -> n rows of M(q) of links with these parameters, by composite rigid bodies.
+
+    Walker and Orin 1982; Featherstone, Rigid Body Dynamics Algorithms, Sect. 6.2. Several times cheaper than n
+    inverse dynamics with unit accelerations. Arguments as of :func:`inverse_dynamics`.
+    """
+    n = arm.n
+    fixed = [_matrix(arm.X_PF[i, :3, :3]) for i in range(n)]
+    origins: list[Vector] = [_vector(arm.X_PF[i, :3, 3]) for i in range(n)]
+    axes: list[Vector] = [_vector(arm.axis[i]) for i in range(n)]
+    turning = [joint.kind == "revolute" for joint in arm.joints]
+    slides = [_times(fixed[i], axes[i]) for i in range(n)]
+    bodies = []
+    for i in range(n):
+        mass, mx, my, mz, xx, yy, zz, xy, xz, yz = (float(x) for x in parameters[10 * i : 10 * i + 10])
+        bodies.append((mass, (mx, my, mz), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))
+    sin, cos = functions.sin, functions.cos
+
+    def rows(q: Sequence[Any] | Array) -> list[list[Any]]:
+        q = q.tolist() if isinstance(q, np.ndarray) else q
+        R = [
+            _product(fixed[i], _rotation(axes[i], sin(q[i]), cos(q[i]))) if turning[i] else fixed[i]
+            for i in range(n)
+        ]
+        p = [origins[i] if turning[i] else _plus(origins[i], slides[i], q[i]) for i in range(n)]
+        M: list[list[Any]] = [[0.0] * n for _ in range(n)]
+        mass: Any
+        moment: Vector
+        mass, moment, inertia = bodies[n - 1]
+        for k in range(n - 1, -1, -1):
+            if k < n - 1:
+                beyond = _moved(R[k + 1], p[k + 1], mass, moment, inertia)
+                own_mass, own_moment, own_inertia = bodies[k]
+                mass, moment = mass + own_mass, _plus(beyond[0], own_moment, 1.0)
+                a, b, c = own_inertia
+                inertia = (
+                    _plus(beyond[1][0], a, 1.0),
+                    _plus(beyond[1][1], b, 1.0),
+                    _plus(beyond[1][2], c, 1.0),
+                )
+            axis = axes[k]
+            # What a unit acceleration of joint k needs at the origin of its link, and then at those before it.
+            if turning[k]:
+                f, m = _cross(axis, moment), _times(inertia, axis)
+            else:
+                f, m = (mass * axis[0], mass * axis[1], mass * axis[2]), _cross(moment, axis)
+            for i in range(k, -1, -1):
+                x, s = (m if turning[i] else f), axes[i]
+                M[i][k] = M[k][i] = x[0] * s[0] + x[1] * s[1] + x[2] * s[2]
+                f, m = _times(R[i], f), _times(R[i], m)
+                m = _plus(m, _cross(p[i], f), 1.0)
+        return M
+
+    return rows
+
+
+def _moved(
+    R: tuple[Vector, Vector, Vector], p: Vector, mass: Any, moment: Vector, inertia: tuple[Vector, ...]
+) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
+    """First moment and inertia of a body about the origin of the previous frame, in that frame."""
+    h = _times(R, moment)
+    turned = _product(_product(R, inertia), tuple(zip(*R, strict=True)))
+    twice = 2.0 * (p[0] * h[0] + p[1] * h[1] + p[2] * h[2])
+    shift = twice + mass * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    a, b, c = (
+        tuple(
+            turned[i][j] - p[i] * h[j] - h[i] * p[j] - mass * p[i] * p[j] + (shift if i == j else 0.0)
+            for j in range(3)
+        )
+        for i in range(3)
+    )
+    return _plus(h, p, mass), (_triple(a), _triple(b), _triple(c))
+
+
+def _triple(x: tuple[Any, ...]) -> Vector:
+    return x[0], x[1], x[2]
 
 
 def _wrench(body: tuple[float, ...], w: Vector, wdot: Vector, a: Vector) -> tuple[Vector, Vector]:

@@ -6,7 +6,7 @@ A piece is a run of its own to everything after it, so that no filter and no der
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,8 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from armloop.log import MotionLog, check_header, read_log
-from armloop.tables import count_rows
+from armloop.tables import CSV, count_rows
 
+#: Samples of all logs together up to which they are kept in memory.
+IN_MEMORY = 500_000
 #: Rows of a piece: what a filter's ends cost is nothing, and a few copies of it fit in any memory.
 PIECE = 1 << 17
 
@@ -77,24 +79,45 @@ class LogPiece:
         )
 
 
-def log_pieces(path: str | Path, joints: int, recorded: dict[str, Any]) -> list[LogPiece]:
-    """Cut a file into pieces of about :data:`PIECE` rows; a CSV, which has no index, stays whole.
+def log_sources(
+    paths: Sequence[str | Path], joints: int, recorded: dict[str, Any], in_memory: int = IN_MEMORY
+) -> list[LogPiece]:
+    """The files of a log, whole where all of them fit into memory, else in pieces of about :data:`PIECE` rows.
+
+    Only headers are read. A CSV, which has no index, is never cut.
 
     Raises:
-        LogError: the file is missing, or its header is not that of a log of so many joints.
+        LogError: a file is missing, or its header is not that of a log of so many joints.
     """
-    path = Path(path)
+    files = [_whole(Path(path), joints, recorded) for path in paths]
+    if sum(file.samples for file in files) <= in_memory:
+        return files
+    return [piece for file in files for piece in _cut(file)]
+
+
+def _whole(path: Path, joints: int, recorded: dict[str, Any]) -> LogPiece:
     check_header(path, joints)
     rows = count_rows(path)
     if rows is None:
-        # Ten characters or more a cell.
-        return [LogPiece(path, joints, path.stat().st_size // (10 * (3 * joints + 1)), None, recorded)]
-    edges = np.linspace(0, rows, max(1, -(-rows // PIECE)) + 1).astype(int).tolist()
-    if len(edges) == 2:
-        return [LogPiece(path, joints, rows, None, recorded)]
-    return [LogPiece(path, joints, last - first, (first, last), recorded) for first, last in pairwise(edges)]
+        # A cell takes ten characters or more.
+        rows = path.stat().st_size // (10 * (3 * joints + 1))
+    return LogPiece(path, joints, rows, None, recorded)
 
 
-def read_all(pieces: Sequence[LogSource]) -> list[MotionLog]:
-    """All logs in memory; pieces of one file stay apart."""
-    return [piece.read() for piece in pieces]
+def _cut(file: LogPiece) -> list[LogPiece]:
+    if file.path.suffix == CSV or file.samples <= PIECE:
+        return [file]
+    edges = np.linspace(0, file.samples, -(-file.samples // PIECE) + 1).astype(int).tolist()
+    return [replace(file, samples=last - first, rows=(first, last)) for first, last in pairwise(edges)]
+
+
+def first_samples(sources: Sequence[LogSource], most: int = IN_MEMORY) -> list[MotionLog]:
+    """The first logs, of so many samples together (at least one log): what a report shows."""
+    logs: list[MotionLog] = []
+    samples = 0
+    for source in sources:
+        samples += source.samples
+        if logs and samples > most:
+            break
+        logs.append(source.read())
+    return logs

@@ -1,8 +1,7 @@
 """Evaluating a model one sample at a time, fast enough for a 1 kHz loop in Python.
 
-Sparse terms of all steps are merged into one matrix between the waves of the angles and the monomials of the rates,
-so that a sample costs one sine per wave and two small products, whatever the number of terms; friction is plain
-arithmetic; rigid bodies go through the recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
+Sparse terms of all steps are merged into one table of waves; friction is plain arithmetic; rigid bodies go through the
+recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.effects.base import Pointwise as EffectPointwise
 from armloop.functions import MATH, Functions
 from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.library.harmonics import Wave, waves_of
 from armloop.newton_euler import inverse_dynamics
+from armloop.wave_table import WaveTable
 
 Array = NDArray[np.float64]
 Pointwise = Callable[[Array, Array, Array], Array]
@@ -49,7 +48,8 @@ def pointwise(
 
     Friction with memory acts as if fully slid: one sample has no past.
     """
-    terms = _merged(arm.n, components, step)
+    sparse = [c for c in components if isinstance(c, SparseTerms) and c.step <= step and len(c.index)]
+    terms = WaveTable(sparse).torque if sparse else lambda q, v, vdot: np.zeros(arm.n)
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
     bodies += [_energies(c, step) for c in components if isinstance(c, Lagrangian)]
     laws = [_friction([t for t in joint if t.step <= step]) for joint in friction.terms]
@@ -153,60 +153,6 @@ def _energies(body: Lagrangian, step: int) -> Pointwise:
     return torque
 
 
-def _merged(n: int, components: Sequence[Component], step: int) -> Pointwise:
-    """All sparse terms together: tau_j = sum over waves w and monomials m of C_jwm wave_w(q) m(q, v, vdot)."""
-    weights: dict[tuple[tuple[Wave, bool], tuple[int, ...]], Array] = {}
-    for part in components:
-        if isinstance(part, SparseTerms) and part.step <= step:
-            for key, weight in _wave_terms(part):
-                weights[key] = weights.get(key, np.zeros(n)) + weight
-    if not weights:
-        return lambda q, v, vdot: np.zeros(n)
-    waves = {wave: w for w, wave in enumerate(dict.fromkeys(wave for wave, _ in weights))}
-    monomials = {monomial: m for m, monomial in enumerate(dict.fromkeys(monomial for _, monomial in weights))}
-    w, m = len(waves), len(monomials)
-    C = np.zeros((n, w, m))
-    for (wave, monomial), weight in weights.items():
-        C[:, waves[wave], monomials[monomial]] = weight
-    # Column by column: the product with a short vector is then a third faster.
-    C = np.asfortranarray(C.reshape(-1, m))
-    # One product with (1, q, v, vdot) gives the phases, then the first, second, .. factor of every monomial.
-    width = max(1, *(len(monomial) for monomial in monomials))
-    gather = np.zeros((w + width * m, 1 + 3 * n))
-    for (k, sine), row in waves.items():
-        gather[row, : 1 + n] = [0.0 if sine else 0.5 * np.pi, *k]
-    for monomial, column in monomials.items():
-        for factor in range(width):
-            gather[w + factor * m + column, monomial[factor] if factor < len(monomial) else 0] = 1.0
-    gather = np.asfortranarray(gather)
-    # Calls of numpy are what costs: work space that stays, and few of them.
-    one, state, gathered, inner = np.ones(1), np.empty(1 + 3 * n), np.empty(len(gather)), np.empty(n * w)
-    phases, rates, others = gathered[:w], gathered[w : w + m], gathered[w + m :].reshape(-1, m)
-    by_wave = inner.reshape(n, w)
-
-    def torque(q: Array, v: Array, vdot: Array) -> Array:
-        np.concatenate((one, q, v, vdot), out=state)
-        np.dot(gather, state, gathered)
-        for factor in others:
-            np.multiply(rates, factor, rates)
-        np.dot(C, rates, inner)
-        return by_wave.dot(np.sin(phases, phases))
-
-    return torque
-
-
-def _wave_terms(part: SparseTerms) -> list[tuple[tuple[tuple[Wave, bool], tuple[int, ...]], Array]]:
-    """Each term as waves times one monomial: indices of the positions (from 1), speeds and accelerations."""
-    factors = part.factors
-    w = len(factors.waves)
-    found = []
-    for row, weight in zip(part.index.tolist(), part.coefficients, strict=True):
-        trigonometric = [(factors.waves[(e - 1) % w], e <= w) for e in row if 0 < e <= 2 * w]
-        monomial = tuple(sorted(e - 2 * w for e in row if e > 2 * w))
-        found += [((wave, monomial), c * weight) for wave, c in waves_of(trigonometric, factors.n).items()]
-    return found
-
-
 #: Friction per unit of each kind's coefficient at one velocity: (v, sign(v), parameter, functions).
 #: Kinds with memory act as if fully slid. The smooth stand-in for the sign is whatever the caller hands in.
 FRICTION_LAWS: dict[str, Callable[[Any, Any, float, Functions], Any]] = {
@@ -217,11 +163,13 @@ FRICTION_LAWS: dict[str, Callable[[Any, Any, float, Functions], Any]] = {
     "load_sign": lambda v, sign, p, f: sign,
     "load_smooth_sign": lambda v, sign, p, f: f.tanh(v / p),
     "load_hysteresis": lambda v, sign, p, f: sign,
-    "abs_speed": lambda v, sign, p, f: abs(v),
     "viscous": lambda v, sign, p, f: v,
+    "viscous_forward": lambda v, sign, p, f: 0.5 * (v + abs(v)),
+    "viscous_backward": lambda v, sign, p, f: 0.5 * (v - abs(v)),
     # sqrt(|v|) sign(v), rounded off below 1e-10 so that it has a derivative at rest
     "root": lambda v, sign, p, f: v / f.sqrt(f.sqrt(v * v + 1e-20)),
     "quadratic": lambda v, sign, p, f: abs(v) * v,
     "cubic": lambda v, sign, p, f: v * v * v,
+    "stribeck_peak": lambda v, sign, p, f: f.exp(-(v / p) * (v / p)) * sign,
     "stribeck": lambda v, sign, p, f: (1.0 - f.exp(-(v / p) * (v / p))) * sign,
 }

@@ -45,14 +45,17 @@ def residual(model: ReconstructedModel, samples: Samples) -> Array:
 def score(model: ReconstructedModel, samples: Samples, rows: NDArray[np.bool_] | None = None) -> Score:
     """Score a model on the samples, or on those in ``rows`` (N,)."""
     chosen = np.ones(samples.motion.samples, dtype=bool) if rows is None else rows
-    error = residual(model, samples)[chosen]
-    tau, moving = samples.tau[chosen], samples.moving[chosen]
+    return score_errors(residual(model, samples)[chosen], samples.tau[chosen], samples.moving[chosen])
+
+
+def score_errors(error: Array, tau: Array, moving: NDArray[np.bool_]) -> Score:
+    """Score residuals (N, n) beside the measured torque (N, n), where it is known which samples move (N, n)."""
     return Score(
         overall=_errors(error, tau, np.ones_like(moving)),
         moving=_errors(error, tau, moving),
         standstill=_errors(error, tau, ~moving),
         rms=[_rms(tau[moving[:, j], j]) for j in range(tau.shape[1])],
-        samples=int(chosen.sum()),
+        samples=len(tau),
     )
 
 

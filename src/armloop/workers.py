@@ -33,6 +33,10 @@ class Workers(Protocol):
         """Yield the answers in the order of the chunks; exceptions of the function come through."""
         ...
 
+    def close(self) -> None:
+        """Let go of what was opened."""
+        ...
+
 
 def map_reduce(workers: Workers, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Answer:
     """Sum of the function's answers over the chunks (at least one); only the running sum is kept."""
@@ -45,6 +49,9 @@ class Serial:
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         return map(function, chunks)
+
+    def close(self) -> None:
+        pass
 
 
 class Processes:
@@ -65,6 +72,9 @@ class Processes:
         with _inherited(function, chunks) as key:
             with ProcessPoolExecutor(jobs, get_context("fork"), _one_thread) as pool:
                 yield from pool.map(_call, [key] * len(chunks), range(len(chunks)))
+
+    def close(self) -> None:
+        pass
 
 
 class Cluster:
@@ -104,7 +114,6 @@ class Cluster:
             yield future.result()
 
     def close(self) -> None:
-        """Leave the cluster."""
         self.client.close()
 
 

@@ -301,6 +301,14 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
         (*RECONSTRUCT, GOOD, "--method", "sindy", "--library", "rigid-body"),
         r"'sindy'",
     ),
+    "two signal-to-noise ratios": (
+        (*RECONSTRUCT, GOOD, "--snr", "60,40"),
+        r"--snr 60,40: give three numbers",
+    ),
+    "signal-to-noise ratios of a time series": (
+        (*RECONSTRUCT, GOOD, "--snr", "60,40,20"),
+        r"--snr is for samples that are no time series",
+    ),
     "a penalty of zero": ((*RECONSTRUCT, GOOD, "--penalty", "0"), r"--penalty 0"),
     "an order of zero": ((*RECONSTRUCT, GOOD, "--max-order", "0"), r"--max-order 0"),
     "a fractional order": ((*RECONSTRUCT, GOOD, "--max-order", "2.5"), r"--max-order: .*'2\.5'"),

@@ -23,8 +23,10 @@ from armloop.drake_systems import (
     PidGains,
     PreslidingFriction,
     Stop,
+    model_equations,
 )
 from armloop.drake_systems.effects import EFFECTS
+from armloop.dynamics import Dynamics
 from armloop.errors import ModelError
 
 ARM, SCARA = load_arm("three_axis"), load_arm("scara")
@@ -155,6 +157,16 @@ def test_every_effect_of_the_plant_but_the_sensors_has_a_system():
     assert set(EFFECTS) - {"torque_offset"} <= set(PARAMETERS)
     with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
+
+
+def test_the_mass_matrix_as_formulas():
+    model, q = model_of(SCARA, *scara_terms(SCARA)), [0.3, -0.7, 0.1, 1.1]
+    symbols = [Variable(f"q{i + 1}") for i in range(4)]
+    M = model_equations(model).mass_matrix([Expression(s) for s in symbols])
+    values = dict(zip(symbols, q, strict=True))
+    found = [[x.Evaluate(values) if isinstance(x, Expression) else x for x in row] for row in M]
+    assert_allclose(found, Dynamics(model).mass_matrix(q), atol=1e-12)
+    assert "cos(q2)" in str(M[0][0])
 
 
 def test_a_model_of_numbers_alone_stays_float():

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from armloop.arm import Arm, load_arm
 from armloop.components import SparseTerms
 from armloop.drake_systems.plant import add_links
-from armloop.dynamics import Dynamics, require_mass_matrix
+from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix
 from armloop.errors import ModelError
 from armloop.library.friction import FrictionTerm
 
@@ -93,8 +93,29 @@ def test_an_unsymmetric_mass_matrix_is_told_apart_from_an_impossible_one():
     assert_allclose(symmetric, 0.5 * (M + M.T))
     assert require_mass_matrix(model)[0] > 0
     negative = model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients))
-    with pytest.raises(ModelError, match="not positive definite: its smallest eigenvalue is -"):
+    with pytest.raises(
+        ModelError, match=r"not positive definite: its smallest eigenvalue is -.*nearest_rigid_body"
+    ):
         require_mass_matrix(negative)
+
+
+def test_the_nearest_rigid_body_averages_the_errors_of_terms_out():
+    arm = ARMS["scara"]
+    *others, inertia = scara_terms(arm)
+    exact = model_of(arm, *others, inertia, effects=EFFECTS)
+    motion = random_motion(arm.n, 50, seed=6)
+    assert_allclose(nearest_rigid_body(exact).predict(motion), exact.predict(motion), atol=1e-8)
+    q, M = motion.q, Dynamics(exact).mass_matrix(motion.q)
+    for seed in range(5):
+        noise = 0.02 * np.random.default_rng(seed).normal(size=inertia.coefficients.shape)
+        noisy = model_of(
+            arm, *others, SparseTerms(3, inertia.index, inertia.coefficients + noise), effects=EFFECTS
+        )
+        errors = [
+            np.sqrt(((Dynamics(m).mass_matrix(q) - M) ** 2).mean())
+            for m in (noisy, nearest_rigid_body(noisy))
+        ]
+        assert errors[1] < errors[0], seed
 
 
 def test_terms_that_no_mass_matrix_holds_are_named():

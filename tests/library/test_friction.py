@@ -72,10 +72,20 @@ def test_friction_that_grows_with_load():
 
 
 def test_friction_with_memory_starts_afresh_with_each_run():
-    motion = at_speeds(np.ones(6), q=[0, 0.1, 0.2, 0, 0.1, 0.2])
+    q, v = [0, 0.1, 0.2, 0, 0.1, 0.2], np.array([0.001, 1, 1, 0.001, 1, 1])
+    motion = at_speeds(v, q=q)
     apart = Motion(motion.time, motion.q, motion.v, motion.vdot, np.array([0, 3]))
     column = FrictionTerm("hysteresis", parameter=0.15).column(apart, 0)
     np.testing.assert_allclose(column, [0, 2 / 3, 1, 0, 2 / 3, 1])
+
+
+def test_a_run_that_begins_in_mid_motion_begins_stretched():
+    motion = at_speeds(np.ones(3), q=[0, 0.01, 0.02])
+    term = FrictionTerm("hysteresis", parameter=0.15)
+    np.testing.assert_allclose(term.column(motion, 0), 1.0)  # steady, so it has slid for long
+    # speeding up at 2.5 rad/s^2 it has turned 0.2 rad since it was at rest: from -1 by 0.2/0.15
+    speeding = Motion(motion.time, motion.q, motion.v, np.full((3, 1), 2.5), motion.starts)
+    np.testing.assert_allclose(term.column(speeding, 0)[0], 0.2 / 0.15 - 1)
 
 
 def test_a_law_survives_its_dictionary_and_keeps_joints_apart():

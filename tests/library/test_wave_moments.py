@@ -70,6 +70,15 @@ def test_waves_without_redundancy_only() -> None:
         WaveProducts(Factors(2), plain.index).sums(random_motion(2, 10, seed=0), np.zeros((10, 1)))
 
 
+def test_some_candidates_keep_only_their_own_waves() -> None:
+    library = AngleSums((True, False, True), 3, 1, "both")
+    products, motion = WaveProducts(library.factors, library.index), random_motion(3, 50, seed=6)
+    for chosen in ([0, 5, 40, 77, 200], [0], list(range(library.size))):
+        some = products.only(np.array(chosen))
+        np.testing.assert_array_equal(some.columns(motion), products.columns(motion)[:, chosen])
+        assert len(some.factors.waves) <= max(3, 2 * len(chosen))
+
+
 def test_the_one_shot_library_needs_one_small_product() -> None:
     library = AngleSums((True, True, True), 4, 2, "both")
     sums = WaveProducts(library.factors, library.index).sums(random_motion(3, 5, 0), np.zeros((5, 1)))

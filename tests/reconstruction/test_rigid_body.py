@@ -89,7 +89,7 @@ def test_friction_never_drives_and_the_mass_matrix_is_positive(result: Reconstru
     motion = fourier_motion(20.0, 20.0, 5)
     law = model.friction.torque(motion, load=model.rigid_body(motion))
     offsets = np.array(
-        [next(t.coefficient for t in joint if t.kind == "offset") for joint in model.friction.terms]
+        [sum(t.coefficient for t in joint if t.kind == "offset") for joint in model.friction.terms]
     )
     assert ((law - offsets) * motion.v)[np.abs(motion.v) > 0.05].min() > 0
     unit = np.eye(3)
@@ -108,6 +108,20 @@ def test_motion_that_leaves_most_parameters_open_is_refused():
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     with pytest.raises(ExcitationError, match=r"\d+ of \d+ inertial parameters undetermined"):
         reconstruct([log], three_axis(), library="rigid-body")
+
+
+def test_the_ladder_says_what_each_rung_brought(result: Reconstruction):
+    ladder = result.model.history["friction_ladder"]
+    assert ladder[0]["rung"] == "Coulomb and viscous" and ladder[0]["joints"] == [1, 2, 3]
+    assert all(rung["after"] <= 1.02 * rung["before"] for rung in ladder)
+    # what the arm does not have: friction that grows with load
+    assert not any(t.by_load for joint in result.model.friction.terms for t in joint)
+    assert any(note.startswith("friction, Stribeck:") for note in result.notes)
+
+
+def test_friction_terms_dissipate_one_by_one(result: Reconstruction):
+    for joint in result.model.friction.terms:
+        assert all(term.coefficient > 0 for term in joint if term.kind != "offset")
 
 
 def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.MonkeyPatch):

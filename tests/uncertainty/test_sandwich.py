@@ -44,7 +44,7 @@ def equations(block, first, X, Z, y):
 
 def test_the_covariance_is_that_of_refits_without_one_block():
     data = two_steps()
-    theta, sums = equations(*data)
+    _, sums = equations(*data)
     block, rest = data[0], data[1:]
     refits = np.array([solve(block != b, *rest) for b in range(sums.blocks)])
     moved = refits - refits.mean(axis=0)

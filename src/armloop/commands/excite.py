@@ -35,13 +35,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="what is optimised: variance (mean variance of the coefficients), logdet (log-determinant of the "
         "information) or condition (condition number of the regression) (%(default)s)",
     )
-    p.add_argument("--duration", type=float, default=None, help="s (rigid-body 20, double-feature-set 60)")
+    p.add_argument(
+        "--duration",
+        type=float,
+        default=None,
+        help="s (rigid-body 20, double-feature-set 60, at four joints 120)",
+    )
     p.add_argument(
         "--base-frequency",
         type=float,
         default=None,
         metavar="HZ",
-        help="(default: one period is the duration, or a minute)",
+        help="(default: one period is the duration, up to two minutes)",
     )
     p.add_argument(
         "--harmonics", type=int, default=None, help="of the base frequency (default: as many as reach 0.4 Hz)"
@@ -142,7 +147,7 @@ def run(options: argparse.Namespace) -> None:
         seed=options.seed,
         random=options.random,
     )
-    settings.timing()  # faults of the options before anything is computed
+    settings.timing(arm.n)  # faults of the options before anything is computed
     ranges = _ranges(options, arm)
     tell = progress(options)
     result = excite(arm, ranges, settings, model.predict if model else None, tell)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 from armloop.commands.arguments import ARM_HELP, add_json, add_logs, add_recorded
 
@@ -26,14 +27,48 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--estimator",
-        default="lasso_ebic",
-        help="how terms are chosen: lasso_ebic (Lasso path, information criterion, swap search), lasso (Eq. 32 with "
-        "--penalty) or least_squares (%(default)s)",
+        default="evidence",
+        help="how terms are chosen: evidence (Lasso path, information criterion, exchange of terms), lasso, "
+        "debiased_lasso, adaptive_lasso, thresholded, stlsq, sr3, stability or least_squares (%(default)s)",
     )
-    p.add_argument("--penalty", type=float, default=1e-3, help="λ of --estimator lasso (%(default)s)")
+    p.add_argument(
+        "--penalty",
+        type=float,
+        default=None,
+        help="λ of the Lassos (Eq. 32), or the threshold of thresholded, stlsq and sr3, for columns and torque of unit "
+        "root mean square (default: by held-out error)",
+    )
+    p.add_argument(
+        "--snr",
+        default=None,
+        metavar="Q,V,VDOT",
+        help="signal-to-noise ratios in dB of q, v and vdot, where they are known and the samples are no time series "
+        "(--cutoff 0): coefficients are corrected for this noise after the terms are chosen",
+    )
     p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
     p.add_argument(
         "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
+    )
+    p.add_argument(
+        "--coefficients", action="store_true", help="print every coefficient with its standard error, too"
+    )
+    p.add_argument(
+        "--no-physical",
+        action="store_true",
+        help="do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)",
+    )
+    p.add_argument(
+        "--jobs",
+        type=int,
+        default=None,
+        metavar="N",
+        help="processes that pass over logs too large for memory (default: one per core)",
+    )
+    p.add_argument(
+        "--scheduler",
+        default=None,
+        metavar="ADDRESS",
+        help="pass over the logs on a Dask cluster whose workers see the same files (extra: dask)",
     )
     p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
     add_recorded(p, "N*m")
@@ -43,43 +78,59 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Reconstruct a model and write it."""
     from armloop.arm import load_arm
-    from armloop.commands.shared import TORQUE, out_file, print_json, progress, read_logs, recorded_as
+    from armloop.commands.shared import TORQUE, out_file, print_json, progress, recorded_as
     from armloop.errors import InputError
     from armloop.files import write_text
+    from armloop.pieces import IN_MEMORY, first_samples, log_sources
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
     from armloop.reports.tables import formulas, score_table, steps_table
     from armloop.signals import Conditioning
+    from armloop.workers import Cluster, Processes
 
     if options.estimator not in ESTIMATORS:
         raise InputError(f"unknown estimator {options.estimator!r}; there are: {', '.join(ESTIMATORS)}")
-    if not options.penalty > 0:
+    if options.penalty is not None and not 0 < options.penalty < math.inf:
         raise InputError(f"--penalty {options.penalty}: λ must be positive")
     if not 1 <= options.max_order <= 6:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
+    if options.jobs is not None and options.jobs < 1:
+        raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
+    _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
     arm = load_arm(options.arm)
     recorded = recorded_as(options, TORQUE)
-    logs = read_logs(options.logs, arm.n, recorded)
-    result = run(
-        logs,
-        arm,
-        options.method,
-        options.library,
-        None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
-        Options(sparse=Sparse(options.estimator, options.penalty), max_order=options.max_order),
-        progress(options),
-        recorded,
-    )
+    logs = log_sources(options.logs, arm.n, recorded, 0 if options.scheduler else IN_MEMORY)
+    workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)
+    try:
+        result = run(
+            logs,
+            arm,
+            options.method,
+            options.library,
+            None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
+            Options(
+                sparse=Sparse(options.estimator, options.penalty),
+                max_order=options.max_order,
+                physical=not options.no_physical,
+                snr=_snr(options),
+            ),
+            progress(options),
+            recorded,
+            workers,
+            in_memory=0 if options.scheduler else IN_MEMORY,
+        )
+    finally:
+        workers.close()
     result.model.save(options.out)
     if options.report:
         from armloop.reports.reconstruction_report import reconstruction_report
 
-        write_text(options.report, reconstruction_report(result, logs))
+        write_text(options.report, reconstruction_report(result, first_samples(logs)))
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})
         return
@@ -87,7 +138,32 @@ def run(options: argparse.Namespace) -> None:
     print()
     print(formulas(result.model), *result.model.legend(), sep="\n")
     print()
+    if options.coefficients:
+        from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
+
+        for table in (coefficients_table(result.model), stribeck_table(result.model)):
+            print(table, end="\n\n") if table else None
+        print(NOTE, end="\n\n")
     print(score_table(result.held_out, arm))
     for note in result.notes:
         print(f"note: {note}")
     print(f"model written to {options.out}")
+
+
+def _snr(options: argparse.Namespace) -> tuple[float, float, float] | None:
+    """The signal-to-noise ratios of q, v and vdot, or None."""
+    from armloop.errors import InputError
+
+    if options.snr is None:
+        return None
+    try:
+        q, v, vdot = (float(level) for level in options.snr.split(","))
+    except ValueError:
+        raise InputError(f"--snr {options.snr}: give three numbers in dB, such as 60,40,20") from None
+    if not all(0 < level < math.inf for level in (q, v, vdot)):
+        raise InputError(f"--snr {options.snr}: ratios in dB must be positive")
+    if options.cutoff != 0:
+        raise InputError("--snr is for samples that are no time series; give --cutoff 0 with it")
+    if options.method != "stepwise" or options.library not in (None, "double-feature-set"):
+        raise InputError("--snr works with the stepwise method and the library double-feature-set")
+    return q, v, vdot

@@ -14,11 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.cluster import KMeans
 
-from armloop.conditions.indicators import noise_floor, paper_indicator, robust_indicator
+from armloop.conditions.indicators import paper_indicator, robust_indicator
 from armloop.conditions.kmeans import fitted
 from armloop.motion import Motion
 
 Array = NDArray[np.float64]
+
+#: Where the robust indicator puts samples at rest, at constant and at varying velocity.
+_IDEAL = np.array([[0.0, 0.0], [1.1, 0.0], [1.1, 1.1]])
 
 
 class Condition(IntEnum):
@@ -61,29 +64,46 @@ def sort_samples(motion: Motion, indicator: str = "robust", seed: int = 0) -> Cl
         indicator: ``"robust"`` (default) or ``"paper"`` (h = 60, W₁ = 0.6, W₂ = 0.32, Sect. 2.2).
         seed: of the k-means starts.
 
-    Clusters get their name from their centres: the lowest velocity level is static, the highest
-    acceleration level varying. With fewer than three distinguishable levels k-means still returns
-    three clusters; the elbow tells.
+    The robust indicator says of every sample what is switched on: k-means starts from the three ideal points
+    (neither, velocity, both), and a cluster is called what its centre has switched on; what accelerates is
+    varying, at standstill too, as in a reversal of all joints. A condition that does not occur stays empty. The
+    paper's indicator has no such scale: its clusters are ranked, the lowest being static, that of the highest
+    acceleration varying, and there are always three.
     """
     if indicator == "paper":
         z = np.column_stack([paper_indicator(motion.v, 60, 0.6), paper_indicator(motion.vdot, 60, 0.32)])
     else:
-        z = np.column_stack([robust_indicator(a, noise_floor(a)) for a in (motion.v, motion.vdot)])
+        z = np.column_stack([robust_indicator(a) for a in (motion.v, motion.vdot)])
     # The elbow needs the shape of the cloud, not every sample of it.
     thin = z[:: max(1, len(z) // 4000)]
     wcss = []
     for k in range(1, 7):
         fit = fitted(KMeans(k, n_init=4, random_state=seed), thin)
         wcss.append(float(np.linalg.norm(thin - fit.cluster_centers_[fit.labels_], axis=1).sum()))
-    best = fitted(KMeans(3, n_init=10, random_state=seed), z)
-    centers = best.cluster_centers_
-    level = np.abs(centers) if indicator == "paper" else centers
+    if indicator == "paper":
+        best = fitted(KMeans(3, n_init=10, random_state=seed), z)
+        names = _ranked(np.abs(best.cluster_centers_))[best.labels_]
+    else:
+        best = fitted(KMeans(3, init=_IDEAL, n_init=1), z)
+        names = _switched(best.cluster_centers_)[best.labels_]
+        names[(names == Condition.STATIC) & (z[:, 1] > 0.5)] = Condition.VARYING_VELOCITY
+    return Clusters(names, z, best.cluster_centers_, wcss, _elbow(wcss), int(best.n_iter_))
+
+
+def _ranked(level: Array) -> NDArray[np.int_]:
+    """(3,) names of clusters whose centres are at these levels of velocity and acceleration."""
     static = int(np.argmin(level.sum(axis=1)))
     others = [j for j in range(3) if j != static]
     varying = max(others, key=lambda j: level[j, 1] - 1e-3 * level[j, 0])
     names = np.full(3, int(Condition.CONSTANT_VELOCITY))
     names[static], names[varying] = Condition.STATIC, Condition.VARYING_VELOCITY
-    return Clusters(names[best.labels_], z, centers, wcss, _elbow(wcss), int(best.n_iter_))
+    return names
+
+
+def _switched(centers: Array) -> NDArray[np.int_]:
+    """(3,) names of clusters by what their centres have switched on."""
+    moves, accelerates = centers.T > 0.5
+    return np.asarray(1 + np.where(accelerates, 2, moves.astype(int)))
 
 
 def _elbow(wcss: list[float]) -> int:

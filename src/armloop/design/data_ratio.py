@@ -129,6 +129,8 @@ def amount_needed(errors: Array, goal: float) -> float:
     if last == 0:
         # more than good enough: errors fall with the root of the amount of data
         return float((errors[0] / goal) ** 2)
+    if not np.isfinite(errors[last - 1]):
+        return float(last + 1)
     high, low = np.log(errors[last - 1]), np.log(errors[last])
     part = (high - np.log(goal)) / max(high - low, 1e-12)
     return float(np.exp(np.log(last) + part * (np.log(last + 1) - np.log(last))))

@@ -123,7 +123,7 @@ def excite(
     Raises:
         InputError: settings out of range, or limits that exclude any motion.
     """
-    timing = settings.timing()
+    timing = settings.timing(arm.n)
     stated = np.array([joint.effort for joint in arm.joints])
     limits = Limits(ranges, (1 - settings.reserve) * stated, torque or nominal_torque(arm))
     notes = _effort_notes(arm, limits.torque)

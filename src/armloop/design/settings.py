@@ -10,13 +10,14 @@ from armloop.errors import InputError
 
 LIBRARIES = ("rigid-body", "double-feature-set")
 
-#: s. The double feature set has several times as many columns, and one short curve cannot tell them apart.
-_DURATION = {"rigid-body": 20.0, "double-feature-set": 60.0}
-_LONGEST_PERIOD, _LONGEST = 60.0, 3600.0
+#: s of rigid-body, and of the double feature set up to three joints and beyond: it has several times as many columns
+#: (94 at three joints, 156 at four, N1 = 1), and one short curve cannot tell them apart.
+_DURATION, _DURATIONS = 20.0, (60.0, 120.0)
+_LONGEST_PERIOD, _LONGEST = 120.0, 3600.0
 #: Hz that the default number of harmonics reaches, about the band of the random trajectories.
 _TOP = 0.4
-_FEWEST, _MOST = 4, 40
-_USUAL = (6, 24)
+_FEWEST, _MOST = 4, 64
+_USUAL = (6, 48)
 #: Products of columns and trigonometric functions reach beyond the motion's own band; this keeps most of them below
 #: the corner of the low-pass that the log will meet.
 _BELOW_CUTOFF = 5.0
@@ -30,8 +31,8 @@ class Settings:
         library: one of :data:`LIBRARIES`, whose columns are to be determined.
         criterion: a key of `CRITERIA`.
         duration: s, a whole number of periods.
-        base_frequency: Hz; by default one period is the duration, up to a minute.
-        harmonics: of the base frequency; by default as many as reach 0.4 Hz, 6 to 24.
+        base_frequency: Hz; by default one period is the duration, up to two minutes.
+        harmonics: of the base frequency; by default as many as reach 0.4 Hz, 6 to 48.
         order: N1 of the double feature set.
         reserve: part of the effort limits kept free for what the torque's prediction lacks.
         noise: standard deviation of each joint's torque noise, N*m (N).
@@ -54,8 +55,8 @@ class Settings:
     seed: int = 0
     random: int = 20
 
-    def timing(self) -> Timing:
-        """Period, harmonics and number of periods.
+    def timing(self, joints: int) -> Timing:
+        """Period, harmonics and number of periods for an arm of so many joints.
 
         Raises:
             InputError: a choice is unknown or out of range, or the duration is too short for the rest.
@@ -76,7 +77,9 @@ class Settings:
             raise InputError(
                 f"random {self.random}: at least 3 random references are needed for a comparison"
             )
-        duration = _DURATION[self.library] if self.duration is None else self.duration
+        duration = self.duration
+        if duration is None:
+            duration = _DURATION if self.library == "rigid-body" else _DURATIONS[joints > 3]
         if not 0 < duration <= _LONGEST:
             raise InputError(f"duration {duration:g} s: give more than 0 and at most {_LONGEST:g} s")
         period, periods = _period(duration, self.base_frequency)

@@ -18,6 +18,7 @@ from armloop.drake_systems.friction_system import (
     Stop,
     presliding_of,
 )
+from armloop.drake_systems.model_expressions import model_equations
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.reference import ReferenceSource
@@ -49,5 +50,6 @@ __all__ = [
     "Stop",
     "add_arm_with_controller",
     "add_joint_forces",
+    "model_equations",
     "presliding_of",
 ]

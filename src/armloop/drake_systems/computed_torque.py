@@ -102,9 +102,8 @@ def ComputedTorque_(T: type) -> Any:
             if friction_at not in FRICTION_SOURCES:
                 raise ValueError(f"friction_at is {friction_at!r}; it must be {', '.join(FRICTION_SOURCES)}")
             if not isinstance(model, ReconstructedModel):
-                converter = (
-                    SystemScalarConverter()
-                )  # numbers alone can be neither differentiated nor written out
+                # Numbers alone can be neither differentiated nor written out.
+                converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = model, gains
             self._options: dict[str, Any] = {"friction_at": friction_at, "period": period}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Any, Protocol
 
@@ -47,14 +48,13 @@ def Feedforward_(T: type) -> Any:
         ) -> None:
             """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3."""
             if not isinstance(model, ReconstructedModel):
-                converter = (
-                    SystemScalarConverter()
-                )  # numbers alone can be neither differentiated nor written out
+                # Numbers alone can be neither differentiated nor written out.
+                converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = model, n, step
-            self._model = model
-            self._step = step
-            if T is not float:
+            if T is float:
+                self._drive = _drive(model, step)
+            else:
                 assert isinstance(model, ReconstructedModel)
                 self._equations = ModelEquations(model, functions_of(T), step=step)
             self._inputs = [self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")]
@@ -64,15 +64,15 @@ def Feedforward_(T: type) -> Any:
 
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
-            self._model = model
             self._arguments = model, *self._arguments[1:]
+            self._drive = _drive(model, self._arguments[2])
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, *other._arguments, converter=converter)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
-            q, v, vdot = (port.Eval(context) for port in self._inputs)
-            tau = self._model.feedforward(q, v, vdot, self._step)
+            q, v, vdot = self._inputs
+            tau = self._drive(q.Eval(context), v.Eval(context), vdot.Eval(context))
             # A NaN or an infinity shows in the sum; several times faster than numpy's test.
             if not isfinite(sum(tau.tolist())):
                 raise RuntimeError(
@@ -88,3 +88,9 @@ def Feedforward_(T: type) -> Any:
 
 
 Feedforward = Feedforward_[None]
+
+
+def _drive(model: FeedforwardModel, step: int) -> Callable[[Array, Array, Array], Array]:
+    if isinstance(model, ReconstructedModel):
+        return model.drive(step)
+    return lambda q, v, vdot: model.feedforward(q, v, vdot, step)

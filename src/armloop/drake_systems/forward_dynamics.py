@@ -40,10 +40,11 @@ def ForwardDynamics_(T: type) -> Any:
         Scalar types float, AutoDiffXd and Expression: for `Linearize`, `DirectCollocation` and other planners,
         and for the equations as formulas.
 
-        Precondition: M has a positive definite symmetric part over the range that the model was fitted on (checked on
-        construction, raises `ModelError`). M of sparse terms need not be symmetric, as its rows were found
-        joint by joint; `symmetric` takes (M + M^T) / 2 instead. Outside the training range nothing holds M
-        positive definite but for a rigid body of physical parameters.
+        Precondition: M has a positive definite symmetric part over the range that the model was fitted on (checked
+        on construction, raises `ModelError`). M of sparse terms need not be symmetric, as its rows were found joint
+        by joint; `symmetric` takes (M + M^T) / 2 instead. In noisy data it may not be positive definite either: then
+        plan with `armloop.dynamics.nearest_rigid_body(model)`. Outside the training range nothing holds M positive
+        definite but a rigid body's physical parameters.
 
         Not supported: joint and torque limits, contact, sensor effects, friction with memory (as if fully
         slid), models with terms that are not linear in the acceleration alone (one-shot SINDy may have them).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
@@ -9,6 +11,7 @@ from pydrake.systems.primitives import Demultiplexer
 
 from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.dynamics import ModelEquations
+from armloop.errors import ModelError
 from armloop.excitation import Reference
 from armloop.functions import NUMPY
 from armloop.model import ReconstructedModel
@@ -83,9 +86,11 @@ class _ReferenceTable(TableSource):
 
     def set_model(self, model: FeedforwardModel | None, step: int) -> None:
         self._model, self._step = model, step
-        self._equations = (
-            ModelEquations(model, NUMPY, step=step) if isinstance(model, ReconstructedModel) else None
-        )
+        self._equations = None
+        if isinstance(model, ReconstructedModel):
+            # An added effect may have a law for samples only: then each period is asked for by itself.
+            with suppress(ModelError):
+                self._equations = ModelEquations(model, NUMPY, step=step)
         self._rows[:, 3 * self._n :] = 0.0
         self._filled = [model is None] * (len(self._rows) // _CHUNK + 1)
 

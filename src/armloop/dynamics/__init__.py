@@ -3,5 +3,14 @@
 from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
 from armloop.dynamics.effects import EffectLaw, effect_law
 from armloop.dynamics.model import ModelEquations
+from armloop.dynamics.rigid import nearest_rigid_body
 
-__all__ = ["Dynamics", "EffectLaw", "ModelEquations", "effect_law", "require_mass_matrix", "training_range"]
+__all__ = [
+    "Dynamics",
+    "EffectLaw",
+    "ModelEquations",
+    "effect_law",
+    "nearest_rigid_body",
+    "require_mass_matrix",
+    "training_range",
+]

@@ -116,7 +116,7 @@ def require_mass_matrix(
         posture = ", ".join(f"{x:.2f}" for x in at)
         raise ModelError(
             f"the model's mass matrix is not positive definite: its smallest eigenvalue is {value:.3g} at q = ({posture}), "
-            "within the range it was fitted on; forward dynamics is impossible. Reconstruct with more data of "
-            "acceleration, or with the library rigid-body or lagrangian"
+            "within the range it was fitted on; forward dynamics is impossible. Take armloop.dynamics.nearest_rigid_body "
+            "of it, or reconstruct with the library rigid-body or lagrangian"
         )
     return value, at

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from armloop.components import SparseTerms
+from armloop.arm import Arm
+from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.dynamics.effects import EffectLaw, effect_law
-from armloop.dynamics.equations import Equations, Numbers, Rows, equations
+from armloop.dynamics.equations import BodyEquations, EnergyEquations, Equations, Numbers, Rows
+from armloop.dynamics.sparse import SparseArrayEquations, SparseEquations
 from armloop.errors import ModelError
-from armloop.functions import Functions
+from armloop.functions import NUMPY, Functions
 from armloop.model import ReconstructedModel
 from armloop.pointwise import FRICTION_LAWS
 
@@ -69,10 +71,9 @@ class ModelEquations:
             )
             for effect, parameters in added
         ]
+        used = [c for c in model.components if not isinstance(c, SparseTerms) or c.step <= step]
         self._parts: list[tuple[Equations, bool]] = [
-            (equations(model.arm, component, functions), True)
-            for component in model.components
-            if not isinstance(component, SparseTerms) or component.step <= step
+            (part, True) for part in equations(model.arm, used, functions)
         ]
         self._parts += [(law.equations, law.load) for law in laws if law.equations is not None]
         self._effects: list[EffectLaw] = [law for law in laws if law.friction is not None]
@@ -231,3 +232,18 @@ def solve(A: Rows, b: Sequence[Any]) -> list[Any]:
             x[k] = x[k] - A[k][j] * x[j]
         x[k] = x[k] / A[k][k]
     return x
+
+
+def equations(arm: Arm, components: Sequence[Component], functions: Functions) -> list[Equations]:
+    """The equations of a model's components; sparse terms of all steps together, since they share their waves."""
+    sparse = [c for c in components if isinstance(c, SparseTerms) and len(c.index)]
+    kind = SparseArrayEquations if functions is NUMPY else SparseEquations
+    parts: list[Equations] = [kind(sparse, functions)] if sparse else []
+    for component in components:
+        if isinstance(component, Lagrangian):
+            parts.append(EnergyEquations(component, functions))
+        elif isinstance(component, RigidBody):
+            parts.append(BodyEquations(arm, component.parameters, functions))
+        elif not isinstance(component, SparseTerms):
+            raise TypeError(f"{type(component).__name__} has no equations of motion")
+    return parts

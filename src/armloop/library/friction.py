@@ -21,6 +21,9 @@ from armloop.motion import Motion
 
 Array = NDArray[np.float64]
 
+#: A joint that is no faster than this when a run begins, rad/s or m/s, begins at rest.
+_AT_REST = 0.005
+
 
 @dataclass(frozen=True)
 class _Kind:
@@ -30,24 +33,56 @@ class _Kind:
     by_load: bool = False
 
 
-# q (N,), v (N,), run starts, parameter -> (N,)
+@dataclass(frozen=True)
+class _Entry:
+    """How the runs begin: index of each first sample, and what is known of the path before it.
+
+    ``travel`` (R,) is the distance since the last reversal, signed by its direction, as if the acceleration had
+    been what it is now: v²/2a where the joint speeds up, without end where it slows down.
+    """
+
+    starts: NDArray[np.intp]
+    travel: Array
+
+    @staticmethod
+    def of(motion: Motion, joint: int) -> _Entry:
+        v, a = motion.v[motion.starts, joint], motion.vdot[motion.starts, joint]
+        speeding = v * a > 0
+        distance = np.where(speeding, v**2 / (2 * np.where(speeding, np.abs(a), 1.0)), np.inf)
+        return _Entry(motion.starts, np.sign(v) * np.where(np.abs(v) > _AT_REST, distance, 0.0))
+
+    def stop(self, q: Array, width: float) -> Array:
+        """The stop operator; relaxed where a run begins at rest."""
+        state = np.sign(self.travel) * np.clip(np.abs(self.travel) / width - 1, -1, 1)
+        return stop_operator(q, width, self.starts, state)
+
+
+# q (N,), v (N,), how the runs begin, parameter -> (N,)
 _KINDS: dict[str, _Kind] = {
-    "offset": _Kind(1, "1", lambda q, v, starts, p: np.ones_like(v)),
-    "sign": _Kind(1, "sign(v{j})", lambda q, v, starts, p: np.sign(v)),
-    "smooth_sign": _Kind(1, "tanh(v{j}/{p:g})", lambda q, v, starts, p: np.tanh(v / p)),
-    "hysteresis": _Kind(1, "stop(q{j},{p:g})", lambda q, v, starts, p: stop_operator(q, p, starts)),
-    "load_sign": _Kind(1, "abs(load{j})*sign(v{j})", lambda q, v, starts, p: np.sign(v), by_load=True),
-    "load_hysteresis": _Kind(
-        1, "abs(load{j})*stop(q{j},{p:g})", lambda q, v, starts, p: stop_operator(q, p, starts), by_load=True
+    "offset": _Kind(1, "1", lambda q, v, entry, p: np.ones_like(v)),
+    "sign": _Kind(1, "sign(v{j})", lambda q, v, entry, p: np.sign(v)),
+    "smooth_sign": _Kind(1, "tanh(v{j}/{p:g})", lambda q, v, entry, p: np.tanh(v / p)),
+    "hysteresis": _Kind(1, "stop(q{j},{p:g})", lambda q, v, entry, p: entry.stop(q, p)),
+    "load_sign": _Kind(1, "abs(load{j})*sign(v{j})", lambda q, v, entry, p: np.sign(v), by_load=True),
+    "load_smooth_sign": _Kind(
+        1, "abs(load{j})*tanh(v{j}/{p:g})", lambda q, v, entry, p: np.tanh(v / p), by_load=True
     ),
-    "viscous": _Kind(2, "v{j}", lambda q, v, starts, p: v),
-    "root": _Kind(2, "sqrt(abs(v{j}))*sign(v{j})", lambda q, v, starts, p: np.sqrt(np.abs(v)) * np.sign(v)),
-    "quadratic": _Kind(2, "abs(v{j})*v{j}", lambda q, v, starts, p: np.abs(v) * v),
-    "cubic": _Kind(2, "v{j}^3", lambda q, v, starts, p: v**3),
+    "load_hysteresis": _Kind(
+        1, "abs(load{j})*stop(q{j},{p:g})", lambda q, v, entry, p: entry.stop(q, p), by_load=True
+    ),
+    "viscous": _Kind(2, "v{j}", lambda q, v, entry, p: v),
+    "viscous_forward": _Kind(2, "max(v{j},0)", lambda q, v, entry, p: np.maximum(v, 0.0)),
+    "viscous_backward": _Kind(2, "min(v{j},0)", lambda q, v, entry, p: np.minimum(v, 0.0)),
+    "root": _Kind(2, "sqrt(abs(v{j}))*sign(v{j})", lambda q, v, entry, p: np.sqrt(np.abs(v)) * np.sign(v)),
+    "quadratic": _Kind(2, "abs(v{j})*v{j}", lambda q, v, entry, p: np.abs(v) * v),
+    "cubic": _Kind(2, "v{j}^3", lambda q, v, entry, p: v**3),
+    "stribeck_peak": _Kind(
+        2, "exp(-(v{j}/{p:g})^2)*sign(v{j})", lambda q, v, entry, p: np.exp(-((v / p) ** 2)) * np.sign(v)
+    ),
     "stribeck": _Kind(
         2,
         "(1-exp(-(v{j}/{p:g})^2))*sign(v{j})",
-        lambda q, v, starts, p: -np.expm1(-((v / p) ** 2)) * np.sign(v),
+        lambda q, v, entry, p: -np.expm1(-((v / p) ** 2)) * np.sign(v),
     ),
 }
 
@@ -87,7 +122,7 @@ class FrictionTerm:
         ``load`` (N, n) is the rigid-body torque, which kinds proportional to the load need.
         """
         v = motion.v[:, joint]
-        column = _KINDS[self.kind].column(motion.q[:, joint], v, motion.starts, self.parameter)
+        column = _KINDS[self.kind].column(motion.q[:, joint], v, _Entry.of(motion, joint), self.parameter)
         if self.by_load:
             if load is None:
                 raise ModelError(f"friction term {self.kind!r} needs the load torque")

@@ -24,16 +24,17 @@ Array = NDArray[np.float64]
 _Maps = tuple[Array, Array, Array]
 
 
-def stop_operator(q: Array, width: float, starts: ArrayLike = (0,)) -> Array:
+def stop_operator(q: Array, width: float, starts: ArrayLike = (0,), initial: ArrayLike = 0.0) -> Array:
     """Normalized state of an elasto-plastic element that is carried along by each joint.
 
-    The state is zero (relaxed) at the first sample of every run; what it was before is forgotten as soon
-    as the joint has once travelled 2 ``width``.
+    What the state was at the first sample of a run is forgotten as soon as the joint has once travelled
+    2 ``width``.
 
     Args:
         q: (N,) or (N, n) positions, rad (m for a prismatic joint).
         width: stretch at which the element yields, in the unit of q.
         starts: (R,) index of the first sample of each run.
+        initial: state at these samples in [-1, 1], of the shape of q[starts], or one for all; zero is relaxed.
 
     Returns:
         Array of the shape of q with values in [-1, 1].
@@ -47,8 +48,10 @@ def stop_operator(q: Array, width: float, starts: ArrayLike = (0,)) -> Array:
     if len(q) == 0:
         return np.zeros_like(q)
     lower, upper = np.full_like(q, -width), np.full_like(q, width)
-    first = np.union1d(np.asarray(starts, dtype=int), [0])
-    lower[first] = upper[first] = 0.0  # a map that forgets: whatever z was, it is 0 now
+    lower[0] = upper[0] = 0.0
+    # maps that forget: whatever z was, it is the initial state now
+    first = np.asarray(starts, dtype=int)
+    lower[first] = upper[first] = width * np.asarray(initial, dtype=float)
     shift, lower, upper = _compose_all((np.diff(q, axis=0, prepend=q[:1]), lower, upper))
     return np.clip(shift, lower, upper) / width
 

@@ -140,6 +140,19 @@ class WaveProducts:
         """(N, T) values of the candidates, for few samples or few candidates."""
         return products(self.factors.evaluate(motion), self.index)
 
+    def only(self, candidates: Index) -> WaveProducts:
+        """Some of the candidates, with no other waves among their factors."""
+        index, w = self.index[candidates], len(self.factors.waves)
+        used = sorted({(int(e) - 1) % w for e in np.unique(index) if 0 < e <= 2 * w})
+        factors = Factors(self.factors.n, tuple(self.factors.waves[k] for k in used))
+        place = np.zeros(1 + 2 * w + 3 * self.factors.n, dtype=np.intp)
+        for kind in "sc":
+            old, new = self.factors.block(kind), factors.block(kind)
+            place[[old[k] for k in used]] = new[: len(used)]
+        for kind in "qva":
+            place[self.factors.block(kind)] = factors.block(kind)
+        return WaveProducts(factors, place[index])
+
     @cached_property
     def _split(self) -> tuple[list[tuple[Wave, int]], list[Monomial], Index, Index]:
         """Functions (wave, 0 cosine or 1 sine), monomials, and of each candidate the places of its two parts."""

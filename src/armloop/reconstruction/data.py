@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import gcd
 from typing import TypeVar
 
 import numpy as np
@@ -26,7 +27,7 @@ Mask = NDArray[np.bool_]
 Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.
-REFERENCE = 200_000
+REFERENCE = 50_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +132,9 @@ class Data:
         if how.cutoff_hz > 0:
             noise = np.max(list(workers.map(partial(_noise, how.cutoff_hz), logs)), axis=0)
         stride = max(1, sum(log.samples for log in logs) // REFERENCE)
+        # Samples that are no time series are dealt into folds one by one: every fold must be met.
+        while gcd(stride, options.folds) > 1:
+            stride += 1
         parts, reference, first = [], [], 0
         surveyed = workers.map(
             partial(_survey, stride), [_Conditioned(log, how, noise, options) for log in logs]

@@ -23,16 +23,17 @@ from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.physical import physical_cuts, physical_solution, postures
+from armloop.reconstruction.physical import physical_solution, physics_notes, postures
+from armloop.reconstruction.pooled import Pooled
 from armloop.reconstruction.shared import (
     FRICTION,
-    LOAD_FRICTION,
+    PLAIN_FRICTION,
     check_moves,
     check_rank,
     found_friction,
     sliding_rows,
-    solve_weighted,
 )
 from armloop.regression.moments import Moments
 from armloop.signals import independent_rows, smooth
@@ -49,6 +50,8 @@ _GOOD_ENOUGH = 1.01
 _WORTH_A_SWAP = 1e-4
 #: Squared error relative to the torque's below which nothing is left to find.
 _FLOOR = 1e-10
+#: Held-out nRMSE from which on a note says that the library may not suit.
+_POOR = 0.1
 #: Rows of the library evaluated at once.
 _CHUNK = 512
 
@@ -74,36 +77,66 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     progress(f"lagrangian: {len(chosen)} terms chosen")
     columns = energy.columns(motion)
     smoothed = smooth(samples, columns)
-    laws = [list(FRICTION) for _ in arm.joints]
-    first = solve_weighted(samples, smoothed, laws, rows, None).theta
-    laws = [[*law, LOAD_FRICTION] for law in laws]
-    solution = solve_weighted(samples, smoothed, laws, rows, columns @ first[: energy.count])
-    mass, kept = energy.mass(postures(motion)), "M(q) positive definite and friction from driving"
-    try:
-        theta, active = physical_solution(solution, physical_cuts(motion, mass, laws))
-    except ExcitationError:  # terms found in little data may leave no room for M; the notes then say so
-        kept = "friction from driving"
-        theta, active = physical_solution(solution, physical_cuts(motion, mass[:0], laws))
-    body = Lagrangian(energy, theta[: energy.count])
-    friction = found_friction(laws, theta[energy.count :])
+    plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], rows)
+    load = columns @ plain.solve(plain.everything).theta[: energy.count]
+    ladder = climb(arm, samples, smoothed, rows, load, options, {})
+    mass = energy.mass(postures(motion))
+
+    def regressed(rows: Rows) -> Found:
+        pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
+        solution = pooled.solve(pooled.everything)
+        theta, physics = solution.theta, {}
+        if options.physical:
+            try:
+                physical = physical_solution(solution, mass, ladder.laws, options.insist)
+                theta = physical.theta
+                physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
+            except (
+                ExcitationError
+            ):  # terms found in little data may leave no room for M; the notes then say so
+                pass
+        body = Lagrangian(energy, theta[: energy.count])
+        history = {"friction_ladder": [rung.to_dict() for rung in ladder.climbs], **physics}
+        return Found(arm, [body], found_friction(ladder.laws, theta[energy.count :]), history=history)
+
+    found = regressed(rows)
+    found.final = final = regressed(sliding_rows(samples))
+    friction = final.friction
     acts = energy.acts
     moving, at_rest = acts & ~energy.potential, acts & energy.potential
     reports = []
     for step in (1, 2, 3):
         terms = at_rest.sum(axis=1) + (moving.sum(axis=1) if step > 1 else 0)
         counts = [int(terms[j]) + sum(t.step <= step for t in friction[j]) for j in range(arm.n)]
-        samples_per_joint = rows.sum(axis=0).tolist()
+        samples_per_joint = sliding_rows(samples).sum(axis=0).tolist()
         reports.append(StepReport(step, None, library.count, library.count, counts, samples_per_joint))
     notes = [
         f"{energy.count} terms of the energies serve all joints and all steps: they were regressed together and "
         "the steps are told apart on prediction"
     ]
-    if active:
-        notes.append(f"{active} constraints were needed to keep {kept}")
+    notes += [*ladder.notes, *physics_notes(final.history), *_warnings(found, final, samples, held_out)]
+    found.reports, found.notes = reports, notes
+    return found
+
+
+def _warnings(found: Found, final: Found, samples: Samples, held_out: Rows) -> list[str]:
+    """What speaks against the terms found: a mass matrix that is none, and torques not met on the held-out blocks."""
+    motion, warnings = samples.motion, []
+    (body,) = final.components
+    assert isinstance(body, Lagrangian)
     lowest = np.linalg.eigvalsh(body.mass_matrix(motion.q[:: max(1, motion.samples // 1000)]))[:, 0]
     if (lowest <= 0).any():
-        notes.append(f"M(q) is not positive definite at {np.mean(lowest <= 0):.1%} of the postures")
-    return Found(arm, [body], friction, reports, notes)
+        warnings.append(f"M(q) is not positive definite at {np.mean(lowest <= 0):.1%} of the postures")
+    judged = samples.moving & held_out[:, None]
+    residual = samples.tau - smooth(samples, found.torque(motion))
+    squares = [np.sum(x**2, axis=0, where=judged) for x in (residual, samples.tau)]
+    error = float(np.mean(np.sqrt(squares[0] / np.maximum(squares[1], 1e-300))))
+    if error > _POOR:
+        warnings.append(
+            f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
+            "(axes that cross need more terms than short logs tell apart); try --library rigid-body"
+        )
+    return warnings
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,11 @@ class Options:
             at the end, one more chooses the orders.
         block_seconds: longest block.
         seed: of k-means.
+        snr: signal-to-noise ratios in dB of q, v and v̇ of samples that are no time series, where they are known:
+            coefficients are corrected for the noise after the terms are chosen.
+        physical: keep friction from driving, and M(q) positive definite unless the data contradict that, where the
+            library knows how to.
+        insist: keep M(q) positive definite even then.
     """
 
     sparse: Sparse = field(default_factory=Sparse)
@@ -28,6 +33,9 @@ class Options:
     folds: int = 5
     block_seconds: float = 1.0
     seed: int = 0
+    snr: tuple[float, float, float] | None = None
+    physical: bool = True
+    insist: bool = False
 
 
 @dataclass

@@ -15,10 +15,11 @@ from armloop.blocks import folds
 from armloop.errors import InputError
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
-from armloop.pieces import LogSource
+from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
+from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
@@ -28,11 +29,9 @@ from armloop.reconstruction.stepwise import stepwise_on
 from armloop.reconstruction.tally import Tally
 from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
-from armloop.workers import Cluster, Workers
+from armloop.workers import Workers
 
 METHODS = ("stepwise", "sindy")
-#: Samples of all logs together up to which they are kept in memory.
-IN_MEMORY = 500_000
 LIBRARIES = ("double-feature-set", "rigid-body", "lagrangian")
 
 
@@ -80,6 +79,7 @@ def reconstruct(
     progress: Progress = silent,
     recorded: dict[str, Any] | None = None,
     workers: Workers | None = None,
+    in_memory: int = IN_MEMORY,
 ) -> Reconstruction:
     """Reconstruct a model of an arm's joint torques from its logs.
 
@@ -90,11 +90,10 @@ def reconstruct(
         library: one of :data:`LIBRARIES`; by default what suits the number of joints.
         conditioning: filter; by default what suits the library.
         recorded: how the logs recorded the torque, kept in the model for later logs.
-        workers: who passes over logs of more than :data:`IN_MEMORY` samples (or, for a cluster, over any); by
-            default this process.
-
-    More samples than that are read and conditioned anew on every pass by the stepwise method on the double
-    feature set, in memory that does not grow with them; the other libraries read everything.
+        workers: who passes over logs that are not kept in memory; by default this process.
+        in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
+            every pass by the stepwise method on the double feature set, in memory that does not grow with them;
+            the other libraries read everything.
 
     Raises:
         InputError: logs that do not fit the arm, an unknown method, or too little excitation.
@@ -112,7 +111,11 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     progress(f"conditioning {len(logs)} log(s), low-pass {conditioning.cutoff_hz:g} Hz")
-    if method == "stepwise" and library == "double-feature-set" and _is_streamed(logs, workers):
+    if (
+        method == "stepwise"
+        and library == "double-feature-set"
+        and (sum(log.samples for log in logs) > in_memory)
+    ):
         data = Data.streamed(logs, conditioning, options, workers)
     else:
         data = Data.of(condition([log.read() for log in logs], conditioning), options)
@@ -148,11 +151,10 @@ def reconstruct(
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
         model = replace(model, components=components, friction=found.final.law, history=history)
+    progress("standard errors of the coefficients")
+    errors = uncertainty(model, data, found, shared=library in ("rigid-body", "lagrangian"))
+    model = replace(model, uncertainty=errors)
     return Reconstruction(model, found.reports, tally.score(), found.notes)
-
-
-def _is_streamed(logs: Sequence[LogSource], workers: Workers | None) -> bool:
-    return isinstance(workers, Cluster) or sum(log.samples for log in logs) > IN_MEMORY
 
 
 def _range(motion: Motion) -> list[list[float]]:

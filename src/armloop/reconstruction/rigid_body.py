@@ -1,7 +1,8 @@
 """The rigid-body library: base parameters shared by all joints, with friction that has memory and feels load.
 
-It scales to seven joints: 40 shared parameters and seven friction columns a joint where the double feature
+It scales to seven joints: some 40 shared parameters and a few friction terms a joint where the double feature
 set would need tens of thousands. The regression is weighted by what each joint's residual turns out to be.
+What scarce data leave open is filled in from the URDF, as firmly as the data themselves speak for it.
 """
 
 from __future__ import annotations
@@ -18,20 +19,23 @@ from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.physical import physical_cuts, physical_solution, postures
+from armloop.reconstruction.physical import physical_solution, physics_notes, postures
+from armloop.reconstruction.pooled import Pooled, Prior
 from armloop.reconstruction.shared import (
-    FRICTION,
-    LOAD_FRICTION,
+    PLAIN_FRICTION,
     check_moves,
     check_rank,
     found_friction,
     sliding_rows,
-    solve_weighted,
 )
 from armloop.signals import smooth
 
 Array = NDArray[np.float64]
+
+#: Standard deviations of a link's mass from the URDF's that are tried, kg.
+_SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
 def rigid_body(
@@ -39,44 +43,75 @@ def rigid_body(
 ) -> Found:
     """Regress base parameters and friction on all moving samples at once.
 
-    Two passes: the torque that passes a joint, on which its friction depends, is known after the first.
+    Which friction each joint has is chosen on a ladder (:mod:`armloop.reconstruction.friction_ladder`). The torque
+    that passes a joint, on which its friction may depend, is known after a first pass with plain friction.
+    What physics demands (M(q) positive definite, friction that never drives) is kept as constraints.
 
     Raises:
         ExcitationError: a joint does not move, or the motion leaves base parameters undetermined.
-
-    What physics demands (M(q) positive definite, friction that never drives) is kept as constraints.
     """
     motion = samples.motion
-    rows = sliding_rows(samples) & ~held_out[:, None]
+    sliding = sliding_rows(samples)
+    rows = sliding & ~held_out[:, None]
     check_moves(arm, rows)
     base = BaseParameters.of_arm(arm, rotors=True)
-    progress(f"rigid body: {base.count} base parameters, {len(FRICTION) + 1} friction columns a joint")
-    columns = smooth(samples, base.columns(arm, motion))
+    raw = base.columns(arm, motion)
+    columns = smooth(samples, raw)
     check_rank(columns, rows, base)
-    laws = [list(FRICTION) for _ in arm.joints]
-    first = solve_weighted(samples, columns, laws, rows, None).theta
+    plain = Pooled(samples, columns, [list(PLAIN_FRICTION) for _ in arm.joints], rows)
+    load = raw @ plain.solve(plain.everything).theta[: base.count]
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
-    load = base.columns(arm, motion) @ first[: base.count]
-    laws = [[*law, LOAD_FRICTION] for law in laws]
-    solution = solve_weighted(samples, columns, laws, rows, load)
-    cuts = physical_cuts(motion, _mass_columns(arm, base, postures(motion)), laws)
-    theta, active = physical_solution(solution, cuts)
-    friction = found_friction(laws, theta[base.count :])
-    values = theta[: base.count]
-    body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
-    samples_per_joint = [int(rows[:, j].sum()) for j in range(arm.n)]
-    reports = []
+    progress(f"rigid body: {base.count} base parameters; choosing each joint's friction on held-out data")
+    ladder = climb(arm, samples, columns, rows, load, options, _priors(arm, base, nominal))
+    mass = _mass_columns(arm, base, postures(motion))
+
+    def regressed(rows: NDArray[np.bool_]) -> Found:
+        pooled = Pooled(samples, columns, ladder.laws, rows, load, passive=options.physical)
+        solution = pooled.solve(pooled.everything, ladder.prior)
+        theta, physics = solution.theta, {}
+        if options.physical:
+            physical = physical_solution(solution, mass, ladder.laws, options.insist)
+            theta = physical.theta
+            physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
+        values = theta[: base.count]
+        body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
+        inertial = body.parameters[: 10 * arm.n].tolist()
+        history = {
+            "inertial": inertial,
+            "friction_ladder": [rung.to_dict() for rung in ladder.climbs],
+            **physics,
+        }
+        return Found(arm, [body], found_friction(ladder.laws, theta[base.count :]), history=history)
+
+    found = regressed(rows)
+    found.final = final = regressed(sliding)
+    body, samples_per_joint = final.components[0], sliding.sum(axis=0).tolist()
+    size = base.count + sum(len(law) for law in ladder.laws)
     for step in (1, 2, 3):
-        counts = [len(body.terms(arm, j)) + sum(t.step <= step for t in friction[j]) for j in range(arm.n)]
-        reports.append(StepReport(step, None, len(theta), base.count, counts, samples_per_joint))
-    notes = [
-        "the steps share one set of parameters: they were regressed together and are told apart on prediction"
+        friction = [sum(term.step <= step for term in terms) for terms in final.friction]
+        counts = [len(body.terms(arm, j)) + friction[j] for j in range(arm.n)]
+        found.reports.append(StepReport(step, None, size, base.count, counts, samples_per_joint))
+    found.notes = [
+        "the steps share one set of parameters: they were regressed together and are told apart on prediction",
+        "the held-out blocks judged a model without them; the model itself was then regressed on all data",
+        *ladder.notes,
     ]
-    if active:
-        notes.append(
-            f"{active} constraints were needed to keep M(q) positive definite and friction from driving"
-        )
-    return Found(arm, [body], friction, reports, notes, {"inertial": body.parameters[: 10 * arm.n].tolist()})
+    found.notes += physics_notes(final.history)
+    return found
+
+
+def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:
+    """Beliefs that every link is like the URDF's, by how many kg its mass may well differ.
+
+    Its first moments and inertias may differ as those of so much mass a typical link's length away.
+    """
+    length = np.linalg.norm(arm.X_PF[1:, :3, 3], axis=1).sum() / max(arm.n - 1, 1)
+    length = float(length) if length > 0 else 1.0
+    unit = np.concatenate([np.tile([1.0, *[length] * 3, *[length**2] * 6], arm.n), np.full(arm.n, length**2)])
+    spread = base.grouping * unit
+    precision = np.linalg.inv(spread @ spread.T)
+    centre = base.from_full(nominal)
+    return {f"links as in the URDF ± {kg:g} kg": Prior(precision / kg**2, centre) for kg in _SPREADS}
 
 
 def _mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:

@@ -1,12 +1,10 @@
 """What the libraries that serve all joints with shared coefficients have in common.
 
-One regression over all moving samples of all joints, weighted by what each joint's residual turns out to be,
-with the same friction terms for every joint.
+Which samples they regress, what the motion must show for that, and the friction that stands in until each joint's
+own is chosen.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +14,7 @@ from armloop.errors import ExcitationError
 from armloop.library.friction import FrictionTerm
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Samples
-from armloop.regression.moments import Moments
-from armloop.signals import Conditioning, smooth
+from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
 
@@ -34,12 +31,10 @@ FRICTION = (
     FrictionTerm("viscous"),
     FrictionTerm("quadratic"),
 )
-#: Added in a second pass: the torque that passes a joint is known after the first.
-LOAD_FRICTION = FrictionTerm("load_hysteresis", parameter=1e-3)
+#: What the load is estimated with, before any friction that depends on it is regressed.
+PLAIN_FRICTION = FRICTION[:2] + FRICTION[4:]
 #: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion.
 _SLIDING = 0.01
-_RIDGE = 1e-7
-_REWEIGHTINGS = 3
 #: What a constraint has pressed to zero, N·m.
 _NOTHING = 1e-12
 
@@ -73,49 +68,6 @@ def found_friction(laws: list[list[FrictionTerm]], values: Array) -> list[list[F
         )
         start += len(law)
     return friction
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Coefficients with the weighted normal equations they solve."""
-
-    theta: Array
-    G: Array
-    b: Array
-
-
-def solve_weighted(
-    samples: Samples,
-    columns: Array,
-    laws: list[list[FrictionTerm]],
-    rows: NDArray[np.bool_],
-    load: Array | None,
-) -> Solution:
-    """Coefficients of the shared columns (N, n, r), then of each joint's friction terms, by reweighted least squares."""
-    r = columns.shape[2]
-    total = r + sum(len(law) for law in laws)
-    parts: list[tuple[NDArray[np.intp], Moments]] = []
-    start = r
-    G, b = np.zeros((total, total)), np.zeros(total)
-    for j, law in enumerate(laws):
-        friction = np.column_stack([term.column(samples.motion, j, load) for term in law])
-        X = np.hstack([columns[:, j], smooth(samples, friction)])[rows[:, j]]
-        where = np.concatenate([np.arange(r), np.arange(start, start + len(law))])
-        parts.append((where.astype(np.intp), Moments.of(X, samples.tau[rows[:, j], j])))
-        start += len(law)
-    weights = np.array([part.count / part.yy for _, part in parts])
-    theta = np.zeros(total)
-    for _ in range(_REWEIGHTINGS + 1):
-        G, b = np.zeros((total, total)), np.zeros(total)
-        for weight, (where, part) in zip(weights, parts, strict=True):
-            G[np.ix_(where, where)] += weight * part.G
-            b[where] += weight * part.b
-        scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
-        G += _RIDGE * np.diag(1 / scale**2)
-        theta = scale * np.linalg.solve(G * np.outer(scale, scale), scale * b)
-        errors = [part.squared_error(theta[where]) / part.count for where, part in parts]
-        weights = 1 / np.maximum(errors, 1e-12 * np.array([part.yy / part.count for _, part in parts]))
-    return Solution(theta, G, b)
 
 
 def check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from armloop.conditions.indicators import units
 from armloop.motion import Motion
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ _NONE = 1e-6
 class Sorter:
     """Conditions of samples, learnt from a motion whose samples have been sorted.
 
-    Near means near in log‖v‖₁ and log‖v̇‖₁, of which every indicator is a function.
+    Near means near in log‖v‖ and log‖v̇‖, each joint in units of its noise, of which the indicators are functions.
 
     Args:
         motion: the sorted samples.
@@ -27,15 +28,19 @@ class Sorter:
     def __init__(self, motion: Motion, condition: NDArray[np.int_]) -> None:
         self._known = motion
         self._condition = condition
-        sizes = [np.abs(a).sum(axis=1) for a in (motion.v, motion.vdot)]
-        self._floor = _NONE * np.maximum([float(size.max(initial=0)) for size in sizes], 1e-300)
+        self._units = [units(a) for a in (motion.v, motion.vdot)]
+        sizes = self._sizes(motion)
+        self._floor = _NONE * np.maximum(sizes.max(axis=0, initial=0.0), 1e-300)
         points, first = np.unique(self._place(motion), axis=0, return_index=True)
         self._labels = condition[first]
         self._tree = cKDTree(points)
 
+    def _sizes(self, motion: Motion) -> Array:
+        pairs = zip((motion.v, motion.vdot), self._units, strict=True)
+        return np.column_stack([np.linalg.norm(a / unit, axis=1) for a, unit in pairs])
+
     def _place(self, motion: Motion) -> Array:
-        sizes = np.column_stack([np.abs(a).sum(axis=1) for a in (motion.v, motion.vdot)])
-        return np.log10(np.maximum(sizes, self._floor))
+        return np.log10(np.maximum(self._sizes(motion), self._floor))
 
     def __call__(self, motion: Motion) -> NDArray[np.int_]:
         """(N,) condition of each sample; the sorted motion itself gets its own back."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.components import SparseTerms
-from armloop.errors import ExcitationError
+from armloop.errors import ExcitationError, InputError
 from armloop.library.angle_sums import AngleSums
 from armloop.library.double_feature_set import DoubleFeatureSet, Factors
 from armloop.library.friction import FrictionTerm
@@ -24,6 +24,7 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.sums import Choice, Columns, Problems, StepSums
 from armloop.reconstruction.trials import Correction, Fit, HeldOut
+from armloop.reconstruction.unattenuated import unattenuated
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
 
@@ -138,23 +139,27 @@ class _Joint:
     profile: Index
     scale: float
 
-    def select(self, moments: Moments, library: Index, sparse: Sparse) -> Index:
-        """Support among the library columns ``library`` and the friction columns."""
+    def select(self, moments: Moments, library: Index, sparse: Sparse) -> Fit:
+        """Support among the library columns ``library`` and the friction columns, and its coefficients."""
         chosen = np.zeros(0, dtype=np.intp)
         best: Index = np.zeros(0, dtype=np.intp)
+        parts = (self.fit, self.all - self.fit) if moments is self.all and sparse.needs_parts else ()
         for _ in range(3):
             previous = best
             best = self._profiled(moments, np.concatenate([self.fixed, chosen]))
             forced = np.concatenate([self.fixed, best])
             columns = np.concatenate([library, forced]).astype(np.intp)
             doubtless = np.arange(len(library), len(columns))
-            local = sparse.support(moments.take(columns), doubtless, self.scale**2)
+            local, beta = sparse.fit(
+                moments.take(columns), doubtless, self.scale**2, [part.take(columns) for part in parts]
+            )
             support = columns[local]
             chosen = support[support < self.size]
             if np.array_equal(best, previous):
                 break
-        support = np.concatenate([chosen, self.fixed, best]).astype(np.intp)
-        return sparse.prune(moments, support, support[support >= self.size], self.scale**2)
+        kept = sparse.prune(moments, support, support[support >= self.size], self.scale**2)
+        shrunk = sparse.shrinks and len(kept) == len(support)
+        return Fit(kept, beta if shrunk else moments.solve(kept))
 
     def _profiled(self, moments: Moments, base: Index) -> Index:
         """The one profiled column that, with the base, leaves the smallest squared error."""
@@ -178,6 +183,7 @@ def regress_step(
 
     Raises:
         ExcitationError: too few samples for a joint.
+        InputError: the estimator's solver does not converge.
     """
     candidates = _candidates(revolute, plan)
     library = WaveProducts(candidates.factors, candidates.index)
@@ -196,8 +202,11 @@ def regress_step(
     errors = np.sqrt(tried.errors.mean(axis=1)).tolist()
     trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
     final = [_fit(joint, joint.all, chosen, options) for joint in joints]
-    final = _corrected(final, joints, partial(_gradients, data, choice, columns))
-    terms, friction = _collect(final, candidates, columns, plan)
+    if not options.sparse.shrinks:
+        final = _corrected(final, joints, partial(_gradients, data, choice, columns))
+    if options.snr is not None:
+        final = unattenuated(data, choice, columns, final, options.snr)
+    terms, friction = _collect(final, candidates.step, columns, plan)
     reports = []
     for part, found in zip(plan.parts, terms, strict=True):
         N2 = _second_order(part, orders[1])
@@ -245,8 +254,10 @@ def _joints(columns: Columns, sums: StepSums, plan: StepPlan) -> list[_Joint]:
 
 
 def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> Fit:
-    support = joint.select(moments, library, options.sparse)
-    return Fit(support, moments.solve(support))
+    try:
+        return joint.select(moments, library, options.sparse)
+    except ArithmeticError as error:
+        raise InputError(f"{error}; choose another estimator, or another penalty") from error
 
 
 def _gradients(data: Data, choice: Choice, columns: Columns, fits: list[Fit]) -> tuple[Array, ...]:
@@ -276,9 +287,9 @@ def _corrected(
 
 
 def _collect(
-    fits: Sequence[Fit], candidates: _Candidates, columns: Columns, plan: StepPlan
+    fits: Sequence[Fit], step: Index, columns: Columns, plan: StepPlan
 ) -> tuple[list[SparseTerms], list[list[FrictionTerm]]]:
-    size = candidates.size
+    size = columns.library.size
     coefficients = np.zeros((size, len(fits)))
     friction: list[list[FrictionTerm]] = []
     for j, fit in enumerate(fits):
@@ -286,11 +297,9 @@ def _collect(
         coefficients[fit.support[mine], j] = fit.beta[mine]
         laws = zip(fit.support[~mine] - size, fit.beta[~mine].tolist(), strict=True)
         friction.append([replace(columns.friction[j][k], coefficient=value) for k, value in laws])
-    kept = coefficients.any(axis=1)
     terms = []
     for part in plan.parts:
-        mine = kept & (candidates.step == part.step)
-        terms.append(
-            SparseTerms(part.step, candidates.index[mine], coefficients[mine], candidates.factors.waves)
-        )
+        kept = np.flatnonzero(coefficients.any(axis=1) & (step == part.step))
+        found = columns.library.only(kept)
+        terms.append(SparseTerms(part.step, found.index, coefficients[kept], found.factors.waves))
     return terms, friction

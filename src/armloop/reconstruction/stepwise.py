@@ -14,6 +14,7 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
+from armloop.reconstruction.refit import refit
 from armloop.reconstruction.sorter import Sorter
 from armloop.reconstruction.step import Part, StepPlan, regress_step
 from armloop.reconstruction.sums import Choice
@@ -48,7 +49,7 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
     if not note:
         found.sorter = sorter
     revolute = tuple(bool(r) for r in arm.revolute)
-    for plan in _together(revolute, options) if note else _steps(revolute, options):
+    for plan in _together(revolute, options) if note else steps(revolute, options):
         share = float(np.isin(clusters.condition, plan.conditions).mean())
         progress(f"{plan.name}: {share:.0%} of the samples")
         # A copy: what is found now must not be inherited by itself.
@@ -59,13 +60,16 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
         for law, more in zip(found.friction, friction, strict=True):
             law += more
         found.reports += report
+    if refit(found, data, options.sparse.estimator):
+        found.notes.append("coefficients regressed once more on columns that are filtered like the torque")
     return found
 
 
 _PARTS = (Part(1, "none"), Part(2, "velocity"), Part(3, "acceleration"))
 
 
-def _steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
+    """The three steps, each with the orders worth trying."""
     first, second, third = _PARTS
     return [
         StepPlan((first,), _orders(revolute, (first,), (0,), options), ("sign",), (1,)),

@@ -25,6 +25,8 @@ from armloop.regression.moments import Moments
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
+#: Samples whose friction columns, dozens per joint, exist at a time.
+_AT_ONCE = 4096
 #: Which joints move (a bit each), and whether the samples choose orders.
 Cell = tuple[int, bool]
 
@@ -48,7 +50,7 @@ class Usable:
     validation: Mask
     blocks: Index
 
-    def take(self, rows: Mask) -> Usable:
+    def take(self, rows: Mask | Index) -> Usable:
         """Some samples."""
         return Usable(
             _rows(self.motion, rows),
@@ -82,7 +84,8 @@ class Choice:
             rows &= np.isin(self.sorter(motion), self.conditions)
         part = _rows(motion, rows)
         tau = samples.tau[rows]
-        rest = tau - self.inherited.torque(part)
+        # A chunk may have no sample of a condition, and an empty motion has no first instant.
+        rest = tau - self.inherited.torque(part) if len(tau) else tau
         return Usable(part, tau, rest, samples.moving[rows], chunk.validation[rows], chunk.blocks[rows])
 
 
@@ -111,7 +114,7 @@ class Columns:
     def chosen(self, motion: Motion, joint: int, support: Index) -> Array:
         """(N, s) values of some of the joint's columns."""
         size = self.library.size
-        candidates = WaveProducts(self.library.factors, self.library.index[support[support < size]])
+        candidates = self.library.only(support[support < size])
         friction = [self.friction[joint][c - size].column(motion, joint) for c in support if c >= size]
         values = np.empty((motion.samples, len(support)))
         values[:, support < size] = candidates.columns(motion)
@@ -147,12 +150,12 @@ class StepSums:
         cells, power = {}, {}
         for code in np.unique(codes):
             for chooses in (False, True):
-                part = usable.take((codes == code) & (usable.validation == chooses))
-                if part.motion.samples:
-                    given = np.hstack([part.rest, columns.beside(part.motion)])
+                rows = np.flatnonzero((codes == code) & (usable.validation == chooses))
+                parts = [usable.take(rows[i : i + _AT_ONCE]) for i in range(0, len(rows), _AT_ONCE)]
+                if parts:
                     cell = (int(code), chooses)
-                    cells[cell] = columns.library.sums(part.motion, given)
-                    power[cell] = (part.tau**2).sum(axis=0)
+                    cells[cell] = _total(_sums(part, columns) for part in parts)
+                    power[cell] = (usable.tau[rows] ** 2).sum(axis=0)
         return StepSums(cells, power)
 
     def samples(self, joint: int, choosing: bool | None = None) -> int:
@@ -201,6 +204,10 @@ class Problems:
         return Moments(G, b, float(square[0, 0]), float(whole.count))
 
 
+def _sums(part: Usable, columns: Columns) -> WaveSums:
+    return columns.library.sums(part.motion, np.hstack([part.rest, columns.beside(part.motion)]))
+
+
 def _total(parts: Iterable[WaveSums]) -> WaveSums:
     first, *others = parts
     for other in others:
@@ -208,5 +215,5 @@ def _total(parts: Iterable[WaveSums]) -> WaveSums:
     return first
 
 
-def _rows(motion: Motion, rows: Mask) -> Motion:
+def _rows(motion: Motion, rows: Mask | Index) -> Motion:
     return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))

@@ -98,6 +98,9 @@ class Correction:
         gradients = []
         for j, fit in enumerate(fits):
             part = usable.take(usable.moving[:, j])
+            if part.motion.samples == 0:
+                gradients.append(np.zeros(len(fit.support)))
+                continue
             X = columns.chosen(part.motion, j, fit.support)
             gradients.append(X.T @ (part.rest[:, j] - X @ fit.beta))
         return Correction(tuple(gradients))

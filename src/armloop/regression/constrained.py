@@ -1,4 +1,9 @@
-"""Least squares under linear inequalities, by osqp; constraints that nobody violates cost nothing."""
+"""Least squares under linear inequalities, by osqp; constraints that nobody violates cost nothing.
+
+osqp takes first-order steps, which crawl where many constraints are nearly parallel, as those of a matrix that is
+all but singular. Then an active-set method ends the work: the projection z of z₀ onto {A z ≥ 0} is z₀ + Aᵀλ with
+the λ ≥ 0 that minimises ‖z₀ + Aᵀλ‖ (Moreau 1962; Lawson and Hanson, Solving Least Squares Problems, 1974).
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,7 @@ import osqp
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -17,6 +23,8 @@ Cuts = Callable[[Array], Array]
 
 _ROUNDS = 20
 _TOLERANCE = 1e-9
+#: Steps of osqp before the active-set method takes over.
+_STEPS = 2000
 
 
 def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> tuple[Array, int]:
@@ -34,7 +42,7 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
         θ, and the number of constraints that were needed (0: ``start`` itself).
 
     Raises:
-        ArithmeticError: osqp finds no solution.
+        ArithmeticError: no solution is found.
     """
     # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
     # In coordinates z = Lᵀθ with G = LLᵀ the cost is ‖z − z₀‖²: as well conditioned as it can be.
@@ -67,10 +75,14 @@ def _nearest(target: Array, A: Array) -> Array:
         verbose=False,
         eps_abs=_TOLERANCE,
         eps_rel=_TOLERANCE,
-        max_iter=100_000,
+        max_iter=_STEPS,
         polishing=True,
     )
     result = problem.solve(raise_error=False)
-    if result.info.status not in ("solved", "solved inaccurate"):
-        raise ArithmeticError(f"osqp: {result.info.status}")
-    return size * np.asarray(result.x)
+    if result.info.status == "solved":
+        return size * np.asarray(result.x)
+    try:
+        pushes, _ = nnls(A.T, -target / size, maxiter=30 * len(A))
+    except RuntimeError as error:
+        raise ArithmeticError(f"osqp: {result.info.status}; nnls: {error}") from error
+    return np.asarray(target + size * (A.T @ pushes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from armloop.conditions import Clusters, sort_samples
 from armloop.log import MotionLog
 from armloop.motion import Motion, Samples
 from armloop.reconstruction import Reconstruction, StepReport
+from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import clusters_figure, has_trials, orders_figure, torque_figure
 from armloop.reports.tables import Table, formulas, make_table, score_table, steps_table
@@ -101,6 +103,9 @@ def reconstruction_sections(
         tables.append(comparison(reconstruction, baseline))
         text.append(_against(reconstruction, baseline))
     folded = [("The model as formulas, one per joint", formulas(model))]
+    tables += [table for table in (stribeck_table(model),) if table is not None]
+    if (coefficients := coefficients_table(model, None)) is not None:
+        folded.append(("Coefficients with standard errors", f"{coefficients}\n\n{textwrap.fill(NOTE, 110)}"))
     if legend := model.legend():
         folded.append(("What the symbols stand for", "\n".join(legend)))
     return [Section("Reconstruction", text, pictures, tables, folded, list(reconstruction.notes))]

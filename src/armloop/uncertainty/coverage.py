@@ -33,7 +33,7 @@ DISTURBANCES = (
     Disturbance("coloured torque noise (0.2 s)", coloured=0.02),
     Disturbance("drifting friction level (1 s)", drift=0.1),
     Disturbance("coloured noise; little noise in q, v", coloured=0.02, q_noise=1e-4, v_noise=2e-4),
-    Disturbance("coloured noise; much noise in q, v", coloured=0.02, q_noise=3e-3, v_noise=3e-2),
+    Disturbance("coloured noise; much noise in q, v", coloured=0.02, q_noise=3e-3, v_noise=1e-2),
     Disturbance("torque ripple in q", ripple=0.1),
 )
 
@@ -56,8 +56,8 @@ class Covered:
     coefficients: dict[str, int]
     blocks: dict[str, float]
     independent: dict[str, float]
-    bias: dict[str, float]
-    width: dict[str, float]
+    bias: dict[str, float | None]
+    width: dict[str, float | None]
     block_count: float
 
 
@@ -171,7 +171,9 @@ def _summary(name: str, runs: Sequence[_Run]) -> Covered:
     error = np.array([run.error for run in runs])
     half = np.array([run.half for run in runs])
     plain = 1.959964 * np.array([run.independent for run in runs])
-    spread = np.maximum(error.std(axis=0, ddof=1), 1e-300)
+    # a coefficient that ran away in every run has no spread to compare with
+    spread = error.std(axis=0, ddof=1)
+    spread[~(spread > 1e-12)] = np.nan
     off = error.mean(axis=0) / spread
     wide = np.median(np.array([run.block for run in runs]), axis=0) / spread
     names = list(dict.fromkeys(runs[0].kinds))
@@ -180,7 +182,11 @@ def _summary(name: str, runs: Sequence[_Run]) -> Covered:
         coefficients={k: int((kinds == k).sum()) for k in names},
         blocks={k: float(np.mean(np.abs(error) <= half, axis=0)[kinds == k].mean()) for k in names},
         independent={k: float(np.mean(np.abs(error) <= plain, axis=0)[kinds == k].mean()) for k in names},
-        bias={k: float(np.sqrt(np.mean(off[kinds == k] ** 2))) for k in names},
-        width={k: float(np.median(wide[kinds == k])) for k in names},
+        bias={k: _finite(np.sqrt(np.nanmean(off[kinds == k] ** 2))) for k in names},
+        width={k: _finite(np.nanmedian(wide[kinds == k])) for k in names},
         block_count=float(np.mean([run.blocks for run in runs])),
     )
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None

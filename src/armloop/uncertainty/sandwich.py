@@ -50,7 +50,8 @@ class Equations:
     @cached_property
     def scale(self) -> Array:
         """(p,) factors that make the columns' squares sum to one."""
-        return np.asarray(1 / np.sqrt(np.maximum(np.diagonal(self.jacobian.sum(axis=0)), 1e-300)))
+        squares = np.diagonal(self.jacobian.sum(axis=0))
+        return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
 
     @cached_property
     def _scaled(self) -> Array:

@@ -14,14 +14,14 @@ from armloop.library.friction import FrictionLaw
 from armloop.library.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
-from armloop.uncertainty.standard_errors import Errors, Fitted, covariances, gauss_newton_steps
+from armloop.uncertainty.standard_errors import Errors, Fitted, covariances, gauss_newton_steps, misfit
 from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown
 
 Array = NDArray[np.float64]
 
 
 def solve_given_terms(
-    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 2
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 3
 ) -> tuple[ReconstructedModel, list[Errors]]:
     """Least squares, step by step, over a model's own terms; Gauss-Newton for v_s.
 
@@ -31,6 +31,27 @@ def solve_given_terms(
     for _ in range(iterations):
         model = moved(model, gauss_newton_steps(model, samples, fitted))
     return model, covariances(model, samples, fitted)[0]
+
+
+def solve(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 4
+) -> tuple[ReconstructedModel, bool]:
+    """The best of several Gauss-Newton iterates, and whether it fits better than the model given.
+
+    Better is a smaller sum over joints of squared residual relative to the squared torque, every sample by the
+    last regression that used it.
+
+    Raises:
+        numpy.linalg.LinAlgError: the terms cannot be told apart.
+    """
+    best, error = model, misfit(model, samples, fitted)
+    start = error
+    for _ in range(iterations):
+        model = moved(model, gauss_newton_steps(model, samples, fitted))
+        new = misfit(model, samples, fitted)
+        if new < error:
+            best, error = model, new
+    return best, error < start
 
 
 def moved(model: ReconstructedModel, steps: Sequence[tuple[list[Unknown], Array]]) -> ReconstructedModel:

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0
+#: Of a problem with more unknowns (nothing was chosen) no errors are computed: the table would say nothing.
+MOST_UNKNOWNS = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,9 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         for unknown, error, freedom in zip(part.unknowns, part.std_error, part.freedom, strict=True):
             place = table[unknown.kind]
             where = place if unknown.joint is None else place[unknown.joint]
-            where[unknown.name] = _entry(error, freedom)
+            # what the fitted samples do not determine has no error; it must not spoil the model's file
+            if np.isfinite(error) and np.isfinite(freedom):
+                where[unknown.name] = _entry(error, freedom)
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
@@ -96,9 +100,10 @@ def covariances(
     todo = problems(model)
     residual, spread = _residuals(todo, samples, fitted)
     rows = np.logical_or.reduce([part.rows for part in fitted])
+    # an even selection from long logs is coarser than its sample period
+    step = float(np.median(np.diff(samples.motion.time)))
     correlation = max(
-        correlation_time(residual[:, j], rows[:, j], samples.motion, samples.period)
-        for j in range(model.arm.n)
+        correlation_time(residual[:, j], rows[:, j], samples.motion, step) for j in range(model.arm.n)
     )
     covered = [
         covered_time(samples.motion.time, np.any(one.rows, axis=1, keepdims=True)[:, 0]) for one in fitted
@@ -107,7 +112,7 @@ def covariances(
     blocks = independent_blocks(samples.motion, seconds)
     found = []
     for problem in todo:
-        if problem.unknowns:
+        if 0 < len(problem.unknowns) <= MOST_UNKNOWNS:
             sums = _equations(problem, samples, fitted, blocks, spread)
             found.append(Errors(problem.unknowns, sums.covariance(), sums.degrees_of_freedom(), sums))
     return found, seconds, correlation
@@ -125,6 +130,14 @@ def gauss_newton_steps(
         for problem in todo
         if problem.unknowns
     ]
+
+
+def misfit(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> float:
+    """Sum over the joints of mean squared residual relative to mean squared torque, on the fitted samples."""
+    residual, _ = _residuals(problems(model), samples, fitted)
+    rows = np.logical_or.reduce([one.rows for one in fitted])
+    power = (samples.tau**2 * rows).sum(axis=0)
+    return float(((residual**2).sum(axis=0) / np.maximum(power, 1e-300)).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,5 +255,6 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
             if chosen.any():
                 error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
                 freedom = float(part.freedom[chosen > 0].min())
-                found[key] = {"value": float(value), **_entry(error, freedom)}
+                if np.isfinite(error) and np.isfinite(freedom):
+                    found[key] = {"value": float(value), **_entry(error, freedom)}
     return found

@@ -2,7 +2,8 @@
 
 Sparse terms belong to one joint each, so there is one problem per joint. Base parameters and terms of the
 energies serve all joints: one problem, in which every joint's samples count by the size of its residual. The
-Stribeck velocity v_s is an unknown too; it enters by its derivative (delta method).
+Stribeck velocity v_s is an unknown too; it enters by its derivative (delta method). Columns pass the filter that
+the torque has passed: friction steps where a joint reverses, and so must its column.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def _sparse(model: ReconstructedModel, joint: int) -> Problem:
         X = np.column_stack(
             [np.zeros((motion.samples, 0)), *parts, *_friction_columns(law, motion, joint, load)]
         )
-        return [Design(joint, where, X)]
+        return [Design(joint, where, smooth(samples, X))]
 
     return Problem(unknowns, False, designs)
 

@@ -1,0 +1,60 @@
+"""The paper, table by table."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import add_json
+
+HELP = "reproduce the paper's tables and figures, ours beside the paper's"
+EXAMPLE = "armloop reproduce table2 fig9 --out out/reproduction"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument(
+        "items",
+        nargs="*",
+        metavar="ITEM",
+        help="fig1, table2, fig5, fig6, fig8, fig9, fig10, fig11, fig14, fig15 (default: all of these)",
+    )
+    p.add_argument("--out", required=True, help="folder for reproduction.json and report.html")
+    p.add_argument(
+        "--draws", type=int, default=10, help="noise draws per case; the paper shows one (%(default)s)"
+    )
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the items, print and write what they come to."""
+    import json
+    import time
+
+    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.errors import InputError
+    from armloop.files import write_text
+    from armloop.reports.reproduction_report import reproduction_report, terminal_text
+    from armloop.reproduction import Context, chosen, run_item
+
+    names = chosen(options.items)
+    if not 1 <= options.draws <= 1000:
+        raise InputError(f"--draws {options.draws}: give a number of draws from 1 to 1000")
+    folder = out_folder(options.out)
+    tell = progress(options)
+    context = Context(draws=options.draws, progress=tell)
+    answer, seconds, entries = {}, {}, []
+    for name in names:
+        tell(f"{name} …")
+        start = time.perf_counter()
+        outcome = run_item(name, context)
+        seconds[name] = time.perf_counter() - start
+        answer[name] = outcome.to_dict()
+        entries.append((name, outcome.headline, outcome.verdict, outcome.section))
+        if not options.json:
+            print(terminal_text(name, outcome.section, outcome.verdict, seconds[name]), flush=True)
+    write_text(folder / "reproduction.json", json.dumps(answer, indent=1) + "\n")
+    write_text(folder / "report.html", reproduction_report(entries, seconds))
+    if options.json:
+        print_json(answer)
+    else:
+        print(f"written: {folder}/reproduction.json, report.html  ({sum(seconds.values()):.0f} s)")

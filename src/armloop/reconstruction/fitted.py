@@ -1,0 +1,47 @@
+"""Which samples each regression of a reconstruction used: what standard errors have to know."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from armloop.model import ReconstructedModel
+from armloop.reconstruction.data import Data
+from armloop.reconstruction.found import Found
+from armloop.reconstruction.shared import sliding_rows
+from armloop.uncertainty import Fitted, standard_errors
+
+
+def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> dict[str, Any]:
+    """Standard errors of a model's coefficients.
+
+    Of logs that are not kept in memory the even selection stands for all samples, and errors are those of a
+    regression of it: too large rather than too small.
+
+    Args:
+        found: how the model was found.
+        shared: whether its coefficients serve all joints.
+    """
+    samples = data.reference.samples
+    if not in_memory(data):
+        # a selection cannot be filtered; its columns are taken as they are
+        samples = replace(samples, cutoff_hz=0.0)
+    return standard_errors(model, samples, fitted_rows(data, found, shared))
+
+
+def in_memory(data: Data) -> bool:
+    """Whether the reference is all there is."""
+    return len(data.parts) == 1 and getattr(data.parts[0], "kept", None) is data.reference
+
+
+def fitted_rows(data: Data, found: Found, shared: bool) -> list[Fitted]:
+    """The regressions in their order, with the samples of the reference that they used."""
+    chunk = data.reference
+    if shared:
+        rows = sliding_rows(chunk.samples)
+        return [Fitted((1, 2, 3), rows if found.final is not None else rows & ~chunk.held_out[:, None])]
+    rows = chunk.samples.moving & (chunk.independent & ~chunk.held_out)[:, None]
+    if found.sorter is None:
+        return [Fitted((1, 2, 3), rows)]
+    condition = found.sorter(chunk.samples.motion)
+    return [Fitted((step,), rows & (condition == step)[:, None]) for step in (1, 2, 3)]

@@ -1,0 +1,284 @@
+"""A ladder of friction laws: every rung must earn its place on data held out.
+
+The rungs go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
+Coulomb level it makes levels that differ with the direction), the Stribeck fall, nonlinear viscous friction,
+viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with memory
+before the joint slides, with and without load. A rung brings a row of elements (widths, speeds, powers), of which a
+passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
+scatter over the folds; else for the joints alone for which it falls by more than twice that. At the end, each joint
+hands back the rungs it does not miss.
+
+Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.blocks import block_numbers
+from armloop.library.friction import FrictionTerm
+from armloop.motion import Motion, Samples
+from armloop.reconstruction.options import Options
+from armloop.reconstruction.pooled import Choice, Pooled, Prior
+
+Array = NDArray[np.float64]
+
+#: Folds of the inner judges: so many where there is plenty of data, s of them; else twice as many, of blocks that
+#: may become as short as so many periods of the filter, so that what is left can still determine the rest.
+_FOLDS, _PLENTY, _SHORTEST = 5, 60.0, 5.0
+#: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
+_WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
+#: Part of a joint's squared error that a rung must be worth for the joint to keep it.
+_KEEP = 0.002
+#: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
+_FADES = (0.003, 0.01, 0.03, 0.1)
+_WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
+#: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
+_STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A step of the ladder: its name, and the elements it brings for each joint."""
+
+    name: str
+    elements: list[list[FrictionTerm]]
+
+
+@dataclass
+class Climb:
+    """What one rung brought.
+
+    Attributes:
+        rung: its name.
+        before, after: held-out nRMSE, mean over the joints.
+        refused: held-out nRMSE that it would have led to, where it was not taken.
+        joints: those that took it (0-based), or, of the last entry, that handed rungs back.
+    """
+
+    rung: str
+    before: float
+    after: float
+    refused: float | None
+    joints: list[int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values; joints count from 1."""
+        return {**vars(self), "joints": [joint + 1 for joint in self.joints]}
+
+
+@dataclass(frozen=True, eq=False)
+class Ladder:
+    """The laws chosen, the prior of the shared coefficients, and what each rung brought."""
+
+    laws: list[list[FrictionTerm]]
+    prior: Prior | None
+    climbs: list[Climb]
+    notes: list[str]
+
+
+def rungs(arm: Arm, motion: Motion) -> list[Rung]:
+    """The ladder of an arm; the Stribeck speeds follow each joint's fastest speed."""
+    units = np.where(arm.revolute, 1.0, 0.1)
+    fastest = np.quantile(np.abs(motion.v), 0.995, axis=0)
+    slowest = units * _SLOWEST
+    stribeck = [
+        np.geomspace(low, max(_PART * v, 2 * low), _STRIBECK) for low, v in zip(slowest, fastest, strict=True)
+    ]
+
+    def same(*kinds: str) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind) for kind in kinds] for _ in units]
+
+    def scaled(kind: str, sizes: tuple[float, ...]) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind, parameter=float(unit * size)) for size in sizes] for unit in units]
+
+    coulomb = [[*fades, FrictionTerm("viscous")] for fades in scaled("smooth_sign", _FADES)]
+    falls = [[FrictionTerm("stribeck_peak", parameter=float(f"{v:.2g}")) for v in own] for own in stribeck]
+    return [
+        Rung("Coulomb and viscous", coulomb),
+        Rung("offset (levels by direction)", same("offset")),
+        Rung("Stribeck", falls),
+        Rung("nonlinear viscous", same("root", "quadratic", "cubic")),
+        Rung("viscous by direction", same("viscous_forward", "viscous_backward")),
+        Rung("Coulomb by load", scaled("load_smooth_sign", _FADES)),
+        Rung("presliding", scaled("hysteresis", _WIDTHS)),
+        Rung("presliding by load", scaled("load_hysteresis", _WIDTHS)),
+    ]
+
+
+def climb(
+    arm: Arm,
+    samples: Samples,
+    columns: Array,
+    rows: NDArray[np.bool_],
+    load: Array,
+    options: Options,
+    priors: dict[str, Prior],
+) -> Ladder:
+    """Choose the prior of the shared coefficients by its evidence, then every joint's friction on held-out folds.
+
+    Args:
+        columns: (N, n, r) shared columns, filtered.
+        rows: (N, n) samples to use.
+        load: (N, n) torque that friction by load depends on.
+        priors: what the shared coefficients may be drawn to, by name; none if empty.
+    """
+    ladder = rungs(arm, samples.motion)
+    candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
+    fold, judged = inner_folds(samples, np.asarray(rows.any(axis=1)), options)
+    pooled = Pooled(samples, columns, candidates, rows, load, fold, judged, options.physical)
+    ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
+    places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
+    state = _State(pooled, places, priors)
+    plenty = rows.any(axis=1).sum() * samples.period > _PLENTY
+    climbs = [state.take(level, rung.name, one_by_one=plenty) for level, rung in enumerate(ladder)]
+    if plenty:
+        climbs.append(state.hand_back())
+    notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
+    laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
+    return Ladder(laws, state.prior, climbs, notes + _notes(climbs))
+
+
+def inner_folds(
+    samples: Samples, used: NDArray[np.bool_], options: Options
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """(N,) folds for the choice of terms, and (N,) which samples judge their fold.
+
+    Whole runs are dealt out where there are enough of them and none outweighs the others: another run is what a
+    model is for. Else blocks are; their samples within half a period of the filter from a border do not judge.
+    """
+    motion = samples.motion
+    lengths = np.array([used[run].sum() for run in motion.runs()])
+    seconds = used.sum() * samples.period
+    if np.count_nonzero(lengths) >= _FOLDS and lengths.max() <= 0.4 * lengths.sum() and seconds > _PLENTY:
+        fold, following = np.zeros(motion.samples, dtype=np.intp), 0
+        for run, length in zip(motion.runs(), lengths, strict=True):
+            fold[run] = following % _FOLDS
+            following += int(length > 0)
+        return fold, np.ones(motion.samples, dtype=bool)
+    shortest = _SHORTEST / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
+    numbers = block_numbers(motion, max(min(options.block_seconds, seconds / (4 * _FOLDS)), shortest))
+    kept = np.unique(numbers[used])
+    count = _FOLDS if seconds > _PLENTY else 2 * _FOLDS
+    fold = np.searchsorted(kept, numbers) % max(1, min(count, len(kept)))
+    return fold.astype(np.intp), _inside(motion, numbers, samples)
+
+
+def _inside(motion: Motion, numbers: NDArray[np.intp], samples: Samples) -> NDArray[np.bool_]:
+    """(N,) samples further than half a period of the filter from the borders of their block."""
+    inside = np.ones(motion.samples, dtype=bool)
+    if samples.cutoff_hz > 0:
+        reach = int(np.ceil(0.5 / (samples.cutoff_hz * samples.period)))
+        border = np.flatnonzero(np.diff(numbers)) + 1
+        near = (border[:, None] + np.arange(-reach, reach)).ravel()
+        inside[near[(near >= 0) & (near < motion.samples)]] = False
+    return inside
+
+
+class _State:
+    """Where the climb stands: the rungs each joint has taken, and the squared errors on the held-out folds."""
+
+    def __init__(self, pooled: Pooled, places: list[list[int]], priors: dict[str, Prior]) -> None:
+        self.pooled, self._places = pooled, places
+        self._counts = pooled.counts
+        self._count = np.maximum(self._counts.sum(axis=0), 1.0)
+        self._rms = np.sqrt(np.maximum(pooled.squares.sum(axis=0) / self._count, 1e-300))
+        self.taken: list[list[int]] = [[] for _ in pooled.candidates]
+        self.prior: Prior | None = None
+        self.prior_name: str | None = None
+        self._priors = priors
+        self._weights, self._errors = self._judged()
+
+    def choice(self, taken: list[list[int]]) -> Choice:
+        """Places of the elements of some rungs per joint."""
+        return [[place for level in own for place in self._places[level]] for own in taken]
+
+    def take(self, level: int, name: str, one_by_one: bool) -> Climb:
+        """Take a rung for all joints or for some if it earns its place; the first, which all drives have, anyway."""
+        before = self._error(self._errors)
+        everyone = [[*own, level] for own in self.taken]
+        errors = self._held_out(everyone)
+        gain, sure = self._gain(errors, _SURE)
+        if level == 0:
+            self.taken = everyone
+            self._choose_prior()
+        elif sure and gain > _WORTH:
+            self.taken = everyone
+        elif one_by_one:
+            self.taken = [
+                everyone[j] if self._earns_alone(j, level) else own for j, own in enumerate(self.taken)
+            ]
+        joints = [j for j, own in enumerate(self.taken) if level in own]
+        if joints:
+            self._weights, self._errors = self._judged()
+        after = self._error(self._errors)
+        return Climb(name, before, after, None if joints else self._error(errors), joints)
+
+    def hand_back(self) -> Climb:
+        """Let every joint drop the rungs it does not miss, the last first."""
+        before, joints = self._error(self._errors), set()
+        for level in reversed(range(len(self._places))):
+            for j, own in enumerate(self.taken):
+                if level in own:
+                    shorter = [*self.taken[:j], [k for k in own if k != level], *self.taken[j + 1 :]]
+                    errors = self._held_out(shorter)
+                    if -self._gain(errors, _SURE, [j])[0] < _KEEP:
+                        self.taken, self._errors = shorter, errors
+                        joints.add(j)
+        return Climb("rungs handed back", before, self._error(self._errors), None, sorted(joints))
+
+    def _earns_alone(self, joint: int, level: int) -> bool:
+        more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
+        gain, sure = self._gain(self._held_out(more), _SURER, [joint])
+        return sure and gain > _WORTH
+
+    def _choose_prior(self) -> None:
+        if self._priors:
+            choice = self.choice(self.taken)
+            weights = self.pooled.solve(choice).weights
+            evidence = {name: self.pooled.evidence(choice, weights, p) for name, p in self._priors.items()}
+            self.prior_name = max(evidence, key=evidence.__getitem__)
+            self.prior = self._priors[self.prior_name]
+
+    def _judged(self) -> tuple[Array, Array]:
+        """Weights of the joints, and (folds, n) squared errors on the held-out folds."""
+        choice = self.choice(self.taken)
+        weights = self.pooled.solve(choice, self.prior).weights
+        return weights, self.pooled.held_out(choice, weights, self.prior)
+
+    def _held_out(self, taken: list[list[int]]) -> Array:
+        return self.pooled.held_out(self.choice(taken), self._weights, self.prior)
+
+    def _error(self, errors: Array) -> float:
+        """Held-out nRMSE, mean over the joints."""
+        return float(np.mean(np.sqrt(errors.sum(axis=0) / self._count) / self._rms))
+
+    def _gain(self, errors: Array, times: float, joints: list[int] | None = None) -> tuple[float, bool]:
+        """Mean log ratio of the squared errors before and after, and whether it exceeds its scatter over the folds.
+
+        In ratios, so that no joint and no fold that happens to be hard outweighs the others. ``joints`` are those
+        whose errors the gain is a part of.
+        """
+        ratios = np.log(np.maximum(self._errors, 1e-300) / np.maximum(errors, 1e-300))
+        whole = self._count.sum() if joints is None else self._count[joints].sum()
+        gains = (self._counts * ratios).sum(axis=1) / whole
+        scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+        return float(gains.sum()), float(gains.sum()) > times * scatter
+
+
+def _notes(climbs: list[Climb]) -> list[str]:
+    """What each rung brought, in a line each."""
+    notes = []
+    for rung in climbs:
+        who = "joints " + ", ".join(str(joint + 1) for joint in rung.joints) if rung.joints else "no joint"
+        change = f"{rung.before:.4f} → {rung.after:.4f}"
+        if rung.refused is not None:
+            change = f"{rung.before:.4f}; it would be {rung.refused:.4f}"
+        notes.append(f"friction, {rung.rung}: {who}; held-out nRMSE {change}")
+    return notes

@@ -1,0 +1,62 @@
+"""Coefficients regressed once more, the terms being chosen, on columns that are filtered like the torque.
+
+Friction steps where a joint reverses, and the filter smears the step in the torque; unless its column is smeared
+alike, f_s comes out low and v_s high, most of all where a log holds no slow motion but that around reversals. All
+candidates cannot be filtered in reasonable time, the few chosen ones can. v_s leaves its grid here (Gauss-Newton).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.components import SparseTerms
+from armloop.library.friction import FrictionTerm
+from armloop.model import ReconstructedModel
+from armloop.reconstruction.data import Data
+from armloop.reconstruction.fitted import fitted_rows, in_memory
+from armloop.reconstruction.found import Found
+from armloop.uncertainty.solving import solve
+
+#: Estimators whose coefficients are those of least squares on the few terms they keep.
+_LEAST_SQUARES = ("evidence", "debiased_lasso", "thresholded", "stability")
+_FARTHEST = 2.5
+
+
+def refit(found: Found, data: Data, estimator: str) -> bool:
+    """Replace a stepwise result's coefficients; tell whether it was done.
+
+    It is not done for samples that passed no filter, for logs that are not kept in memory, for estimators that
+    shrink or choose nothing, and where the squared error of the fitted samples would not fall; nor for a joint
+    whose v_s would move by more than a factor of two and a half.
+    """
+    if data.reference.samples.cutoff_hz <= 0 or not in_memory(data) or estimator not in _LEAST_SQUARES:
+        return False
+    samples, fitted = data.reference.samples, fitted_rows(data, found, shared=False)
+    before = ReconstructedModel(found.arm, tuple(found.components), found.law)
+    try:
+        after, falls = solve(before, samples, fitted)
+    except np.linalg.LinAlgError:
+        return False
+    if not falls:
+        return False
+    good = [_near(old, new) for old, new in zip(before.friction.terms, after.friction.terms, strict=True)]
+    found.friction = [
+        list(new if ok else old)
+        for ok, old, new in zip(good, before.friction.terms, after.friction.terms, strict=True)
+    ]
+    found.components = [
+        replace(new, coefficients=np.where(good, new.coefficients, old.coefficients))
+        if isinstance(old, SparseTerms) and isinstance(new, SparseTerms)
+        else new
+        for old, new in zip(before.components, after.components, strict=True)
+    ]
+    return any(good)
+
+
+def _near(old: Sequence[FrictionTerm], new: Sequence[FrictionTerm]) -> bool:
+    """Whether a joint's v_s stayed near the grid's best: with terms missing it can run away."""
+    pairs = [(a.parameter, b.parameter) for a, b in zip(old, new, strict=True) if a.kind == "stribeck"]
+    return all(a / _FARTHEST < b < a * _FARTHEST for a, b in pairs)

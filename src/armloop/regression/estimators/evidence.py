@@ -1,0 +1,197 @@
+"""The default: the support with the best extended Bayesian information criterion that a thorough search finds.
+
+Starts are the supports along the Lasso path (Eq. 32), and what backward elimination makes of its long end; both are
+improved by exact add, drop and swap moves and, where these are stuck, by exchanging two or three terms for two others.
+Waves of neighbouring frequencies mimic each other within a limited range of an angle, as cos q, cos 3q and cos 4q mimic
+1 and cos 2q within ±60°, and no single move leads from one such set to the other.
+
+The criterion (Chen and Chen 2008) charges each term log m + 2γ log p. It takes errors as independent and of one
+size, which those of noisy motion are not: their size follows M(q) and the speeds. With γ = 1 and hundreds of
+candidates a term must stand out by more than four standard deviations, which such a mistake does not bridge; how
+many independent samples the data are worth is the caller's to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.regression.estimators.lasso import path
+from armloop.regression.estimators.problem import Problem
+from armloop.regression.moments import DEPENDENT, Moments
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Move = tuple[float, Index]
+
+#: Columns that an exchange considers: those that alone regain most of what the removed terms explained.
+_SCREENED = 120
+#: Terms of which two or three are exchanged: those that cost least to drop.
+_EXCHANGED = 12
+#: Area that two unit columns span, squared, below which what they would gain together is round-off.
+_NEARLY_ONE = 1e-7
+_RIDGE = 1e-12
+#: A new support must be better than round-off of the criterion.
+_BETTER = 1e-6
+
+
+def evidence(problem: Problem) -> Array:
+    """(p,) least-squares coefficients on the support found."""
+    return problem.refitted(_Search(problem).run())
+
+
+class _Fit:
+    """Least squares on a support, and what every other column would see of what it leaves.
+
+    Attributes:
+        P: inverse of the support's normal equations.
+        beta: coefficients.
+        onto: (p, s) coefficients by which the support explains each column.
+        own, left: (p,) size of each column outside the support, and its product with the residual.
+        rss: squared error.
+    """
+
+    def __init__(self, moments: Moments, support: Index) -> None:
+        self.moments, self.support = moments, support
+        rows = moments.G[:, support]
+        self.P = np.linalg.inv(rows[support] + _RIDGE * np.eye(len(support)))
+        self.beta = self.P @ moments.b[support]
+        self.onto = rows @ self.P
+        self.own = 1.0 - np.einsum("ps,ps->p", self.onto, rows)
+        self.left = moments.b - self.onto @ moments.b[support]
+        self.rss = max(moments.yy - float(self.beta @ moments.b[support]), 0.0)
+
+    def losses(self) -> Array:
+        """(s,) by how much dropping each term alone would raise the squared error."""
+        return np.asarray(self.beta**2 / np.diag(self.P))
+
+    def without(self, some: Index) -> tuple[float, Array, Array, Array]:
+        """Squared error without some terms (d,); of each column the size outside the rest, the product with the
+        residual that is then left, and (d, p) what turns it into the part of other columns outside the rest."""
+        back = np.linalg.inv(self.P[np.ix_(some, some)])
+        onto, beta = self.onto[:, some], self.beta[some]
+        spread = back @ onto.T
+        own = self.own + np.einsum("pd,dp->p", onto, spread)
+        return self.rss + float(beta @ back @ beta), own, self.left + beta @ spread, spread
+
+    def between(self, some: Index, spread: Array, columns: Index) -> Array:
+        """(c, c) products of columns outside the support without some of its terms."""
+        G = self.moments.G[np.ix_(columns, columns)]
+        G = G - self.onto[columns] @ self.moments.G[np.ix_(self.support, columns)]
+        return np.asarray(G + self.onto[np.ix_(columns, some)] @ spread[:, columns])
+
+
+def _gains(own: Array, left: Array) -> Array:
+    """(p,) by how much each column alone would lower the squared error; nothing if the support spans it."""
+    return np.where(own > DEPENDENT, left**2 / np.maximum(own, DEPENDENT), 0.0)
+
+
+def _pair_gains(G: Array, left: Array) -> Array:
+    """(c, c) by how much two columns together would lower the squared error."""
+    spanned = np.diag(G) < DEPENDENT
+    own, left = np.where(spanned, 0.0, np.diag(G)), np.where(spanned, 0.0, left)
+    square = np.outer(own, own)
+    area = square - G**2
+    gains = np.outer(left**2, own) + np.outer(own, left**2) - 2 * np.outer(left, left) * G
+    gains = np.where(area > _NEARLY_ONE * square, gains / np.maximum(area, 1e-300), 0.0)
+    np.fill_diagonal(gains, 0.0)
+    return gains
+
+
+class _Search:
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.moments = problem.moments
+        self.max_terms = min(problem.max_terms, problem.size, int(problem.count / 4))
+
+    def run(self) -> Index:
+        none = np.zeros(0, dtype=np.intp)
+        if self.max_terms == 0:
+            return none
+        best, last = (self.problem.score(none), none), none
+        for betas in path(self.moments, 2 * self.max_terms)[1].T[1:]:
+            last = np.flatnonzero(betas).astype(np.intp)
+            if len(last) <= self.max_terms:
+                best = min(best, (self.problem.score(last), last), key=_score)
+        starts = {
+            tuple(np.sort(support)): (score, support) for score, support in (best, self._eliminated(last))
+        }
+        return min((self._improved(start) for start in starts.values()), key=_score)[1]
+
+    def _eliminated(self, support: Index) -> Move:
+        """The best support on the way when the weakest term is dropped again and again."""
+        best: Move = (np.inf, support[:0])
+        while len(support):
+            rss, losses = self.moments.losses(support)
+            score = float(self.problem.criterion(rss, len(support)))
+            if len(support) <= self.max_terms and score < best[0]:
+                best = (score, support)
+            support = np.delete(support, int(np.argmin(losses)))
+        return best
+
+    def _improved(self, start: Move) -> Move:
+        score, support = start
+        while True:
+            fit = _Fit(self.moments, support)
+            for candidate in self._moves(fit):
+                if candidate[0] < score - _BETTER:
+                    score, support = candidate
+                    break
+            else:
+                return score, support
+
+    def _moves(self, fit: _Fit) -> Iterator[Move]:
+        """The best move of each kind, cheap kinds first."""
+        yield min(self._drop(fit), self._add(fit), key=_score)
+        yield self._exchange(fit, 1, 1)
+        yield self._exchange(fit, 2, 2)
+        yield self._exchange(fit, 3, 2)
+
+    def _add(self, fit: _Fit) -> Move:
+        if len(fit.support) >= self.max_terms:
+            return np.inf, fit.support
+        gains = _gains(fit.own, fit.left)
+        j = int(np.argmax(gains))
+        score = self.problem.criterion(fit.rss - gains[j], len(fit.support) + 1)
+        return float(score), np.append(fit.support, j)
+
+    def _drop(self, fit: _Fit) -> Move:
+        if len(fit.support) == 0:
+            return np.inf, fit.support
+        losses = fit.losses()
+        k = int(np.argmin(losses))
+        score = self.problem.criterion(fit.rss + losses[k], len(fit.support) - 1)
+        return float(score), np.delete(fit.support, k)
+
+    def _exchange(self, fit: _Fit, removed: int, added: int) -> Move:
+        """The best exchange of so many terms for one or two others."""
+        best: Move = (np.inf, fit.support)
+        weakest = np.argsort(fit.losses())[: None if removed == 1 else _EXCHANGED]
+        for some in combinations(weakest, removed):
+            places = np.array(some, dtype=np.intp)
+            rss, own, left, spread = fit.without(places)
+            gains = _gains(own, left)
+            rest = np.delete(fit.support, places)
+            gains[rest] = 0.0
+            if added == 1:
+                gains[fit.support[places]] = 0.0
+                chosen = np.array([np.argmax(gains)])
+                gain = float(gains[chosen[0]])
+            else:
+                screened = np.argsort(gains)[-_SCREENED:]
+                pairs = _pair_gains(fit.between(places, spread, screened), left[screened])
+                chosen = screened[list(np.unravel_index(int(np.argmax(pairs)), pairs.shape))]
+                gain = float(pairs.max())
+            if gain <= 0:
+                continue
+            score = float(self.problem.criterion(max(rss - gain, 0.0), len(rest) + added))
+            if score < best[0]:
+                best = (score, np.concatenate([rest, chosen]))
+        return best
+
+
+def _score(move: Move) -> float:
+    return move[0]

@@ -1,0 +1,47 @@
+"""What an item of the reproduction comes to: the paper's figures, ours, and a section that says what agrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from armloop.reports.html import Section
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One item.
+
+    Attributes:
+        paper, ours: JSON-ready figures under the same keys; None where the paper prints no number.
+        details: JSON-ready figures that the paper has no counterpart of: spread, readings, errors.
+        verdict: ``agrees``, ``partly`` or ``differs``.
+        headline: ours against the paper's in one short line.
+        section: of the report; its text says what agrees, what does not and why.
+
+    Raises ``ValueError`` when the two sides have different keys.
+    """
+
+    paper: dict[str, Any]
+    ours: dict[str, Any]
+    verdict: str
+    headline: str
+    section: Section
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if _keys(self.paper) != _keys(self.ours):
+            raise ValueError(f"{self.section.title}: the paper's side and ours have different keys")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The item's object in ``reproduction.json``."""
+        return {
+            "paper": self.paper,
+            "ours": self.ours,
+            "verdict": self.verdict,
+            "details": self.details,
+        }
+
+
+def _keys(value: Any) -> Any:
+    return {key: _keys(part) for key, part in value.items()} if isinstance(value, dict) else None

@@ -1,0 +1,141 @@
+"""Reconstruct with part of the data left out, in turn, and score what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.errors import InputError
+from armloop.log import MotionLog
+from armloop.motion import Samples
+from armloop.progress import Progress, silent
+from armloop.reconstruction import Options, Reconstruction, reconstruct
+from armloop.scoring import Score, residual, score_errors
+from armloop.signals import Conditioning, condition
+from armloop.validation.splits import Split, by_blocks, by_file, judging_rows
+
+LEAVE_OUT = ("file", "blocks")
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """The score of one log on what was left out of it, by models that had not seen it."""
+
+    name: str
+    score: Score
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        moving, standstill = self.score.moving, self.score.standstill
+        return {"file": self.name, "samples": self.score.samples, "moving": moving, "standstill": standstill}
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Scores of all logs on data left out, and the reconstructions behind them.
+
+    Attributes:
+        leave_out: ``"file"`` or ``"blocks"``; ``block_seconds`` is None for files.
+        files: one per log.
+        results: (what was left out, reconstruction) of every split.
+    """
+
+    leave_out: str
+    block_seconds: float | None
+    files: list[LeftOut]
+    results: list[tuple[str, Reconstruction]] = field(repr=False)
+
+    @property
+    def per_joint(self) -> list[float | None]:
+        """Mean nRMSE of each moving joint over the files; None for a joint that moves in no file."""
+        table = np.array([[np.nan if x is None else x for x in f.score.moving["nrmse"]] for f in self.files])
+        return [float(np.nanmean(c)) if np.isfinite(c).any() else None for c in table.T]
+
+    @property
+    def mean(self) -> float | None:
+        """Mean nRMSE of the moving joints over joints and files."""
+        values = [x for f in self.files for x in f.score.moving["nrmse"] if x is not None]
+        return float(np.mean(values)) if values else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of ``armloop crossvalidate --json``."""
+        return {
+            "leave_out": self.leave_out,
+            "block_seconds": self.block_seconds,
+            "library": self.results[0][1].model.history["library"],
+            "files": [f.to_dict() for f in self.files],
+            "mean": {"nrmse": self.mean, "nrmse_per_joint": self.per_joint},
+            "notes": {name: result.notes for name, result in self.results},
+        }
+
+
+def crossvalidate(
+    logs: Sequence[MotionLog],
+    arm: Arm,
+    *,
+    leave_out: str | None = None,
+    block_seconds: float = 1.0,
+    method: str = "stepwise",
+    library: str | None = None,
+    conditioning: Conditioning | None = None,
+    options: Options | None = None,
+    progress: Progress = silent,
+) -> CrossValidation:
+    """Reconstruct several times, each time without some of the data, and score those.
+
+    Args:
+        leave_out: one of :data:`LEAVE_OUT`; files by default where there are at least two.
+        block_seconds: length of the alternating blocks.
+        method, library, conditioning, options: as of :func:`armloop.reconstruction.reconstruct`.
+
+    Raises:
+        InputError: too little data to leave any out, or to reconstruct from the rest.
+    """
+    leave_out = leave_out or ("file" if len(logs) > 1 else "blocks")
+    if leave_out not in LEAVE_OUT:
+        raise InputError(f"unknown --leave-out {leave_out!r}; there are: {', '.join(LEAVE_OUT)}")
+    splits = by_file(logs) if leave_out == "file" else by_blocks(logs, block_seconds)
+    errors: list[list[_Judged]] = [[] for _ in logs]
+    results = []
+    for number, split in enumerate(splits, 1):
+        progress(f"{number} of {len(splits)}: {split.name} left out")
+        result = reconstruct(
+            split.training,
+            arm,
+            method=method,
+            library=library,
+            conditioning=conditioning,
+            options=options,
+        )
+        results.append((split.name, result))
+        for k, judged in _judge(split, logs, result):
+            errors[k].append(judged)
+    files = []
+    for log, parts in zip(logs, errors, strict=True):
+        error, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
+        files.append(LeftOut(log.name, score_errors(error, tau, moving)))
+    seconds = block_seconds if leave_out == "blocks" else None
+    return CrossValidation(leave_out, seconds, files, results)
+
+
+#: (N, n) residual, measured torque, and which samples move, of the samples that judge.
+_Judged = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+
+
+def _judge(split: Split, logs: Sequence[MotionLog], result: Reconstruction) -> list[tuple[int, _Judged]]:
+    found = []
+    for k, blocks in split.left_out.items():
+        samples = condition([logs[k]], result.model.conditioning)
+        rows = judging_rows(_time(logs[k], samples), samples, blocks)
+        found.append((k, (residual(result.model, samples)[rows], samples.tau[rows], samples.moving[rows])))
+    return found
+
+
+def _time(log: MotionLog, samples: Samples) -> NDArray[np.float64]:
+    """(N,) instants of the samples in the log's time: unfiltered samples are numbered instead."""
+    return samples.motion.time if samples.cutoff_hz > 0 else log.time

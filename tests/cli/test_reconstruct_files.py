@@ -1,0 +1,59 @@
+"""`armloop reconstruct` takes many Parquet files; what is wrong with jobs or scheduler is one line and status 2."""
+
+import json
+from pathlib import Path
+
+import pytest
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop import workers
+from armloop.cli import main
+from armloop.log import write_log
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder, paths = tmp_path_factory.mktemp("logs"), []
+    for seed in range(2):
+        motion = fourier_motion(8.0, 125.0, seed)
+        tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+        paths.append(str(folder / f"run{seed}.parquet"))
+        write_log(paths[-1], measured(motion, tau, seed))
+    return paths
+
+
+def reconstruct(files: list[str], out: Path, *more: str) -> int:
+    command = ["reconstruct", *files, "--arm", "three_axis", "--out", str(out), "--max-order", "1", "--json"]
+    return main([*command, *more])
+
+
+def test_many_files_make_one_model(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert reconstruct(files, tmp_path / "model.json", "--jobs", "2") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [step["step"] for step in answer["steps"]] == [1, 2, 3]
+    model = json.loads((tmp_path / "model.json").read_text())
+    assert model["history"]["logs"] == ["run0", "run1"]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (("--jobs", "0"), "--jobs 0: give a number of processes of at least 1"),
+        (("--scheduler", "tcp://127.0.0.1:9"), "no Dask scheduler answers there"),
+    ],
+)
+def test_what_cannot_compute_is_said_in_one_line(
+    files: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    more: tuple[str, str],
+    expected: str,
+) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 0.3)
+    assert reconstruct(files, tmp_path / "model.json", *more) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert expected in line
+    assert not (tmp_path / "model.json").exists()

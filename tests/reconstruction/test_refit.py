@@ -1,0 +1,71 @@
+"""Chosen terms are regressed on filtered columns: friction's parameters come back from varying motion alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armloop.reconstruction.data import Data
+from armloop.reconstruction.found import Found
+from armloop.reconstruction.options import Options
+from armloop.reconstruction.refit import refit
+from armloop.signals import condition
+from armloop.uncertainty.simulated import (
+    COULOMB,
+    STATIC,
+    STRIBECK,
+    VISCOUS,
+    Disturbance,
+    collection,
+    true_model,
+)
+
+
+@pytest.fixture(scope="module")
+def varying():
+    return collection(0, poses=2, segments=2, seconds=40.0).logs(Disturbance("coloured", coloured=0.01), 1)[
+        2:
+    ]
+
+
+def biased():
+    """What columns that are not filtered give: f_s a tenth too low, v_s half too high."""
+    truth = true_model()
+    friction = [
+        [
+            replace(t, coefficient=0.9 * t.coefficient, parameter=1.5 * t.parameter) if t.step else t
+            for t in law
+        ]
+        for law in truth.friction.terms
+    ]
+    return Found(truth.arm, list(truth.components), friction)
+
+
+def test_friction_comes_back_from_varying_motion_alone(varying):
+    found = biased()
+    data = Data.of(condition(varying, true_model().conditioning), Options())
+    assert refit(found, data, "evidence")
+    for j in range(3):
+        law = found.law.stribeck_parameters(j)
+        assert law["static"] == pytest.approx(STATIC[j], rel=0.04)
+        assert law["coulomb"] == pytest.approx(COULOMB[j], rel=0.06)
+        assert law["viscous"] == pytest.approx(VISCOUS[j], rel=0.03)
+        assert law["stribeck_velocity"] == pytest.approx(STRIBECK, rel=0.3)
+
+
+def test_shrunken_and_unfiltered_coefficients_are_left_alone(varying):
+    found, samples = biased(), condition(varying, true_model().conditioning)
+    before = found.law
+    assert not refit(found, Data.of(samples, Options()), "lasso")
+    assert not refit(found, Data.of(replace(samples, cutoff_hz=0.0), Options()), "evidence")
+    assert found.law == before
+
+
+def test_held_out_samples_are_not_used(varying):
+    samples = condition(varying, true_model().conditioning)
+    data = Data.of(samples, Options())
+    tau = np.where(data.reference.held_out[:, None], 1e3, samples.tau)
+    one, other = biased(), biased()
+    refit(one, data, "evidence")
+    refit(other, Data.of(replace(samples, tau=tau), Options()), "evidence")
+    assert one.law == other.law
