@@ -286,7 +286,7 @@ def monte_carlo(seconds: float) -> tuple[float, float]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=2.0, help="simulated seconds per run (default 2)")
+    parser.add_argument("--seconds", type=float, default=1.0, help="simulated seconds per run (default 1)")
     parser.add_argument("--rounds", type=int, default=5, help="turns that every loop takes (default 5)")
     options = parser.parse_args()
     models = {active: model_of(active) for active in (50, 300)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from exact_parts import energies, model_of, rigid_body, scara_terms
+from exact_parts import energies, model_of, random_motion, rigid_body, scara_terms
 from numpy.testing import assert_allclose
 from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 from pydrake.symbolic import Expression, Variable
@@ -25,9 +25,10 @@ from armloop.drake_systems import (
     Stop,
     model_equations,
 )
-from armloop.drake_systems.effects import EFFECTS
-from armloop.dynamics import Dynamics
+from armloop.dynamics import Dynamics, effect_law
+from armloop.effects import EFFECTS, Context
 from armloop.errors import ModelError
+from armloop.functions import MATH
 
 ARM, SCARA = load_arm("three_axis"), load_arm("scara")
 PARAMETERS = {
@@ -153,10 +154,35 @@ def test_a_diagram_with_it_can_be_cloned(name):
     assert_allclose(second(x), first(x), rtol=1e-12)
 
 
-def test_every_effect_of_the_plant_but_the_sensors_has_a_system():
-    assert set(EFFECTS) - {"torque_offset"} <= set(PARAMETERS)
+def test_every_effect_but_the_sensors_has_a_system():
+    acting = {name for name, kind in EFFECTS.items() if not kind.sensor}
+    # an event in time, and a pair of joints: laws of another form
+    assert acting - {"external_contact", "transmission_coupling"} <= set(PARAMETERS)
     with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
+
+
+# what needs a load, a path or a clock besides the state is not compared here
+@pytest.mark.parametrize(
+    "name",
+    sorted(
+        set(PARAMETERS)
+        & set(EFFECTS) - {"load_dependent_friction", "presliding_hysteresis", "friction_drift"}
+    ),
+)
+def test_an_effect_says_what_its_columns_say(name):
+    joint = 2 if EFFECTS[name].joint_wise else None
+    inertial = model_of(ARM).inertial_parameters()
+    law = effect_law(ARM, name, joint, PARAMETERS[name], MATH, inertial)
+    motion = random_motion(3, 4, seed=9)
+    context = Context(ARM, motion, inertial)
+    expected = EFFECTS[name](joint).torque(context, PARAMETERS[name])
+    for k in range(motion.samples):
+        q, v, vdot = (x[k].tolist() for x in (motion.q, motion.v, motion.vdot))
+        tau = law.equations.torque(q, v, vdot) if law.equations else [0.0] * 3
+        if law.friction is not None:
+            tau[law.joint] += law.friction(v[law.joint], np.sign(v[law.joint]), 0.0, motion.time[k])
+        assert_allclose(tau, expected[k], atol=1e-12)
 
 
 def test_the_mass_matrix_as_formulas():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from armloop.drake_systems.scenario_data import CONTROLLERS
 from armloop.drake_systems.scenarios import load_plan, load_plant, load_tracking, plant_names
 from armloop.errors import ScenarioError
 from armloop.excitation import fourier_reference, write_reference
@@ -67,6 +68,66 @@ def test_own_plant_and_urdf_beside_the_scenario(tmp_path):
     assert load(tmp_path, scara + "reference: {kind: fourier, duration: 40.0}\n").reference.duration == 40.0
 
 
+TWO = """
+slow:
+  plant: three_axis
+  reference: {kind: places, dwell: 0.5, places: [[0.0, 0.0, 0.0], [0.3, -0.2, 0.1]], pace: 0.5}
+  score: []
+mine:
+  plant: three_axis
+  score: [0.0, 20.0]
+"""
+
+
+def test_a_file_may_hold_several_scenarios(tmp_path):
+    assert load(tmp_path, TWO).score == (0.0, 20.0)  # the one named as the file
+    path = tmp_path / "mine.yaml"
+    slow = load_tracking(f"{path}:slow")
+    assert slow.name == "mine:slow" and slow.score == (0.0, slow.reference.duration)
+    (tmp_path / "other.yaml").write_text(TWO)
+    assert load_tracking(tmp_path / "other.yaml").name == "other:slow"  # else the first
+    with pytest.raises(ScenarioError, match=r"mine.yaml: there is no scenario 'fast'; there are: slow, mine"):
+        load_tracking(f"{path}:fast")
+    with pytest.raises(ScenarioError, match=r"mine.yaml: slow: field 'Kp' is unknown"):
+        load_tracking(f"{_written(path, TWO.replace('  score: []', '  Kp: []'))}:slow")
+    with pytest.raises(ScenarioError, match=r"holds one scenario without a name; leave out :slow"):
+        load_tracking(f"{_written(path, 'plant: three_axis')}:slow")
+    assert load_tracking("three_axis_tracking:all_controllers").controllers == CONTROLLERS
+
+
+def _written(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_places_keep_the_ranges_speeds_and_rest(tmp_path):
+    load(tmp_path, TWO)
+    scenario = load_tracking(f"{tmp_path / 'mine.yaml'}:slow")
+    ranges = scenario.plant.config.ranges
+    t = np.linspace(0, scenario.reference.duration, 4001)
+    q, v, vdot = scenario.reference.evaluate(t)
+    assert_allclose(q[[0, -1]], [[0, 0, 0], [0.3, -0.2, 0.1]])
+    assert_allclose(v[(t < 0.5) | (t > t[-1] - 0.5)], 0.0, atol=1e-12)
+    used = [
+        np.abs(v).max() / (0.5 * ranges.velocity[0]),
+        np.abs(vdot).max() / (0.25 * ranges.acceleration[0]),
+    ]
+    assert max(used) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_arm_may_be_left_to_the_user(tmp_path):
+    text = OWN.replace("  arm: three_axis\n", "") + "score: [0.0, 20.0]\n"
+    with pytest.raises(ScenarioError, match=r"own_plant: arm is missing; give .* or by --arm"):
+        load(tmp_path, text)
+    assert load_tracking(tmp_path / "mine.yaml", "three_axis").plant.arm.name == "three_axis"
+    with pytest.raises(ScenarioError, match="friction has 3 joints; scara has 4"):
+        load_tracking(tmp_path / "mine.yaml", "scara")
+    with pytest.raises(ScenarioError, match="--arm is for scenarios with own_plant"):
+        load_tracking("three_axis_tracking", "scara")
+    with pytest.raises(ScenarioError, match="ur10e_tracking: own_plant: arm is missing"):
+        load_tracking("ur10e_tracking")
+
+
 def test_a_reference_from_a_file(tmp_path):
     made = fourier_reference(load_plant("scara").config.ranges, 6.0, seed=4)
     write_reference(tmp_path / "mine.csv", made, 200.0)
@@ -100,6 +161,15 @@ def test_a_reference_from_a_file(tmp_path):
         ("plant: three_axis\nscore: [30, 50]\n", "score is .* in 0 to 40 s"),
         ("plant: three_axis\ncontrollers: [lqr]\n", "controllers: lqr; there are: pid"),
         ("plant: three_axis\nreference: {kind: circle}\n", "reference.kind is 'circle'"),
+        ("plant: three_axis\nbandwidth: 0\n", "bandwidth is 0.0; it must be above 0 and at most 1000 rad/s"),
+        (
+            "plant: three_axis\nreference: {kind: places}\n",
+            "reference.places must be two or more places of 3",
+        ),
+        (
+            "plant: three_axis\nreference: {kind: places, places: [[0, 0, 0], [0, 0, 0]]}\n",
+            "reference.places: place 2 is the same",
+        ),
         ("plant: three_axis\nreference: {unit: 1.0}\n", "joint 1 would go from"),
         ("plant: three_axis\nreference: {periods: 0}\n", "reference.periods is 0"),
         ("plant: scara\n", "reference: the paper's is for 3 joints; scara has 4"),
@@ -137,11 +207,12 @@ def test_missing_names_are_told():
         load_plant("puma")
 
 
-def test_the_scenarios_script_is_the_command(monkeypatch):
+@pytest.mark.parametrize("name", ["three_axis_tracking", "scara_pick_and_place", "ur10e_tracking"])
+def test_the_scenarios_script_is_the_command(monkeypatch, name):
     calls = []
     monkeypatch.setattr("armloop.cli.main", lambda arguments: calls.append(arguments) or 0)
-    monkeypatch.setattr("sys.argv", ["three_axis_tracking.py", "--model", "step3=mine.json"])
+    monkeypatch.setattr("sys.argv", [f"{name}.py", "--model", "step3=mine.json"])
     with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(scenario_path("three_axis_tracking").with_suffix(".py")), run_name="__main__")
+        runpy.run_path(str(scenario_path(name).with_suffix(".py")), run_name="__main__")
     assert ended.value.code == 0
-    assert calls == [["track", "three_axis_tracking", "--model", "step3=mine.json"]]
+    assert calls == [["track", name, "--model", "step3=mine.json"]]

@@ -8,6 +8,8 @@ from exact_model import ExactModel
 from numpy.testing import assert_allclose
 
 from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.exact import exact_model
+from armloop.drake_systems.scenario_data import CONTROLLERS
 from armloop.drake_systems.scenarios import load_tracking
 from armloop.drake_systems.tracking import controllers_for, run_tracking, track
 from armloop.excitation import FourierReference
@@ -73,6 +75,8 @@ def test_an_undeclared_payload_costs_and_knowing_it_pays(short, exact):
     [
         ("", "pid"),
         ("model", "pid pid_step1 pid_step3"),
+        ("computed_torque", "pid computed_torque"),
+        ("step2", "pid pid_step2"),
         ("step3", "pid pid_step3"),
         ("step3 step1", "pid pid_step1 pid_step3"),
         ("augmented", "pid pid_augmented"),
@@ -86,6 +90,28 @@ def test_controllers_that_have_a_model_run(short, given, expected):
 def test_a_model_asked_for_runs_even_if_the_scenario_does_not_list_its_controller(short):
     scenario = dataclasses.replace(short, controllers=("pid",))
     assert controllers_for(scenario, dict.fromkeys(["step1", "model"])) == ["pid", "pid_step1"]
+
+
+def test_all_controllers_of_a_scenario(short):
+    """Exact inverse dynamics come first, computed torque with the same model is close, each with its metrics."""
+    brief = dataclasses.replace(
+        short,
+        controllers=CONTROLLERS,
+        reference=dataclasses.replace(short.reference, duration=0.6),
+        score=(0.1, 0.6),
+    )
+    assert controllers_for(brief, {}) == ["pid", "exact"]
+    model = exact_model(brief.plant.arm, brief.plant.config.friction)
+    results = run_tracking(brief, {"model": model})
+    assert list(results) == list(CONTROLLERS)
+    assert np.all(results["exact"].eta < 0.01) and np.all(results["computed_torque"].eta < 0.1)
+    assert_allclose(results["exact"].eta, results["pid_step3"].eta)
+    # without the inertia a little worse than with it, far better than without friction's shape
+    assert results["exact"].eta.mean() < results["pid_step2"].eta.mean() < results["pid_step1"].eta.mean()
+    metrics = results["pid"].metrics
+    rows = results["pid"].scored
+    assert_allclose(metrics.effort, np.sqrt((results["pid"].tau[rows] ** 2).mean(axis=0)))
+    assert np.all(metrics.stick <= 0.5)
 
 
 class Steps:

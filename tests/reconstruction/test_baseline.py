@@ -9,7 +9,9 @@ from armloop.kinematics import nominal_parameters
 from armloop.library.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
-from armloop.reconstruction.reconstruct import _baseline
+from armloop.reconstruction import Options
+from armloop.reconstruction.data import Chunk
+from armloop.reconstruction.tally import Tally
 
 
 def test_easy_data_do_not_make_the_baseline_look_better():
@@ -22,6 +24,8 @@ def test_easy_data_do_not_make_the_baseline_look_better():
     error = np.where(labels == 3, 0.5, 0.01)[:, None]
     samples = Samples(motion, rigid_torque(arm, q, v, vdot) + error, np.ones((400, 3), dtype=bool), 1.0)
     held_out = np.arange(400) % 2 == 0
-    assert _baseline(model, samples, held_out, labels)["rmse"] == pytest.approx([0.5] * 3)
-    together = _baseline(model, samples, held_out, None)["rmse"]
+    chunk = Chunk.of(samples, Options(), held_out=held_out)
+    sorted_out = Tally.of(chunk, model, lambda motion: labels)
+    assert sorted_out.baseline()["rmse"] == pytest.approx([0.5] * 3)
+    together = Tally.of(chunk, model, None).baseline()["rmse"]
     assert together == pytest.approx([np.sqrt((0.5**2 + 0.01**2) / 2)] * 3)

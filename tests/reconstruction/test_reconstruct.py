@@ -31,9 +31,9 @@ def together() -> Reconstruction:
 
 
 def test_data_without_clean_conditions_are_said_to_be_regressed_together(together: Reconstruction):
-    (note,) = together.notes
-    assert "regressed together" in note and "static" in note
-    assert together.model.history["notes"] == [note]
+    note, refitted = together.notes
+    assert "regressed together" in note and "static" in note and "filtered" in refitted
+    assert together.model.history["notes"] == together.notes
     assert [report.step for report in together.reports] == [1, 2, 3]
     assert {component.step for component in together.model.components} == {1, 2, 3}
 

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from armloop.reproduction.noise_study import least_counts
 from armloop.reproduction.outcome import Outcome
 from armloop.reproduction.readings import READINGS, Reading, collected
 from armloop.reproduction.sorting_motion import sorting_motion
+from armloop.reproduction.spread import in_words, spread
 
 
 def random_motion(n, samples, seed=0):
@@ -97,13 +99,18 @@ def test_the_literal_reading_minimises_the_norm_not_squared():
 
 def test_noise_has_the_stated_ratio():
     exact = collected(SCARA, None, 5, Reading())
-    for how in ("joint", "matrix", "unit"):
+    for how in ("joint", "matrix", "unit", "record"):
         noisy = collected(SCARA, (60.0, 40.0, 20.0), 5, Reading(noise=how))
         noise = np.asarray(noisy["varying"].vdot) - np.asarray(exact["varying"].vdot)
         power = np.mean(np.asarray(exact["varying"].vdot) ** 2, axis=0)
-        reference = {"joint": power, "matrix": np.full(4, power.mean()), "unit": np.ones(4)}[how]
+        reference = {
+            "joint": power,
+            "matrix": np.full(4, power.mean()),
+            "unit": np.ones(4),
+            "record": np.full(4, 0.4 * power.mean()),
+        }[how]
         np.testing.assert_allclose(np.mean(noise**2, axis=0), reference / 100, rtol=0.1)
-        assert not noisy["static"].v.any()
+        assert noisy["static"].v.any() == (how == "record")
         np.testing.assert_array_equal(noisy["varying"].tau, exact["varying"].tau)
 
 
@@ -209,3 +216,22 @@ def test_the_place_and_the_number_of_draws_are_checked_first(tmp_path, capsys):
 def test_items_come_in_the_papers_order():
     assert chosen(["fig9", "table2"]) == ["table2", "fig9"]
     assert chosen([]) == list(registry.PAPER)
+
+
+def test_every_item_beyond_the_paper_has_its_module():
+    for name in registry.BEYOND:
+        assert name not in registry.PAPER
+        assert find_spec(f"armloop.reproduction.beyond_{name}") is not None
+    outcome = registry.run_item("friction", Context(draws=1, processes=1))
+    assert abs(outcome.ours["profile"]["median"][2] - 0.1) < 0.01
+
+
+def test_spread_leaves_out_what_is_not_finite():
+    assert spread([[1.0, np.nan], [3.0, np.nan]]) == {
+        "median": [2.0, None],
+        "least": [1.0, None],
+        "largest": [3.0, None],
+        "draws": 2,
+    }
+    assert in_words([4.0, 6.0, np.nan, 5.0]) == "5 (4–6)"
+    assert in_words([0.25, 1.0]) == "0.625 (0.250–1.00)"

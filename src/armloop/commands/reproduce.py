@@ -16,7 +16,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "items",
         nargs="*",
         metavar="ITEM",
-        help="fig1, table2, fig5, fig6, fig8, fig9, fig10, fig11, fig14, fig15 (default: all of these)",
+        help="fig1, table2, fig5, fig6, fig8, fig9, fig10, fig11, fig14, fig15 (default: all of these); beyond the paper "
+        "estimators, conditions, coverage, friction",
     )
     p.add_argument("--out", required=True, help="folder for reproduction.json and report.html")
     p.add_argument(

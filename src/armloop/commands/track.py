@@ -15,16 +15,25 @@ EXAMPLE = (
 def arguments(p: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     p.add_argument(
-        "scenario", metavar="SCENARIO", help="a built-in scenario (three_axis_tracking) or a YAML file"
+        "scenario",
+        metavar="SCENARIO",
+        help="a built-in scenario (three_axis_tracking, scara_pick_and_place, ur10e_tracking, ..) or a YAML file; "
+        "FILE:NAME for one of several in a file (three_axis_tracking:all_controllers)",
+    )
+    p.add_argument(
+        "--arm",
+        default=None,
+        metavar="URDF",
+        help="the arm of a scenario that leaves it open (ur10e_tracking)",
     )
     p.add_argument(
         "--model",
         action="append",
         default=[],
         metavar="NAME=MODEL.json",
-        help="step1 and step3 are the feedforwards of pid_step1 and pid_step3, `model` serves both; any other NAME "
-        "adds a controller pid_NAME. Without any, a model is reconstructed from data collected on the "
-        "scenario's arm first",
+        help="step1, step2 and step3 are the feedforwards of pid_step1, pid_step2 and pid_step3, computed_torque is that "
+        "controller's model, `model` serves all of them; any other NAME adds a controller pid_NAME. Without any, a "
+        "model is reconstructed from data collected on the scenario's arm first, if a controller needs it",
     )
     p.add_argument("--out", default=None, help="folder for tracking.json, plots and replay.html")
     add_json(p)
@@ -38,14 +47,17 @@ def run(options: argparse.Namespace) -> None:
     from armloop.loop import run_scenario
     from armloop.model import ReconstructedModel, load_model
     from armloop.reports.tables import eta_table
+    from armloop.reports.tracking_tables import metrics_table
 
     folder = out_folder(options.out) if options.out else None
-    scenario = load_tracking(options.scenario)
+    scenario = load_tracking(options.scenario, options.arm)
     models: dict[str, ReconstructedModel] = {}
     for item in options.model:
         name, equals, path = item.partition("=")
         if not equals or not name.replace("_", "").isalnum() or not path:
             raise InputError(f"--model {item!r}: write NAME=MODEL.json, such as step3=model.json")
+        if name == "exact":
+            raise InputError(f"--model {item!r}: exact is the simulated arm's own model; choose another name")
         if name in models:
             raise InputError(f"--model {item!r}: {name!r} is given twice")
         models[name] = load_model(path, scenario.plant.arm)
@@ -54,5 +66,6 @@ def run(options: argparse.Namespace) -> None:
         print_json(answer)
         return
     print(eta_table(results, paper=scenario.name == "three_axis_tracking"))
+    print(f"\n{metrics_table(results)}")
     if folder is not None:
         print(f"\nwritten: {folder}/tracking.json, tracking.png, replay.html")

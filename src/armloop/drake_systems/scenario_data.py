@@ -7,8 +7,11 @@ knows `Optional[X]`, not `X | None`.
 from dataclasses import dataclass, field
 from typing import Optional
 
-CONTROLLERS = ("pid", "pid_step1", "pid_step3")
-"""The controllers of the paper: without a model, Eq. (35) and Eq. (36)."""
+CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "exact")
+"""PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with the
+simulated arm's own inverse dynamics, which no reconstruction can reach."""
+PAPER = ("pid", "pid_step1", "pid_step3")
+"""The controllers of Fig. 15."""
 
 
 @dataclass
@@ -35,7 +38,7 @@ class RangesData:
 class PlantData:
     """A simulated arm."""
 
-    arm: str = ""  # built-in name, or the path of a URDF, from the scenario's folder
+    arm: str = ""  # built-in name, or the path of a URDF, from the scenario's folder; `--arm` replaces it
     friction: list[FrictionData] = field(default_factory=list)  # one per joint, base to tip
     ranges: Optional[RangesData] = None  # from the limits when absent
     time_step: float = 0.001  # s, of the plant and of the controllers
@@ -69,11 +72,15 @@ class PlanData:
 class ReferenceData:
     """What to track."""
 
-    kind: str = "paper"  # paper: Fig. 14, three joints; fourier: random within the ranges; csv: of `file`
+    # paper: Fig. 14, three joints; fourier: random within the ranges; places: from place to place; csv: of `file`
+    kind: str = "paper"
     file: str = ""  # of a csv one, as `armloop excite` writes it; its path from the scenario's folder
     unit: float = 0.1  # rad, of the paper's k
     periods: int = 2  # of 20 s, of the paper's
     duration: float = 40.0  # s, of a fourier one
+    places: list[list[float]] = field(default_factory=list)  # rad (m), one row per place
+    dwell: float = 0.8  # s of rest at each place
+    pace: float = 1.0  # share of the ranges' velocities between places; squared, of the accelerations
 
 
 @dataclass
@@ -86,6 +93,7 @@ class TrackingData:
     ki: list[float] = field(default_factory=lambda: [8.0])  # N*m/(rad s)
     kd: list[float] = field(default_factory=lambda: [2.0])  # N*m*s/rad
     reference: ReferenceData = field(default_factory=ReferenceData)
-    score: list[float] = field(default_factory=lambda: [20.0, 40.0])  # s, the interval that is scored
-    controllers: list[str] = field(default_factory=lambda: list(CONTROLLERS))
+    score: list[float] = field(default_factory=lambda: [20.0, 40.0])  # s, start and end; []: the whole run
+    controllers: list[str] = field(default_factory=lambda: list(PAPER))
+    bandwidth: float = 20.0  # rad/s, of computed torque: errors decay critically damped
     random_seed: int = 0

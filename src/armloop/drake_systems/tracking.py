@@ -1,4 +1,4 @@
-"""Closed-loop tracking by PID with and without a model: Eqs. (35), (36) and Fig. 15 of the paper."""
+"""Closed-loop tracking with and without a model: Eqs. (35), (36) and Fig. 15 of the paper, and computed torque."""
 
 from __future__ import annotations
 
@@ -13,17 +13,22 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from armloop.drake_systems.closed_loop import add_arm_with_controller
+from armloop.drake_systems.closed_loop import ControlledArm, add_arm_with_controller
+from armloop.drake_systems.computed_torque import AccelerationGains
 from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
 
 Array = NDArray[np.float64]
 
 MAIN_MODEL = "model"
-"""The name in `models` of the one behind `pid_step1` and `pid_step3`."""
-STEPS = {"step1": 1, "step3": 3}
-"""The names in `models` of the one behind `pid_step1` and the one behind `pid_step3`, and their steps."""
+"""The name in `models` of the one behind `pid_step1`, `pid_step2`, `pid_step3` and `computed_torque`."""
+STEPS = {"step1": 1, "step2": 2, "step3": 3}
+"""The names in `models` of the ones behind `pid_step1`, `pid_step2` and `pid_step3` alone, and their steps."""
+COMPUTED_TORQUE = "computed_torque"
+EXACT = "exact"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +38,7 @@ class TrackingResult:
     time (N,); q_ref, q, tau (N, n) over the whole run, q the true positions, tau the drives' torques
     scored : the samples that eta, rms and largest, (n,) each in `unit`, are of: mean absolute, root mean
         square and largest absolute error; unit : per joint, "deg" or "mm"
+    metrics : effort, time in stick, settling; of a run that was simulated
     """
 
     controller: str
@@ -45,15 +51,26 @@ class TrackingResult:
     rms: Array
     largest: Array
     unit: tuple[str, ...]
+    metrics: Metrics | None = None
+
+
+def needs_model(controller: str) -> bool:
+    """Tell whether a controller of a scenario runs only with a model that somebody gives."""
+    return controller not in ("pid", EXACT)
 
 
 def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
     """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
-    served = {f"pid_{name}" for name in models if name != MAIN_MODEL} | {"pid"}
+    own = [
+        name if name == COMPUTED_TORQUE else f"pid_{name}"
+        for name in models
+        if name not in (MAIN_MODEL, EXACT)
+    ]
+    served = {"pid", EXACT, *own}
     if MAIN_MODEL in models:
-        served |= {f"pid_{name}" for name in STEPS}
+        served |= {COMPUTED_TORQUE, *(f"pid_{name}" for name in STEPS)}
     names = [name for name in scenario.controllers if name in served]
-    return names + [f"pid_{name}" for name in models if name != MAIN_MODEL and f"pid_{name}" not in names]
+    return names + [name for name in own if name not in names]
 
 
 def run_tracking(
@@ -65,9 +82,10 @@ def run_tracking(
 ) -> dict[str, TrackingResult]:
     """Track the scenario's reference once per controller.
 
-    models : `"model"` serves `pid_step1` (Eq. 35) and `pid_step3` (Eq. 36), `"step1"` and `"step3"` one of
-        them each and come first; any other NAME adds a controller `pid_NAME`, that model's third step.
-        Controllers of the scenario that have no model do not run; `pid` needs none.
+    models : `"model"` serves `pid_step1` (Eq. 35), `pid_step2`, `pid_step3` (Eq. 36) and `computed_torque`;
+        `"step1"`, `"step2"`, `"step3"` and `"computed_torque"` serve one of them each and come first; any other
+        NAME adds a controller `pid_NAME`, that model's third step. Controllers of the scenario that have no
+        model do not run; `pid` needs none, and `exact` is PID with the plant's own inverse dynamics.
     effects : what the plant has and the models may not know
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
@@ -110,12 +128,9 @@ def track(
     The diagram is that of `add_arm_with_controller`, with loggers. Raises `ValueError` when `models` has none
     for the controller.
     """
-    plant_spec, period = scenario.plant, scenario.plant.config.time_step
-    model, step = _feedforward(controller, models)
+    period = scenario.plant.config.time_step
     builder = DiagramBuilder()
-    systems = add_arm_with_controller(
-        builder, plant_spec, scenario.gains, scenario.reference, model, step, effects=effects
-    )
+    systems = add_controlled_arm(builder, scenario, controller, models, effects)
     states = LogVectorOutput(systems.plant.GetOutputPort("state"), builder, period)
     torques = LogVectorOutput(systems.plant.GetOutputPort("tau_drive"), builder, period)
     simulator = Simulator(builder.Build())
@@ -124,9 +139,37 @@ def track(
     simulator.Initialize()
     simulator.AdvanceTo(scenario.reference.duration)
     log = states.FindLog(context)
-    q = log.data().T[:, : plant_spec.arm.n]
-    q_ref = systems.reference.tables[0]
-    return _score(scenario, controller, log.sample_times(), q_ref, q, torques.FindLog(context).data().T)
+    tables = systems.reference.tables
+    return score(
+        scenario, controller, log.sample_times(), tables, log.data().T, torques.FindLog(context).data().T
+    )
+
+
+def add_controlled_arm(
+    builder: DiagramBuilder,
+    scenario: TrackingScenario,
+    controller: str,
+    models: Mapping[str, FeedforwardModel],
+    effects: Sequence[UndeclaredEffect] = (),
+) -> ControlledArm:
+    """Add a scenario's plant, reference and one of its controllers, as `track` runs them.
+
+    Raises `ValueError` when `models` has none for the controller.
+    """
+    plant, n = scenario.plant, scenario.plant.arm.n
+    if controller == EXACT:
+        model: FeedforwardModel | None = exact_model(plant.arm, plant.config.friction, effects)
+        step = 3
+    else:
+        model, step = _feedforward(controller, models)
+    if controller == COMPUTED_TORQUE:
+        gains = AccelerationGains.critical(n, scenario.bandwidth)
+        return add_arm_with_controller(
+            builder, plant, gains, scenario.reference, model, controller=controller, effects=effects
+        )
+    return add_arm_with_controller(
+        builder, plant, scenario.gains, scenario.reference, model, step, effects=effects
+    )
 
 
 def _feedforward(
@@ -136,17 +179,28 @@ def _feedforward(
     if controller == "pid":
         return None, 3
     name = controller.removeprefix("pid_")
-    model = models.get(name, models.get(MAIN_MODEL) if name in STEPS else None)
+    model = models.get(name, models.get(MAIN_MODEL) if name in (*STEPS, COMPUTED_TORQUE) else None)
     if model is None:
         given = ", ".join(models) or "none"
         raise ValueError(f"there is no model for the controller {controller}; the models given are: {given}")
     return model, STEPS.get(name, 3)
 
 
-def _score(
-    scenario: TrackingScenario, controller: str, time: Array, q_ref: Array, q: Array, tau: Array
+def score(
+    scenario: TrackingScenario,
+    controller: str,
+    time: Array,
+    tables: tuple[Array, Array, Array],
+    state: Array,
+    tau: Array,
 ) -> TrackingResult:
-    arm = scenario.plant.arm
+    """Return what a run came to over the scenario's interval.
+
+    time : (N,) s; tables : q, v, vdot (K, n) of the reference, K >= N; state : (N, 2n); tau : (N, n)
+    """
+    arm, steps = scenario.plant.arm, len(time)
+    q, v = state[:, : arm.n], state[:, arm.n :]
+    q_ref, v_ref = tables[0][:steps], tables[1][:steps]
     first, last = np.searchsorted(time, np.asarray(scenario.score) - 1e-9)
     scored = slice(int(first), int(last))
     scale = np.where(arm.revolute, np.rad2deg(1.0), 1e3)
@@ -154,7 +208,7 @@ def _score(
     return TrackingResult(
         controller,
         time,
-        q_ref[: len(time)],
+        q_ref,
         q,
         tau,
         scored,
@@ -162,4 +216,5 @@ def _score(
         rms=np.sqrt((error**2).mean(axis=0)),
         largest=error.max(axis=0),
         unit=tuple("deg" if turns else "mm" for turns in arm.revolute),
+        metrics=measure(scenario.plant.config.time_step, error, v[scored], v_ref[scored], tau[scored]),
     )

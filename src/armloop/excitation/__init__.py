@@ -4,6 +4,7 @@ Plain arrays, no simulator. A reference is anything with `evaluate(t) -> q, v, v
 """
 
 from armloop.excitation.fourier import FourierReference, fourier_reference, paper_reference
+from armloop.excitation.places import places_reference
 from armloop.excitation.ranges import MotionRanges, ranges_with, speeds
 from armloop.excitation.reference import Reference, within
 from armloop.excitation.segments import (
@@ -23,6 +24,7 @@ __all__ = [
     "constant_velocity_segments",
     "fourier_reference",
     "paper_reference",
+    "places_reference",
     "ranges_with",
     "read_reference",
     "speeds",

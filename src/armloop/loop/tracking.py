@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armloop.drake_systems.collection import collect
 from armloop.drake_systems.loop_analysis import loop_margins
+from armloop.drake_systems.metrics import BAND
 from armloop.drake_systems.scenarios import TrackingScenario, load_plan
-from armloop.drake_systems.tracking import TrackingResult, run_tracking
+from armloop.drake_systems.tracking import TrackingResult, needs_model, run_tracking
 from armloop.files import replacing, write_text
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -27,14 +30,16 @@ def run_scenario(
 ) -> tuple[dict[str, Any], dict[str, TrackingResult]]:
     """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
 
-    Without any model one is reconstructed first, from data collected on the scenario's own arm.
+    Without any model one is reconstructed first, from data collected on the scenario's own arm, if a controller of
+    the scenario needs one.
     ``models`` are named as in :func:`armloop.drake_systems.tracking.run_tracking`.
 
     Returns:
         The content of ``tracking.json`` and the results by controller.
     """
     chosen = dict(models)
-    if not chosen:
+    made = not models and any(map(needs_model, scenario.controllers))
+    if made:
         progress("no --model given: collecting data on the scenario's arm and reconstructing one")
         plant = scenario.plant
         logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed, processes=2)
@@ -51,13 +56,13 @@ def run_scenario(
         with replacing(folder / "tracking.png") as draft:
             tracking_figure(results).savefig(draft, format="png", dpi=110)
         write_replay(folder / "replay.html", scenario.plant.arm, results)
-        if not models:
+        if made:
             chosen["model"].save(folder / "model.json")
     return answer, results
 
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
-    """The content of ``tracking.json``: η per joint and controller, and the loop's margins at rest."""
+    """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
     first = next(iter(results.values()))
     plant = scenario.plant
     q0 = scenario.reference.evaluate([0.0])[0][0]
@@ -70,10 +75,8 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
         "arm": plant.arm.name,
         "scored_s": list(scenario.score),
         "unit": list(first.unit),
-        "controllers": {
-            name: {"eta_deg": r.eta.tolist(), "rms": r.rms.tolist(), "max": r.largest.tolist()}
-            for name, r in results.items()
-        },
+        "settling_band": BAND,
+        "controllers": {name: _result_answer(result) for name, result in results.items()},
         "loop": [
             {
                 "phase_margin_deg": m.phase_margin,
@@ -83,3 +86,17 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
             for m in margins
         ],
     }
+
+
+def _result_answer(result: TrackingResult) -> dict[str, Any]:
+    """η, RMS and largest error in the scenario's ``unit``, effort in N*m (N), times in s; null where there is none."""
+    answer = {"eta_deg": result.eta.tolist(), "rms": result.rms.tolist(), "max": result.largest.tolist()}
+    if result.metrics is not None:
+        m = result.metrics
+        answer |= {
+            "effort": m.effort.tolist(),
+            "stick_s": m.stick.tolist(),
+            "settling_s": [None if np.isnan(x) else x for x in m.settling.tolist()],
+            "unsettled": [None if np.isnan(x) else x for x in m.unsettled.tolist()],
+        }
+    return answer

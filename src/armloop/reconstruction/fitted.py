@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 from armloop.model import ReconstructedModel
-from armloop.reconstruction.data import Data
+from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.shared import sliding_rows
+from armloop.reconstruction.sorter import Sorter
 from armloop.uncertainty import Fitted, standard_errors
 
 
@@ -40,8 +41,13 @@ def fitted_rows(data: Data, found: Found, shared: bool) -> list[Fitted]:
     if shared:
         rows = sliding_rows(chunk.samples)
         return [Fitted((1, 2, 3), rows if found.final is not None else rows & ~chunk.held_out[:, None])]
+    return step_rows(chunk, found.sorter)
+
+
+def step_rows(chunk: Chunk, sorter: Sorter | None) -> list[Fitted]:
+    """The stepwise method's regressions in their order, with the samples of a chunk that they use."""
     rows = chunk.samples.moving & (chunk.independent & ~chunk.held_out)[:, None]
-    if found.sorter is None:
+    if sorter is None:
         return [Fitted((1, 2, 3), rows)]
-    condition = found.sorter(chunk.samples.motion)
+    condition = sorter(chunk.samples.motion)
     return [Fitted((step,), rows & (condition == step)[:, None]) for step in (1, 2, 3)]

@@ -25,6 +25,7 @@ class Options:
         physical: keep friction from driving, and M(q) positive definite unless the data contradict that, where the
             library knows how to.
         insist: keep M(q) positive definite even then.
+        standard_errors: estimate those of the coefficients, which takes longer than the coefficients do.
     """
 
     sparse: Sparse = field(default_factory=Sparse)
@@ -36,6 +37,7 @@ class Options:
     snr: tuple[float, float, float] | None = None
     physical: bool = True
     insist: bool = False
+    standard_errors: bool = True
 
 
 @dataclass

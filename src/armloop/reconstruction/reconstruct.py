@@ -151,9 +151,10 @@ def reconstruct(
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
         model = replace(model, components=components, friction=found.final.law, history=history)
-    progress("standard errors of the coefficients")
-    errors = uncertainty(model, data, found, shared=library in ("rigid-body", "lagrangian"))
-    model = replace(model, uncertainty=errors)
+    if options.standard_errors:
+        progress("standard errors of the coefficients")
+        errors = uncertainty(model, data, found, shared=library in ("rigid-body", "lagrangian"))
+        model = replace(model, uncertainty=errors)
     return Reconstruction(model, found.reports, tally.score(), found.notes)
 
 

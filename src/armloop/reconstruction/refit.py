@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from armloop.components import SparseTerms
 from armloop.library.friction import FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.reconstruction.data import Data
-from armloop.reconstruction.fitted import fitted_rows, in_memory
+from armloop.reconstruction.data import Chunk, Data
+from armloop.reconstruction.fitted import step_rows
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.sorter import Sorter
 from armloop.uncertainty.solving import solve
+from armloop.uncertainty.standard_errors import Assembled
 
 #: Estimators whose coefficients are those of least squares on the few terms they keep.
 _LEAST_SQUARES = ("evidence", "debiased_lasso", "thresholded", "stability")
@@ -28,16 +31,17 @@ _FARTHEST = 2.5
 def refit(found: Found, data: Data, estimator: str) -> bool:
     """Replace a stepwise result's coefficients; tell whether it was done.
 
-    It is not done for samples that passed no filter, for logs that are not kept in memory, for estimators that
-    shrink or choose nothing, and where the squared error of the fitted samples would not fall; nor for a joint
-    whose v_s would move by more than a factor of two and a half.
+    It is not done for samples that passed no filter, for estimators that shrink or choose nothing, and where the
+    squared error of the fitted samples would not fall; nor for a joint whose v_s would move by more than a factor
+    of two and a half.
     """
-    if data.reference.samples.cutoff_hz <= 0 or not in_memory(data) or estimator not in _LEAST_SQUARES:
+    if data.reference.samples.cutoff_hz <= 0 or estimator not in _LEAST_SQUARES:
         return False
-    samples, fitted = data.reference.samples, fitted_rows(data, found, shared=False)
     before = ReconstructedModel(found.arm, tuple(found.components), found.law)
     try:
-        after, falls = solve(before, samples, fitted)
+        after, falls = solve(
+            before, lambda model: data.sum(partial(_assembled, model=model, sorter=found.sorter))
+        )
     except np.linalg.LinAlgError:
         return False
     if not falls:
@@ -54,6 +58,10 @@ def refit(found: Found, data: Data, estimator: str) -> bool:
         for old, new in zip(before.components, after.components, strict=True)
     ]
     return any(good)
+
+
+def _assembled(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None) -> Assembled:
+    return Assembled.of(model, chunk.samples, step_rows(chunk, sorter))
 
 
 def _near(old: Sequence[FrictionTerm], new: Sequence[FrictionTerm]) -> bool:

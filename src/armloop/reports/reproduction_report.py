@@ -13,6 +13,7 @@ _VERDICTS = {
     "agrees": ("agrees", "good"),
     "partly": ("agrees in part", "accent"),
     "differs": ("differs", "bad"),
+    "beyond": ("beyond the paper", "plain"),
 }
 
 

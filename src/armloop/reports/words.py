@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 MISSING = "–"
 
 _STEPS = {"step1": "Step I", "step2": "Step II", "step3": "Step III"}
+_OTHER_CONTROLLERS = {"computed_torque": "computed torque", "exact": "PID + exact model"}
 _UNITS = {"*": "·", "^2": "²", "^3": "³"}
 
 
@@ -76,6 +77,8 @@ def controller(name: str) -> str:
     """``pid_step1`` as PID + Step I."""
     if name == "pid":
         return "PID"
+    if name in _OTHER_CONTROLLERS:
+        return _OTHER_CONTROLLERS[name]
     rest = name.removeprefix("pid_")
     return f"PID + {_STEPS.get(rest, rest)}"
 

@@ -33,7 +33,7 @@ class Context:
     reading_draws: int = 2
     seeds: int = 5
     starts: int = 20
-    repeats: int = 5
+    repeats: int = 20
     processes: int = 2
     progress: Progress = silent
     _shared: dict[object, Any] = field(default_factory=dict)

@@ -79,25 +79,20 @@ def run(context: Context) -> Outcome:
     h, first, second = paper.INDICATOR
     right = {pace: float(np.median(details[f"{pace:g}"]["rand_paper"])) for pace in _PACES}
     text = [
-        f"A SCARA arm moves from place to place with trapezoidal velocities and rests in between; noise of "
-        f"{paper.SORTING_SNR[0]:.0f} and {paper.SORTING_SNR[1]:.0f} dB in velocities and accelerations; h "
-        f"= {h:g}, W₁ = {first}, "
-        f"W₂ = {second}. {context.draws} motions, {context.starts} random starts each (samples as first "
-        "centres; for the fifth "
-        "column points of the box around them). The paper does not say how fast its arm moves; the "
-        "figures beside it are those "
-        f"at {_PACE:.0%} of the velocities of Table 1.",
-        f"The elbow {'is at three clusters, as in the paper' if same else 'is not at three clusters'}, "
-        "and Algorithm 1 takes "
-        f"{ours['iterations_mean']:.2f} iterations on average and {ours['iterations_max']} at most (paper "
+        "A SCARA arm moves from place to place with trapezoidal velocities and rests in between; noise of "
+        f"{paper.SORTING_SNR[0]:.0f} and {paper.SORTING_SNR[1]:.0f} dB in velocities and accelerations; h = {h:g}, "
+        f"W₁ = {first}, W₂ = {second}. {context.draws} motions, {context.starts} random starts each (samples as "
+        "first centres; for the fifth column points of the box around them). The paper does not say how fast its "
+        f"arm moves; the figures beside it are those at {_PACE:.0%} of the velocities of Table 1.",
+        f"The elbow {'is at three clusters, as in the paper' if same else 'is not at three clusters'}, and Algorithm "
+        f"1 takes {ours['iterations_mean']:.2f} iterations on average and {ours['iterations_max']} at most (paper "
         f"{paper.ITERATIONS_MEAN} and {paper.ITERATIONS_MAX}).",
-        "But neither the elbow nor the iterations say that the clusters are right. Against the true "
-        "conditions the adjusted "
-        "Rand index of the paper's indicator is "
+        "But neither the elbow nor the iterations say that the clusters are right. Against the true conditions the "
+        "adjusted Rand index of the paper's indicator is "
         + ", ".join(f"{right[pace]:.2f} at {pace:.0%}" for pace in _PACES)
         + f" of the speed, that of armloop's {np.median(mine['rand_robust']):.2f} at {_PACE:.0%} "
-        "(1 is perfect, 0 is chance). With h = 60 the switch saturates on the noise of standing still, and the sign in Eq. (5) splits what "
-        "belongs together.",
+        "(1 is perfect, 0 is chance). With h = 60 the switch saturates on the noise of standing still, and the sign "
+        "in Eq. (5) splits what belongs together.",
     ]
     bends = {pace: int(np.median(details[f"{pace:g}"]["elbow"])) for pace in _PACES}
     text.insert(

@@ -47,29 +47,21 @@ def run(context: Context) -> Outcome:
     evidence, implied = _implied()
     most = max(max(v["sindy"]) for v in printed if "0.0001" not in v["reading"])
     text = [
-        f"λ = {THREE_AXIS.penalty:g}, active above {THREE_AXIS.threshold}; {len(cases['case_3'])} draws "
-        "of Cases II and "
-        f"III, {len(cases['case_1'])} of the noise-free Case I. The reading is that of Fig. 5, which "
-        "matched there: Eq. (32) "
-        "literally, solved to convergence, noise measured over the matrix of signals.",
-        f"Case I: both keep about the same number of terms ({_percent(fewer['case_1'])} % fewer), as the "
-        "paper says. "
-        f"Cases II and III: stepwise keeps {_percent(fewer['case_2'])} and {_percent(fewer['case_3'])} % "
-        "fewer, the paper "
-        f"prints {_percent(paper.THREE_AXIS_REDUCTION['case_2'])} and "
+        f"λ = {THREE_AXIS.penalty:g}, active above {THREE_AXIS.threshold}; {len(cases['case_3'])} draws of Cases II "
+        f"and III, {len(cases['case_1'])} of the noise-free Case I. The reading is that of Fig. 5, which matched "
+        "there: Eq. (32) literally, solved to convergence, noise measured over the matrix of signals.",
+        f"Case I: both keep about the same number of terms ({_percent(fewer['case_1'])} % fewer), as the paper says. "
+        f"Cases II and III: stepwise keeps {_percent(fewer['case_2'])} and {_percent(fewer['case_3'])} % fewer, the "
+        f"paper prints {_percent(paper.THREE_AXIS_REDUCTION['case_2'])} and "
         f"{_percent(paper.THREE_AXIS_REDUCTION['case_3'])} %.",
-        "The paper's percentages cannot come from a converged Lasso with its λ: printed to two decimals "
-        "they fix how many "
-        f"terms SINDy kept at least (fourth table), {implied} for one joint, while SINDy keeps at most "
-        f"{most:.0f} in any reading "
-        "with the printed λ. The noise does reach its solution, but as many coefficients below the "
-        "threshold of 0.01.",
-        f"The closest reading of the last table is: {best['reading']} "
-        f"({best['mean_distance_percent']:.0f} points off on "
-        "average). "
-        "A penalty near zero that the solver leaves unfinished is the kind of run that keeps hundreds of "
-        "terms; what the "
-        "authors ran cannot be told from the text, so the literal reading stays the default here.",
+        "The paper's percentages cannot come from a converged Lasso with its λ: printed to two decimals they fix "
+        f"how many terms SINDy kept at least (fourth table), {implied} for one joint, while SINDy keeps at most "
+        f"{most:.0f} in any reading with the printed λ. The noise does reach its solution, but as many coefficients "
+        "below the threshold of 0.01.",
+        f"The closest reading of the last table is: {best['reading']} ({best['mean_distance_percent']:.0f} points "
+        "off on average). A penalty near zero that the solver leaves unfinished is the kind of run that keeps "
+        "hundreds of terms; what the authors ran cannot be told from the text, so the literal reading stays the "
+        "default here.",
         "armloop's own choice (angle sums, information criterion, no threshold) keeps "
         + _percent(median([one.active["armloop"] for one in cases["case_3"]]), " / ")
         + " terms in Case III.",

@@ -41,15 +41,13 @@ def run(context: Context) -> Outcome:
     third = error["case_3"]
     better = [float(x) for x in third["sindy"] / third["stepwise"]]
     text = [
-        "The models of Fig. 10 predict q(t) = π/2 + π/3 sin(πt) of joints 1 and 3 and π/6 sin(πt) − π/2 "
-        "of joint 2, "
+        "The models of Fig. 10 predict q(t) = π/2 + π/3 sin(πt) of joints 1 and 3 and π/6 sin(πt) − π/2 of joint 2, "
         "most of it outside the range. A prediction is called inaccurate here when its error exceeds "
-        f"{_INACCURATE:.0%} of the RMS "
-        "torque at some joint (median of the draws); the paper shows curves and prints no number.",
+        f"{_INACCURATE:.0%} of the RMS torque at some joint (median of the draws); the paper shows curves and prints "
+        "no number.",
         f"Case III: the error relative to the torque is {numbers(third['sindy'])} with SINDy, "
-        f"{numbers(third['stepwise'])} stepwise and {numbers(third['armloop'])} with armloop's own "
-        "choice: stepwise is "
-        f"better by {numbers(better)}.",
+        f"{numbers(third['stepwise'])} stepwise and {numbers(third['armloop'])} with armloop's own choice: stepwise "
+        f"is better by {numbers(better)}.",
         "SINDy "
         + ("fails" if ours["case_3"]["sindy_fails"] else "does not fail")
         + " in Case III in this sense"
@@ -65,8 +63,7 @@ def run(context: Context) -> Outcome:
         ours,
         "agrees" if agree == 4 else "partly" if agree >= 2 else "differs",
         f"Case III, error / RMS torque: SINDy {numbers(third['sindy'], 2)}, stepwise "
-        f"{numbers(third['stepwise'], 2)}, "
-        f"armloop {numbers(third['armloop'], 2)}",
+        f"{numbers(third['stepwise'], 2)}, armloop {numbers(third['armloop'], 2)}",
         Section(
             "Figure 11, three axes: prediction outside the range",
             text,

@@ -33,14 +33,12 @@ def run(context: Context) -> Outcome:
     ]
     last = median(errors["step3"])
     text = [
-        "The reference of Fig. 14, one period of 20 s; its k are read in units of 0.1 rad, because plain "
-        "radians would turn the "
-        "joints by more than 430°. Data are collected on the simulated arm with Stribeck friction, "
-        "encoder and torque noise, "
-        f"reconstructed with the defaults, and compared with another measured run; {len(found)} seeds of "
-        "the collection.",
-        f"The error falls with every step at {sum(falls)} of 3 joints in every collection, as the paper "
-        "shows; after Step III it is "
+        "The reference of Fig. 14, one period of 20 s; its k are read in units of 0.1 rad, because plain radians "
+        "would turn the joints by more than 430°. Data are collected on the simulated arm with Stribeck friction, "
+        "encoder and torque noise, reconstructed with the defaults, and compared with another measured run; "
+        f"{len(found)} seeds of the collection.",
+        f"The error falls with every step at {sum(falls)} of 3 joints in every collection, as the paper shows; after "
+        "Step III it is "
         + " / ".join(percent(x) for x in last)
         + " of the RMS torque. The paper prints no number.",
     ]

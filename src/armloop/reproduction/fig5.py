@@ -24,11 +24,9 @@ def run(context: Context) -> Outcome:
     off = [j for j in range(4) if abs(fewer[j] - paper.SCARA_REDUCTION[j]) > 5]
     best = min((v for v in values if "mean_distance_percent" in v), key=lambda v: v["mean_distance_percent"])
     text = [
-        f"SNR {paper.SCARA_SNR} dB in q, v, vdot, λ = {SCARA.penalty}, active above {SCARA.threshold}; "
-        f"{len(draws)} draws "
-        "of states and noise. Eq. (32) is taken literally (norm not squared) and solved until the "
-        "duality gap closes; the "
-        "noise power refers to the whole matrix of signals of a kind, as MATLAB measures it.",
+        f"SNR {paper.SCARA_SNR} dB in q, v, vdot, λ = {SCARA.penalty}, active above {SCARA.threshold}; {len(draws)} "
+        "draws of states and noise. Eq. (32) is taken literally (norm not squared) and solved until the duality gap "
+        "closes; the noise power refers to the whole matrix of signals of a kind, as MATLAB measures it.",
         f"Stepwise keeps {' / '.join(f'{x:.0f}' for x in fewer)} % fewer terms than SINDy (paper "
         f"{' / '.join(map(str, paper.SCARA_REDUCTION))} %). "
         + (
@@ -38,11 +36,9 @@ def run(context: Context) -> Outcome:
             else "Every joint lies within five points of the paper's"
         )
         + f"; of the readings below the closest is: {best['reading']}.",
-        "Stepwise is sparser because static and constant-velocity samples have no noise in the signals "
-        "that are zero "
-        "there, and each step has few columns to spread the noise over. Squared and divided by m, λ = "
-        "0.02 leaves a "
-        "handful of terms with either method: that is not what the authors can have solved.",
+        "Stepwise is sparser because static and constant-velocity samples have no noise in the signals that are "
+        "zero there, and each step has few columns to spread the noise over. Squared and divided by m, λ = 0.02 "
+        "leaves a handful of terms with either method: that is not what the authors can have solved.",
         "armloop's own choice (angle sums, information criterion, no threshold) keeps "
         + " / ".join(f"{x:.0f}" for x in median([one.active["armloop"] for one in draws]))
         + " terms.",

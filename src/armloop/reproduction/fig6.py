@@ -23,12 +23,10 @@ def run(context: Context) -> Outcome:
     ratios = [float(x) for x in error["sindy"] / error["stepwise"]]
     gain = [float(x) for x in error["stepwise"] / np.maximum(error["armloop"], 1e-300)]
     text = [
-        "The models of Fig. 5 predict q(t) = π/2 + π/12 sin(πt) of joints 1, 2, 4 and 0.2 + 0.05 sin(πt) "
-        "of joint 3, half of "
-        "it outside the range of the data.",
-        f"Stepwise is better than SINDy on {sum(better)} of 4 joints, by factors {numbers(ratios)} "
-        "(medians); the paper "
-        "shows that it is better and prints no number. armloop's own choice of terms is better again by "
+        "The models of Fig. 5 predict q(t) = π/2 + π/12 sin(πt) of joints 1, 2, 4 and 0.2 + 0.05 sin(πt) of joint "
+        "3, half of it outside the range of the data.",
+        f"Stepwise is better than SINDy on {sum(better)} of 4 joints, by factors {numbers(ratios)} (medians); the "
+        "paper shows that it is better and prints no number. armloop's own choice of terms is better again by "
         f"{numbers(gain)}.",
     ]
     return Outcome(

@@ -65,27 +65,21 @@ def run(context: Context) -> Outcome:
     same = candidates == paper.THREE_AXIS_CANDIDATES and samples == paper.THREE_AXIS_SAMPLES
     near = 0.5 < ratio / their_ratio < 2
     text = [
-        f"Candidates {'are' if same else 'are not'} the paper's: {candidates['sindy']} against {steps}, "
-        f"{fewer:.2f} % fewer "
-        f"(paper {paper.THREE_AXIS_FEWER} %). sin² + cos² = 1 makes many of them redundant: "
-        f"{independent['sindy']} of the "
-        f"{candidates['sindy']} are independent.",
-        f"A single numpy.linalg.lstsq of all joints with one BLAS thread takes {seconds['sindy']:.0f} s "
-        "at once and "
+        f"Candidates {'are' if same else 'are not'} the paper's: {candidates['sindy']} against {steps}, {fewer:.2f} "
+        f"% fewer (paper {paper.THREE_AXIS_FEWER} %). sin² + cos² = 1 makes many of them redundant: "
+        f"{independent['sindy']} of the {candidates['sindy']} are independent.",
+        f"A single numpy.linalg.lstsq of all joints with one BLAS thread takes {seconds['sindy']:.0f} s at once and "
         f"{seconds['stepwise']:.1f} s in steps: {ratio:.1f} times less (paper {their_ratio:.1f}).",
-        "As armloop solves the same, by moments in angle sums, from the samples on and to the same "
-        "accuracy, it takes "
-        f"{moments['sindy']:.1f} s at once, {times['sindy'] / moments['sindy']:.0f} times less than "
-        "lstsq; then the steps "
-        f"save only {fast_ratio:.1f} times. The stepwise method's gain in time is mostly that of a slow "
-        "solver.",
+        "As armloop solves the same, by moments in angle sums, from the samples on and to the same accuracy, it "
+        f"takes {moments['sindy']:.1f} s at once, {times['sindy'] / moments['sindy']:.0f} times less than lstsq; "
+        f"then the steps save only {fast_ratio:.1f} times. The stepwise method's gain in time is mostly that of a "
+        "slow solver.",
     ]
     return Outcome(
         theirs,
         ours,
         "agrees" if same and near else "partly" if same else "differs",
-        f"{candidates['sindy']} against {steps} candidates (paper 5880 against 2968); steps {ratio:.1f} "
-        "times faster "
+        f"{candidates['sindy']} against {steps} candidates (paper 5880 against 2968); steps {ratio:.1f} times faster "
         f"(paper {their_ratio:.1f})",
         Section(
             "Figure 9, three axes: candidates and time",

@@ -15,7 +15,7 @@ class Outcome:
     Attributes:
         paper, ours: JSON-ready figures under the same keys; None where the paper prints no number.
         details: JSON-ready figures that the paper has no counterpart of: spread, readings, errors.
-        verdict: ``agrees``, ``partly`` or ``differs``.
+        verdict: ``agrees``, ``partly`` or ``differs``; ``beyond`` where the paper has nothing to compare with.
         headline: ours against the paper's in one short line.
         section: of the report; its text says what agrees, what does not and why.
 

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 #: The penalised error, and by what λ is multiplied to give the weight of ‖Ξ‖₁ beside ½‖τ − YΞ‖².
 OBJECTIVES = ("‖r‖²/2m", "‖r‖²/m", "½‖r‖²", "‖r‖²", "‖r‖")
-NOISES = ("joint", "matrix", "unit")
+NOISES = ("joint", "matrix", "unit", "record")
 SAMPLINGS = ("states", "trajectories")
-_NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power"}
+_NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power", "record": "noise at rest too"}
 
 
 @dataclass(frozen=True)
@@ -83,24 +83,28 @@ def collected(
     if snr is None:
         return exact
     rng = np.random.default_rng([seed, 1])
+    signals = {name: (log.q, log.v, np.asarray(log.vdot)) for name, log in exact.items()}
+    whole = [np.concatenate([own[k] for own in signals.values()]) for k in range(3)]
     noisy = {}
     for name in CONDITIONS:
         log = exact[name]
         q, v, vdot = (
-            x + rng.standard_normal(x.shape) * _deviation(x, level, reading.noise)
-            for x, level in zip((log.q, log.v, np.asarray(log.vdot)), snr, strict=True)
+            x + rng.standard_normal(x.shape) * _deviation(x, level, reading.noise, everything)
+            for x, level, everything in zip(signals[name], snr, whole, strict=True)
         )
         noisy[name] = MotionLog(log.time, q, v, log.tau, vdot, name=name)
     return noisy
 
 
-def _deviation(x: Array, snr: float, noise: str) -> Array:
-    """(n,) standard deviation; a signal that is absent altogether gets none."""
+def _deviation(x: Array, snr: float, noise: str, whole: Array) -> Array:
+    """(n,) standard deviation of the noise of one condition's signals x, part of those of all conditions."""
     power = np.mean(x**2, axis=0)
     if noise == "matrix":
         power = np.full_like(power, power.mean())
     elif noise == "unit":
         power = np.full_like(power, float(power.any()))
+    elif noise == "record":
+        power = np.full_like(power, np.mean(whole**2))
     return np.asarray(np.sqrt(power * 10.0 ** (-snr / 10.0)))
 
 
@@ -127,6 +131,7 @@ READINGS = (
     Reading(scaled=True),
     Reading(noise="joint"),
     Reading(noise="unit"),
+    Reading(noise="record"),
     Reading(sampling="trajectories"),
     Reading("½‖r‖²", factor=1e-4, early=True),
 )

@@ -1,4 +1,4 @@
-"""The items by name; each is a module with a function ``run(context) -> Outcome``."""
+"""The items by name; each is a module with a function ``run(context) -> Outcome``, ``beyond_NAME`` if not the paper's."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armloop.reproduction.outcome import Outcome
 #: The paper's tables and figures with numbers in them, in the paper's order.
 PAPER = ("fig1", "table2", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "fig14", "fig15")
 #: Studies beyond the paper: not part of a run that names no items.
-BEYOND: tuple[str, ...] = ()
+BEYOND = ("estimators", "conditions", "coverage", "friction")
 ITEMS = (*PAPER, *BEYOND)
 
 
@@ -30,5 +30,6 @@ def chosen(names: Sequence[str]) -> list[str]:
 
 def run_item(name: str, context: Context) -> Outcome:
     """Run one item."""
-    outcome: Outcome = import_module(f"armloop.reproduction.{name}").run(context)
+    module = f"beyond_{name}" if name in BEYOND else name
+    outcome: Outcome = import_module(f"armloop.reproduction.{module}").run(context)
     return outcome

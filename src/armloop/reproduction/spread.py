@@ -1,14 +1,13 @@
-"""Median and range over draws: noise results are never one lucky draw."""
+"""Median and range over draws: noise results are never one lucky draw. What is not finite is left out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armloop.reports.words import number
+from armloop.reports.words import MISSING, number
 
 
 def median(draws: ArrayLike) -> list[float]:
@@ -17,19 +16,24 @@ def median(draws: ArrayLike) -> list[float]:
 
 
 def spread(draws: ArrayLike) -> dict[str, Any]:
-    """Median, least and largest of draws (d, n), JSON-ready."""
-    values = np.asarray(draws, dtype=float)
+    """Median, least and largest of draws (d, n), JSON-ready; None where no draw is finite."""
+    columns = [column[np.isfinite(column)] for column in np.asarray(draws, dtype=float).T]
     return {
-        "median": median(values),
-        "least": values.min(axis=0).tolist(),
-        "largest": values.max(axis=0).tolist(),
-        "draws": len(values),
+        **{
+            name: [float(of(column)) if len(column) else None for column in columns]
+            for name, of in (("median", np.median), ("least", np.min), ("largest", np.max))
+        },
+        "draws": len(np.asarray(draws)),
     }
 
 
-def in_words(draws: Sequence[float] | np.ndarray, digits: int = 3) -> str:
+def in_words(draws: ArrayLike, digits: int = 3) -> str:
     """Median and range of one quantity as ``16 (14–19)``."""
-    low, middle, high = np.quantile(np.asarray(draws, dtype=float), [0.0, 0.5, 1.0])
-    whole = all(float(x).is_integer() for x in (low, middle, high))
-    show = (lambda x: f"{x:.0f}") if whole else (lambda x: number(x, digits))
-    return f"{show(middle)} ({show(low)}–{show(high)})"
+    values = np.asarray(draws, dtype=float)
+    values = values[np.isfinite(values)]
+    if len(values) == 0:
+        return MISSING
+    three = [float(x) for x in np.quantile(values, [0.5, 0.0, 1.0])]
+    whole = all(x.is_integer() for x in three)
+    middle, low, high = (f"{x:.0f}" if whole else number(x, digits) for x in three)
+    return f"{middle} ({low}–{high})"

@@ -56,23 +56,18 @@ def run(context: Context) -> Outcome:
     headers = ["", "(N1, N2)", "samples", "candidates", "paper", "lstsq [s]", "paper [s]", "moments [s]"]
     same = candidates == paper.SCARA_CANDIDATES and samples == paper.SCARA_SAMPLES
     text = [
-        f"Candidates and samples {'are' if same else 'are not'} the paper's: {candidates['sindy']} against "
-        f"{steps} for the three steps, {fewer:.2f} % fewer (paper {paper.SCARA_FEWER} %). The optimal "
-        "orders are those at "
-        "which the error of noise-free data falls to round-off.",
-        f"numpy.linalg.lstsq on the whole library, all joints at once, one BLAS thread: the steps together are "
-        f"{ratio:.1f} times faster (paper {their_ratio:.1f}). Seconds depend on the machine, the ratio "
-        "hardly does. "
-        f"As armloop solves it, by moments in angle sums and from the samples on, it is "
-        f"{fast_ratio:.1f}.",
+        f"Candidates and samples {'are' if same else 'are not'} the paper's: {candidates['sindy']} against {steps} "
+        f"for the three steps, {fewer:.2f} % fewer (paper {paper.SCARA_FEWER} %). The orders are the paper's.",
+        "numpy.linalg.lstsq on the whole library, all joints at once, one BLAS thread: the steps together are "
+        f"{ratio:.1f} times faster (paper {their_ratio:.1f}). Seconds depend on the machine, the ratio less so. "
+        f"As armloop solves it, by moments in angle sums and from the samples on, it is {fast_ratio:.1f}.",
     ]
     near = 0.5 < ratio / their_ratio < 2.0
     return Outcome(
         theirs,
         ours,
         "agrees" if same and near else "partly" if same else "differs",
-        f"{candidates['sindy']} against {steps} candidates (paper 360 against 168); steps {ratio:.1f} "
-        "times faster "
+        f"{candidates['sindy']} against {steps} candidates (paper 360 against 168); steps {ratio:.1f} times faster "
         f"(paper {their_ratio:.1f})",
         Section("Table 2, SCARA: candidates and time", text, tables=[make_table(headers, rows)]),
         {"seconds_by_moments": moments, "time_ratio_by_moments": fast_ratio},

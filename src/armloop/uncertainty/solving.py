@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,19 @@ from armloop.library.friction import FrictionLaw
 from armloop.library.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
-from armloop.uncertainty.standard_errors import Errors, Fitted, covariances, gauss_newton_steps, misfit
+from armloop.uncertainty.standard_errors import (
+    Assembled,
+    Errors,
+    Fitted,
+    covariances,
+    gauss_newton_steps,
+)
 from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown
 
 Array = NDArray[np.float64]
+
+#: Part of the misfit that another iteration must remove to be worth one more.
+_WORTHWHILE = 1e-3
 
 
 def solve_given_terms(
@@ -34,9 +43,12 @@ def solve_given_terms(
 
 
 def solve(
-    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 4
+    model: ReconstructedModel, assembled: Callable[[ReconstructedModel], Assembled], iterations: int = 4
 ) -> tuple[ReconstructedModel, bool]:
     """The best of several Gauss-Newton iterates, and whether it fits better than the model given.
+
+    Args:
+        assembled: the estimating equations at a model, summed over all samples.
 
     Better is a smaller sum over joints of squared residual relative to the squared torque, every sample by the
     last regression that used it.
@@ -44,13 +56,16 @@ def solve(
     Raises:
         numpy.linalg.LinAlgError: the terms cannot be told apart.
     """
-    best, error = model, misfit(model, samples, fitted)
-    start = error
+    best, equations = model, assembled(model)
+    error = start = equations.misfit()
     for _ in range(iterations):
-        model = moved(model, gauss_newton_steps(model, samples, fitted))
-        new = misfit(model, samples, fitted)
+        model = moved(model, equations.steps())
+        equations = assembled(model)
+        new, gained = equations.misfit(), error - equations.misfit()
         if new < error:
             best, error = model, new
+        if gained < _WORTHWHILE * start:
+            break
     return best, error < start
 
 

@@ -132,12 +132,68 @@ def gauss_newton_steps(
     ]
 
 
-def misfit(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> float:
-    """Sum over the joints of mean squared residual relative to mean squared torque, on the fitted samples."""
-    residual, _ = _residuals(problems(model), samples, fitted)
-    rows = np.logical_or.reduce([one.rows for one in fitted])
-    power = (samples.tau**2 * rows).sum(axis=0)
-    return float(((residual**2).sum(axis=0) / np.maximum(power, 1e-300)).sum())
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """Estimating equations of a stepwise model's problems on some samples, and how it fits; they add over samples.
+
+    Attributes:
+        unknowns: of every problem.
+        jacobian, score: per problem, (p, p) and (p,).
+        squares, power: (n,) sums of squared residual and squared torque per joint, every sample by the last
+            regression that used it.
+    """
+
+    unknowns: list[list[Unknown]]
+    jacobian: list[Array]
+    score: list[Array]
+    squares: Array
+    power: Array
+
+    @staticmethod
+    def of(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> Assembled:
+        """Equations of some samples; for models whose joints have coefficients of their own."""
+        todo = [problem for problem in problems(model) if problem.unknowns]
+        whole = np.zeros(samples.motion.samples, dtype=np.intp)
+        spread = np.ones((len(fitted), model.arm.n))
+        squares = np.zeros(model.arm.n)
+        sums = [_equations(problem, samples, fitted, whole, spread, squares) for problem in todo]
+        rows = np.logical_or.reduce([one.rows for one in fitted])
+        return Assembled(
+            [problem.unknowns for problem in todo],
+            [_summed(e.jacobian, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
+            [_summed(e.score, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
+            squares,
+            (samples.tau**2 * rows).sum(axis=0),
+        )
+
+    def __add__(self, other: Assembled) -> Assembled:
+        pairs = [
+            [a + b for a, b in zip(mine, theirs, strict=True)]
+            for mine, theirs in ((self.jacobian, other.jacobian), (self.score, other.score))
+        ]
+        return Assembled(
+            self.unknowns, pairs[0], pairs[1], self.squares + other.squares, self.power + other.power
+        )
+
+    def steps(self) -> list[tuple[list[Unknown], Array]]:
+        """Every problem's unknowns with the step (p,) that solves the linearised equations."""
+        found = []
+        for unknowns, jacobian, score in zip(self.unknowns, self.jacobian, self.score, strict=True):
+            p = len(unknowns)
+            whole = Equations(
+                jacobian[None], score[None], np.ones((1, p)), np.zeros(p, dtype=np.intp), np.ones(p)
+            )
+            found.append((unknowns, whole.step()))
+        return found
+
+    def misfit(self) -> float:
+        """Sum over the joints of mean squared residual relative to mean squared torque."""
+        return float((self.squares / np.maximum(self.power, 1e-300)).sum())
+
+
+def _summed(blocks: Array, p: int) -> Array:
+    # Where no sample was fitted there is no block; its sum has the right shape all the same.
+    return blocks.sum(axis=0) if len(blocks) else np.zeros((p,) * (blocks.ndim - 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,11 +266,15 @@ def _equations(
     fitted: Sequence[Fitted],
     blocks: NDArray[np.intp],
     spread: Array,
+    squares: Array | None = None,
 ) -> Equations:
+    """The estimating equations by blocks; ``squares`` (n,) is given the squared residuals of each joint."""
     p, B = len(problem.unknowns), int(blocks[-1]) + 1
     stages = _stages(problem, fitted)
     jacobian, score, count = np.zeros((B, p, p)), np.zeros((B, p)), np.zeros((B, p))
     for portion in _walk(problem, samples, fitted):
+        if squares is not None:
+            squares[portion.joint] += portion.r @ portion.r
         weight = 1 / max(spread[portion.stage, portion.joint], 1e-300) if problem.weighted else 1.0
         own = stages[portion.where] == portion.stage
         seen = stages[portion.where] <= portion.stage

@@ -31,9 +31,16 @@ def active_figure(counts: Mapping[str, Array], what: str, titles: Sequence[str] 
             span = np.abs(np.array([draws.min(axis=0), draws.max(axis=0)]) - middle)
             axes.bar(x, middle, 0.24, color=_COLORS[m % len(_COLORS)], label=name)
             axes.errorbar(x, middle, span, fmt="none", ecolor=INK, elinewidth=1.2, capsize=2)
-            for at, value in zip(x, middle, strict=True):
-                axes.annotate(f"{value:.0f}", (at, value), textcoords="offset points", xytext=(0, 4), ha="center",
-                              color=INK, fontsize=8)  # fmt: skip
+            for at, value, top in zip(x, middle, draws.max(axis=0), strict=True):
+                axes.annotate(
+                    f"{value:.0f}",
+                    (at, top),
+                    textcoords="offset points",
+                    xytext=(0, 3),
+                    ha="center",
+                    color=INK,
+                    fontsize=8,
+                )
         axes.set_yscale("log")
         axes.set_xticks(range(draws.shape[1]), [f"joint {j + 1}" for j in range(draws.shape[1])])
         polish(axes, "", what if k == 0 else "", title, grid="y")

@@ -1,0 +1,49 @@
+"""The model that a perfect reconstruction would find: what a simulated arm is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.components import RigidBody
+from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.friction import JointFriction
+from armloop.effects import Estimate, effect
+from armloop.kinematics import nominal_parameters
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect, ReconstructedModel
+
+
+def exact_model(
+    arm: Arm, friction: Sequence[JointFriction], effects: Sequence[UndeclaredEffect] = ()
+) -> ReconstructedModel:
+    """Return inverse dynamics with the links' own inertias, Eq. (34) and the plant's undeclared effects.
+
+    No reconstruction can do better: a reference for what is left to gain, not a controller one could have. Of a
+    payload only the mass and its place are known, not the ball's own inertia (2/5 m r^2).
+    """
+    laws = tuple(
+        tuple(
+            term
+            for term in (
+                FrictionTerm("sign", float(f.static)),
+                FrictionTerm("stribeck", float(f.coulomb - f.static), float(f.stribeck_velocity)),
+                FrictionTerm("viscous", float(f.viscous)),
+            )
+            if term.coefficient
+        )
+        for f in friction
+    )
+    added = tuple(
+        AddedEffect(
+            effect(e.name, e.joint),
+            {key: Estimate(np.asarray(value).tolist(), 0.0, "") for key, value in e.parameters.items()},
+        )
+        for e in effects
+    )
+    body = RigidBody(nominal_parameters(arm), (), np.zeros(0))
+    return ReconstructedModel(
+        arm, (body,), FrictionLaw(laws), effects=added, history={"method": "the simulated arm itself"}
+    )
