@@ -82,7 +82,7 @@ class ReconstructedModel:
         conditioning: how the training logs were filtered; later logs are treated alike.
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
         baseline: what the model leaves on data of its own training runs that were not fitted:
-            ``rmse``, ``rms`` per joint, ``nrmse``.
+            ``rmse``, ``rms``, ``nrmse`` per joint, and ``worst``, the RMSE that one block in ten exceeds.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
@@ -339,7 +339,7 @@ def _recorded(data: dict[str, Any], n: int) -> dict[str, Any]:
 
 
 def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
-    for key in {"rmse", "rms", "nrmse"} & set(data):
+    for key in {"rmse", "rms", "nrmse", "worst"} & set(data):
         if len(data[key]) != n or not all(x is None or 0 <= float(x) < np.inf for x in data[key]):
             raise ModelError(
                 f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 #: An effect must lower the held-out error by this many standard errors (over blocks) …
 SIGNIFICANCE = 3.0
-#: … and, on some joint, by this part of the energy the model leaves on its own baseline: from run to run the
-#: shortcomings of a model vary about as much, and a law that fits them is easily found.
+#: … and, on some joint, by this part of the energy the model leaves on the worst tenth of its own baseline: a run may
+#: be all of such motion, and a law that fits a model's shortcomings is easily found.
 BASELINE_SHARE = 1.0
 #: A further effect must remove at least this part of what could be explained at first: what a large effect leaves
 #: because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for small ones.
@@ -82,7 +82,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
             if any(f.effect.place == effect.place for f in found):
                 continue
             trial = _trial(evidence, residual, current, effect)
-            if trial is None or not _worth(current, trial, rows_per_joint):
+            if trial is None or not _worth(evidence, current, trial, rows_per_joint):
                 continue
             if _gain(current, trial) >= LEAST_SHARE * explainable:
                 trials.append(trial)
@@ -192,14 +192,14 @@ def _gain(current: Fit, trial: Fit) -> float:
     return float((current.held_out**2).sum() - (trial.held_out**2).sum())
 
 
-def _worth(current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
+def _worth(evidence: Evidence, current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     gains = current.block_errors() - trial.block_errors()
     spread = float(np.sqrt(len(gains)) * gains.std(ddof=1))
     if gains.sum() <= SIGNIFICANCE * spread:
         return False
     by_joint = _by_joint(current, trial, len(rows_per_joint))
-    return bool((by_joint > BASELINE_SHARE * rows_per_joint).any())
+    return bool((by_joint > BASELINE_SHARE * evidence.variation * rows_per_joint).any())
 
 
 def _simplest_of_equals(current: Fit, trials: list[Fit], rows_per_joint: NDArray[np.intp]) -> Fit:
