@@ -207,7 +207,10 @@ def test_missing_names_are_told():
         load_plant("puma")
 
 
-@pytest.mark.parametrize("name", ["three_axis_tracking", "scara_pick_and_place", "ur10e_tracking"])
+@pytest.mark.parametrize(
+    "name",
+    ["three_axis_tracking", "scara_pick_and_place", "ur10e_tracking", "payload_pickup", "friction_wear"],
+)
 def test_the_scenarios_script_is_the_command(monkeypatch, name):
     calls = []
     monkeypatch.setattr("armloop.cli.main", lambda arguments: calls.append(arguments) or 0)

@@ -44,10 +44,10 @@ def run(options: argparse.Namespace) -> None:
     from armloop.commands.shared import out_folder, print_json, progress
     from armloop.drake_systems.scenarios import load_tracking
     from armloop.errors import InputError
-    from armloop.loop import run_scenario
+    from armloop.loop import run_pickup_scenario, run_scenario, run_wear_scenario
     from armloop.model import ReconstructedModel, load_model
     from armloop.reports.tables import eta_table
-    from armloop.reports.tracking_tables import metrics_table
+    from armloop.reports.tracking_tables import metrics_table, phases_table, spread_table
 
     folder = out_folder(options.out) if options.out else None
     scenario = load_tracking(options.scenario, options.arm)
@@ -61,11 +61,25 @@ def run(options: argparse.Namespace) -> None:
         if name in models:
             raise InputError(f"--model {item!r}: {name!r} is given twice")
         models[name] = load_model(path, scenario.plant.arm)
-    answer, results = run_scenario(scenario, models, folder, progress(options))
+    if scenario.pickup is not None:
+        answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options))
+        tables = [phases_table(pickup.phases)]
+        files = "tracking.json, tracking.png, diagnosis.json, augmented.json, since_the_grasp.csv"
+    elif scenario.wear is not None:
+        answer, wear = run_wear_scenario(scenario, models, folder, progress(options))
+        tables = [spread_table(wear)]
+        files = "tracking.json, spread.png"
+    else:
+        answer, results = run_scenario(scenario, models, folder, progress(options))
+        paper = scenario.name.startswith("three_axis_tracking")
+        tables = [eta_table(results, paper=paper), metrics_table(results)]
+        files = "tracking.json, tracking.png, replay.html"
     if options.json:
         print_json(answer)
         return
-    print(eta_table(results, paper=scenario.name == "three_axis_tracking"))
-    print(f"\n{metrics_table(results)}")
+    print("\n\n".join(map(str, tables)))
+    if scenario.pickup is not None:
+        found = [f"{effect['words']}" for effect in answer["diagnosis"]["effects"] if "words" in effect]
+        print(f"\nverdict from the log since the grasp: {answer['diagnosis']['verdict']}; {'; '.join(found)}")
     if folder is not None:
-        print(f"\nwritten: {folder}/tracking.json, tracking.png, replay.html")
+        print(f"\nwritten: {folder}/{files}")

@@ -63,8 +63,11 @@ def units(a: Array) -> Array:
             break
     else:
         return own
+    still = np.ones(len(a), dtype=bool)
     for _ in range(_ROUNDS):
-        quiet = np.abs(a[(total <= limit(total, a.shape[1])) & (total > _NOTHING * total.max())])
+        # What has once been motion does not become quiet because another joint is quieter still.
+        still &= total <= limit(total, a.shape[1])
+        quiet = np.abs(a[still & (total > _NOTHING * total.max())])
         if len(quiet) == 0:
             break
         noise = np.quantile(quiet, 0.75, axis=0) / norm.ppf(0.875)

@@ -84,6 +84,26 @@ class ReferenceData:
 
 
 @dataclass
+class PickupData:
+    """A load that is grasped mid-run; the run is by PID with Step III."""
+
+    at: float = 20.0  # s
+    diagnose_at: float = 40.0  # s, when the log since the grasp is diagnosed and the feedforward swapped
+    mass: float = 0.5  # kg
+    com: list[float] = field(
+        default_factory=lambda: [0.0, 0.0, 0.0]
+    )  # m, in the frame of the link `tool`, else the last
+
+
+@dataclass
+class WearData:
+    """Friction that is drawn many times over; the model stays."""
+
+    samples: int = 24
+    spread: float = 0.3  # standard deviation of the logarithm of each friction parameter
+
+
+@dataclass
 class TrackingData:
     """A tracking experiment."""
 
@@ -97,3 +117,5 @@ class TrackingData:
     controllers: list[str] = field(default_factory=lambda: list(PAPER))
     bandwidth: float = 20.0  # rad/s, of computed torque: errors decay critically damped
     random_seed: int = 0
+    pickup: Optional[PickupData] = None
+    wear: Optional[WearData] = None

@@ -15,9 +15,18 @@ import numpy as np
 
 from armloop.arm import Arm, load_arm
 from armloop.drake_systems.collection import CollectionPlan, PlantConfig
+from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
-from armloop.drake_systems.scenario_data import CONTROLLERS, PAPER, PlanData, PlantData, TrackingData
+from armloop.drake_systems.scenario_data import (
+    CONTROLLERS,
+    PAPER,
+    PickupData,
+    PlanData,
+    PlantData,
+    TrackingData,
+    WearData,
+)
 from armloop.drake_systems.scenario_files import entry, per_joint, read, scenario_entry
 from armloop.drake_systems.scenario_references import reference_of
 from armloop.drake_systems.speed_mode import Instruments
@@ -25,6 +34,7 @@ from armloop.errors import ArmError, ScenarioError
 from armloop.excitation import MotionRanges, Reference
 from armloop.resources import scenario_path
 
+_LEAST_LOG = 14.0  # s, what a diagnosis needs and a little more
 _FINEST, _COARSEST = 1e-4, 5e-3  # s of a time step
 
 
@@ -35,6 +45,23 @@ class Plant:
     name: str
     arm: Arm
     config: PlantConfig
+
+
+@dataclass(frozen=True, eq=False)
+class Pickup:
+    """A payload from `at` s on; the log is diagnosed and the model swapped at `diagnose_at` s."""
+
+    at: float
+    diagnose_at: float
+    payload: UndeclaredEffect
+
+
+@dataclass(frozen=True)
+class Wear:
+    """How often friction is drawn, and the standard deviation of its parameters' logarithms."""
+
+    samples: int
+    spread: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +80,8 @@ class TrackingScenario:
     controllers: tuple[str, ...] = PAPER
     seed: int = 0
     bandwidth: float = 20.0
+    pickup: Pickup | None = None
+    wear: Wear | None = None
 
 
 def plant_names() -> list[str]:
@@ -141,7 +170,33 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         tuple(dict.fromkeys(data.controllers)),
         data.random_seed,
         data.bandwidth,
+        _pickup(data.pickup, plant.arm, reference, where),
+        _wear(data.wear, where),
     )
+
+
+def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:
+    if data is None:
+        return None
+    if not 0 < data.at <= data.diagnose_at - _LEAST_LOG or not data.diagnose_at < reference.duration:
+        raise ScenarioError(
+            f"{where}: pickup: at {data.at} and diagnose_at {data.diagnose_at} must lie within 0 and "
+            f"{reference.duration:g} s, {_LEAST_LOG:g} s or more between them"
+        )
+    if not data.mass > 0 or len(data.com) != 3:
+        raise ScenarioError(f"{where}: pickup: mass must be above 0 kg, and com three numbers")
+    payload = UndeclaredEffect("payload", None, {"mass": data.mass, "com": list(data.com)})
+    return Pickup(data.at, data.diagnose_at, payload)
+
+
+def _wear(data: WearData | None, where: str) -> Wear | None:
+    if data is None:
+        return None
+    if not 2 <= data.samples <= 10_000:
+        raise ScenarioError(f"{where}: wear.samples is {data.samples}; it must be 2 to 10000")
+    if not 0 < data.spread <= 1:
+        raise ScenarioError(f"{where}: wear.spread is {data.spread}; it must be above 0 and at most 1")
+    return Wear(data.samples, data.spread)
 
 
 def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | Path | None) -> Plant:

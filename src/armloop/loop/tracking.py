@@ -13,7 +13,7 @@ from armloop.drake_systems.collection import collect
 from armloop.drake_systems.loop_analysis import loop_margins
 from armloop.drake_systems.metrics import BAND
 from armloop.drake_systems.scenarios import TrackingScenario, load_plan
-from armloop.drake_systems.tracking import TrackingResult, needs_model, run_tracking
+from armloop.drake_systems.tracking import MAIN_MODEL, TrackingResult, needs_model, run_tracking
 from armloop.files import replacing, write_text
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -37,13 +37,7 @@ def run_scenario(
     Returns:
         The content of ``tracking.json`` and the results by controller.
     """
-    chosen = dict(models)
-    made = not models and any(map(needs_model, scenario.controllers))
-    if made:
-        progress("no --model given: collecting data on the scenario's arm and reconstructing one")
-        plant = scenario.plant
-        logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed, processes=2)
-        chosen["model"] = reconstruct(list(logs.values()), plant.arm, progress=progress).model
+    chosen = models_for(scenario, models, progress)
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen)
     answer = tracking_answer(scenario, results)
@@ -56,9 +50,29 @@ def run_scenario(
         with replacing(folder / "tracking.png") as draft:
             tracking_figure(results).savefig(draft, format="png", dpi=110)
         write_replay(folder / "replay.html", scenario.plant.arm, results)
-        if made:
-            chosen["model"].save(folder / "model.json")
+        save_made(folder, chosen, models)
     return answer, results
+
+
+def models_for(
+    scenario: TrackingScenario, models: Mapping[str, ReconstructedModel], progress: Progress
+) -> dict[str, ReconstructedModel]:
+    """The models that were given; without any, one reconstructed from data collected on the scenario's own arm, if a
+    controller of the scenario needs one."""
+    if models or not any(map(needs_model, scenario.controllers)):
+        return dict(models)
+    progress("no --model given: collecting data on the scenario's arm and reconstructing one")
+    plant = scenario.plant
+    logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed, processes=2)
+    return {MAIN_MODEL: reconstruct(list(logs.values()), plant.arm, progress=progress).model}
+
+
+def save_made(
+    folder: Path, chosen: Mapping[str, ReconstructedModel], given: Mapping[str, ReconstructedModel]
+) -> None:
+    """Write model.json where `models_for` reconstructed one."""
+    if chosen and not given:
+        chosen[MAIN_MODEL].save(folder / "model.json")
 
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
@@ -76,7 +90,7 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
         "scored_s": list(scenario.score),
         "unit": list(first.unit),
         "settling_band": BAND,
-        "controllers": {name: _result_answer(result) for name, result in results.items()},
+        "controllers": {name: result_answer(result) for name, result in results.items()},
         "loop": [
             {
                 "phase_margin_deg": m.phase_margin,
@@ -88,7 +102,7 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
     }
 
 
-def _result_answer(result: TrackingResult) -> dict[str, Any]:
+def result_answer(result: TrackingResult) -> dict[str, Any]:
     """η, RMS and largest error in the scenario's ``unit``, effort in N*m (N), times in s; null where there is none."""
     answer = {"eta_deg": result.eta.tolist(), "rms": result.rms.tolist(), "max": result.largest.tolist()}
     if result.metrics is not None:

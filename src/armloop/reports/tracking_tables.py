@@ -5,11 +5,42 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import controller
 
 if TYPE_CHECKING:
     from armloop.drake_systems.tracking import TrackingResult
+    from armloop.drake_systems.wear import WearResult
+
+#: The phases of a pickup in words.
+PHASES = {
+    "unloaded": "before the grasp",
+    "loaded": "with the load, model as before",
+    "augmented": "with the load, augmented model",
+}
+
+
+def phases_table(
+    phases: Mapping[str, TrackingResult], title: str | None = "Tracking error η in one run"
+) -> Table:
+    """η per phase of a pickup and joint."""
+    units = next(iter(phases.values())).unit
+    rows = [[PHASES[name], *phase.eta] for name, phase in phases.items()]
+    return make_table(["phase", *(f"η{j + 1} [{unit}]" for j, unit in enumerate(units))], rows, title)
+
+
+def spread_table(result: WearResult, title: str | None = "Tracking error η over all draws") -> Table:
+    """Mean, standard deviation, 5 % and 95 % quantile of η per controller and joint."""
+    rows: list[list[object]] = []
+    for name, eta in result.eta.items():
+        low, high = np.quantile(eta, [0.05, 0.95], axis=0)
+        for j, unit in enumerate(result.unit):
+            rows.append(
+                [controller(name), j + 1, unit, eta[:, j].mean(), eta[:, j].std(ddof=1), low[j], high[j]]
+            )
+    return make_table(["controller", "joint", "unit", "mean η", "std", "5 %", "95 %"], rows, title)
 
 
 def metrics_table(

@@ -1,0 +1,134 @@
+"""A load is grasped while the arm follows its reference; what is learned from the log is used from then on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.pid import PidController
+from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.drake_systems.tracking import MAIN_MODEL, TrackingResult, add_controlled_arm, score
+from armloop.log import MotionLog
+
+Array = NDArray[np.float64]
+
+CONTROLLER = "pid_step3"
+PHASES = ("unloaded", "loaded", "augmented")
+"""Before the grasp; with the load and the model as it was; with the load and the model that knows of it."""
+_SETTLE = 0.5  # s after the grasp that are not logged
+_SAMPLE = 2  # steps per sample of the log
+
+
+@dataclass(frozen=True, eq=False)
+class PickupResult:
+    """One run in three phases.
+
+    phases : per name in `PHASES`, the whole run scored over that phase
+    log : what the diagnosis was given
+    """
+
+    phases: dict[str, TrackingResult]
+    log: MotionLog
+
+
+def run_pickup(
+    scenario: TrackingScenario,
+    model: FeedforwardModel,
+    learn: Callable[[MotionLog], FeedforwardModel],
+) -> PickupResult:
+    """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
+
+    From `pickup.at` on the last link carries the load; positions, velocities and the integrator go on as they are.
+    At `pickup.diagnose_at` the simulation halts, `learn` is given the log since the grasp (encoders, the drives'
+    torques with the sensor's noise, 1 / (2 time steps) Hz), and what it returns is the feedforward from then on. The
+    integrator is then put back to what it held at the grasp: what it has learned since is in the model now.
+    """
+    pickup = scenario.pickup
+    if pickup is None:
+        raise ValueError(f"{scenario.name} has no pickup")
+    free = _Run(scenario, model, ())
+    free.systems.start_on_reference(free.context)
+    free.advance(pickup.at)
+    loaded = _Run(scenario, model, (pickup.payload,))
+    loaded.context.SetTime(free.context.get_time())
+    loaded.context.SetDiscreteState(free.context.get_discrete_state())
+    loaded.advance(pickup.diagnose_at)
+    log = _log(scenario, *loaded.recorded())
+    loaded.systems.set_model(learn(log))
+    loaded.set_integral(free.integral())
+    loaded.advance(scenario.reference.duration)
+    first, second = free.recorded(), loaded.recorded()
+    # both recorded the moment of the grasp
+    time, state, tau = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
+    ends = (0.0, pickup.at, pickup.diagnose_at, scenario.reference.duration)
+    phases = {}
+    for k, name in enumerate(PHASES):
+        part = replace(scenario, score=(ends[k], ends[k + 1]))
+        phases[name] = score(part, CONTROLLER, time, free.systems.reference.tables, state, tau)
+    return PickupResult(phases, log)
+
+
+class _Run:
+    """The controlled arm with loggers, and a simulator."""
+
+    def __init__(
+        self, scenario: TrackingScenario, model: FeedforwardModel, effects: tuple[UndeclaredEffect, ...]
+    ) -> None:
+        builder, period = DiagramBuilder(), scenario.plant.config.time_step
+        self.systems = add_controlled_arm(builder, scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
+        self._logs = [
+            LogVectorOutput(self.systems.plant.GetOutputPort(name), builder, period)
+            for name in ("state", "tau_drive")
+        ]
+        self._simulator = Simulator(builder.Build())
+        self._started = False
+        self.context = self._simulator.get_mutable_context()
+
+    def advance(self, until: float) -> None:
+        if not self._started:
+            self._simulator.Initialize()
+            self._started = True
+        self._simulator.AdvanceTo(until)
+
+    def integral(self) -> Array:
+        """Return what PID's integrator holds, (n,)."""
+        return np.asarray(self._integrator().get_discrete_state_vector().CopyToVector())
+
+    def set_integral(self, value: Array) -> None:
+        self._integrator().SetDiscreteState(value)
+
+    def _integrator(self) -> Context:
+        controller = self.systems.controller
+        assert isinstance(controller, PidController)
+        return controller.GetSubsystemByName("integral").GetMyMutableContextFromRoot(self.context)
+
+    def recorded(self) -> tuple[Array, Array, Array]:
+        """Return time (N,), state (N, 2n) and the drives' torques (N, n)."""
+        state, tau = (log.FindLog(self.context) for log in self._logs)
+        return state.sample_times().copy(), state.data().T.copy(), tau.data().T.copy()
+
+
+def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> MotionLog:
+    """Return what the arm's own instruments say, as `SpeedModeArm.follow` records it."""
+    arm, config = scenario.plant.arm, scenario.plant.config
+    instruments, n = config.instruments, arm.n
+    half = max(1, round(instruments.velocity_half_window / config.time_step))
+    first = max(half, round(_SETTLE / config.time_step))
+    rows = np.arange(first, len(time) - half, _SAMPLE)
+    q = instruments.encode(arm, state[:, :n])
+    v = (q[rows + half] - q[rows - half]) / (2 * half * config.time_step)
+    # a torque is held over the step that follows: the mean of both steps is centred on the sample
+    measured = 0.5 * (tau[rows - 1] + tau[rows])
+    noise = np.random.default_rng(scenario.seed).standard_normal(measured.shape)
+    rms = np.sqrt((measured**2).mean(axis=0))
+    return MotionLog(
+        time[rows], q[rows], v, measured + instruments.torque_noise * rms * noise, name="since the grasp"
+    )

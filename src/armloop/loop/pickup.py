@@ -1,0 +1,78 @@
+"""A load grasped mid-run: the residual of the log is diagnosed, and the feedforward swapped, in the same run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from armloop.diagnosis import Diagnosis, diagnose
+from armloop.drake_systems.pickup import PickupResult, run_pickup
+from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.drake_systems.tracking import MAIN_MODEL
+from armloop.errors import InputError
+from armloop.files import replacing, write_text
+from armloop.log import MotionLog, write_log
+from armloop.loop.tracking import models_for, result_answer, save_made, tracking_answer
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress
+
+
+def run_pickup_scenario(
+    scenario: TrackingScenario,
+    models: Mapping[str, ReconstructedModel],
+    folder: Path | None,
+    progress: Progress,
+) -> tuple[dict[str, Any], PickupResult]:
+    """Run a scenario with a pickup, and write tracking.json, diagnosis.json, the log, the augmented model and a plot.
+
+    Returns:
+        The content of ``tracking.json`` (controllers: ``pid_step3`` with the load, ``pid_augmented`` after the swap; all
+        three phases under ``phases``) and the run.
+
+    Raises:
+        InputError: models are given, but none for Step III.
+    """
+    chosen = models_for(scenario, models, progress)
+    model = chosen.get("step3", chosen.get(MAIN_MODEL))
+    if model is None:
+        raise InputError(
+            f"--model: {scenario.name} needs a model named step3 or model; given: {', '.join(chosen)}"
+        )
+    progress(f"tracking {scenario.reference.duration:g} s; a load is grasped on the way")
+    result, diagnosis = track_pickup(scenario, model, progress)
+    phases = result.phases
+    answer = tracking_answer(
+        scenario, {"pid_step3": phases["loaded"], "pid_augmented": phases["augmented"]}
+    ) | {
+        "phases": {name: result_answer(phase) for name, phase in phases.items()},
+        "diagnosis": diagnosis.to_dict(),
+    }
+    if folder is not None:
+        from armloop.reports.plots import tracking_figure
+        from armloop.reports.tracking_tables import PHASES
+
+        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
+        write_text(folder / "diagnosis.json", json.dumps(diagnosis.to_dict(), indent=1) + "\n")
+        write_log(folder / "since_the_grasp.csv", result.log)
+        diagnosis.model.save(folder / "augmented.json")
+        save_made(folder, chosen, models)
+        with replacing(folder / "tracking.png") as draft:
+            tracking_figure(phases, PHASES).savefig(draft, format="png", dpi=110)
+    return answer, result
+
+
+def track_pickup(
+    scenario: TrackingScenario, model: ReconstructedModel, progress: Progress
+) -> tuple[PickupResult, Diagnosis]:
+    """Run a scenario with a pickup; the diagnosis sees the model and the log since the grasp, nothing else."""
+    found: list[Diagnosis] = []
+
+    def learn(log: MotionLog) -> ReconstructedModel:
+        progress(f"diagnosing {log.time[-1] - log.time[0]:.3g} s of log since the grasp")
+        found.append(diagnose(model, [log], progress))
+        return found[0].model
+
+    result = run_pickup(scenario, model, learn)
+    return result, found[0]

@@ -1,0 +1,62 @@
+"""Tracking with friction that is drawn many times over, and the files a user looks at."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.drake_systems.wear import WearResult, run_wear
+from armloop.files import replacing, write_text
+from armloop.loop.tracking import SCHEMA, models_for, save_made
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress
+
+
+def run_wear_scenario(
+    scenario: TrackingScenario,
+    models: Mapping[str, ReconstructedModel],
+    folder: Path | None,
+    progress: Progress,
+) -> tuple[dict[str, Any], WearResult]:
+    """Run a scenario with wear on all cores, and write tracking.json and spread.png.
+
+    Returns:
+        The content of ``tracking.json``, ``eta_deg`` the mean over the draws, and the errors of every draw.
+    """
+    chosen = models_for(scenario, models, progress)
+    assert scenario.wear is not None
+    progress(f"tracking {scenario.wear.samples} times with each controller, on all cores")
+    result = run_wear(scenario, chosen)
+    answer = {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "arm": scenario.plant.arm.name,
+        "scored_s": list(scenario.score),
+        "unit": list(result.unit),
+        "wear": {"samples": scenario.wear.samples, "spread": scenario.wear.spread, "seed": scenario.seed},
+        "controllers": {name: _spread(eta) for name, eta in result.eta.items()},
+    }
+    if folder is not None:
+        from armloop.reports.plots.spread import spread_figure
+
+        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
+        save_made(folder, chosen, models)
+        with replacing(folder / "spread.png") as draft:
+            spread_figure(result).savefig(draft, format="png", dpi=110, facecolor="white")
+    return answer, result
+
+
+def _spread(eta: np.ndarray) -> dict[str, Any]:
+    """Mean, standard deviation, quantiles and every draw of η (samples, n)."""
+    low, median, high = np.quantile(eta, [0.05, 0.5, 0.95], axis=0)
+    return {
+        "eta_deg": eta.mean(axis=0).tolist(),
+        "std": eta.std(axis=0, ddof=1).tolist(),
+        "quantiles": {"0.05": low.tolist(), "0.5": median.tolist(), "0.95": high.tolist()},
+        "draws": eta.tolist(),
+    }
