@@ -50,7 +50,8 @@ bench: setup
 
 # Whole loops with an effect hidden from a seed, and clean ones: how often the verdict is right (about ten minutes).
 blind: setup
-	$(BIN)/python tests/blind/undeclared.py --seeds 20 --clean 5
+	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5
+	$(BIN)/python tests/blind/run.py --arms 20 --cases 16
 
 clean:
 	rm -rf $(VENV) out dist

@@ -148,3 +148,25 @@ def nominal_parameters(arm: Arm) -> Array:
         tensor = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
         rows.append([m, *(m * c), *tensor])
     return np.concatenate([np.array(row) for row in rows])
+
+
+def tool_jacobian(arm: Arm, q: Array) -> Array:
+    """(N, 3, n) translational Jacobian of the tool's origin in the base frame, at postures q (N, n).
+
+    The tool is the frame X_tool fixed to the last link (that link's own frame where there is none).
+    """
+    N, n = q.shape
+    R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
+    axes, origins = np.empty((n, N, 3)), np.empty((n, N, 3))
+    for i, joint in enumerate(arm.joints):
+        s = arm.axis[i]
+        p = p + R @ arm.X_PF[i, :3, 3]
+        R = R @ arm.X_PF[i, :3, :3]
+        axes[i], origins[i] = R @ s, p
+        if joint.kind == "revolute":
+            R = R @ _rotations(s, q[:, i])
+        else:
+            p = p + q[:, i : i + 1] * axes[i]
+    tip = p + R @ arm.X_tool[:3, 3]
+    turning = np.asarray(arm.revolute)[:, None, None]
+    return np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)

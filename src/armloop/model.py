@@ -55,6 +55,7 @@ class AddedEffect:
         return {
             "effect": self.effect.name,
             "joint": self.effect.joint,
+            **({"other_joint": self.effect.other_joint} if self.effect.pair_wise else {}),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
         }
 
@@ -62,7 +63,7 @@ class AddedEffect:
     def from_dict(data: dict[str, Any]) -> AddedEffect:
         """Rebuild from :meth:`to_dict`."""
         return AddedEffect(
-            effect(data["effect"], data["joint"]),
+            effect(data["effect"], data["joint"], data.get("other_joint")),
             {
                 key: Estimate(e["value"], e["std_error"], str(e["unit"]))
                 for key, e in data["parameters"].items()
@@ -81,7 +82,7 @@ class ReconstructedModel:
         conditioning: how the training logs were filtered; later logs are treated alike.
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
         baseline: what the model leaves on data of its own training runs that were not fitted:
-            ``rmse``, ``rms`` per joint, ``nrmse``.
+            ``rmse``, ``rms``, ``nrmse`` per joint, and ``worst``, the RMSE that one block in ten exceeds.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
@@ -113,23 +114,48 @@ class ReconstructedModel:
             sensors: include what a faulty sensor adds to the record.
         """
         self._check(motion)
-        rigid = self.rigid_body(motion, step)
         if step < 3 or not self.effects:
+            rigid = self.rigid_body(motion, step)
             return rigid + self.friction.torque(motion, step, rigid)
         context = self.context(motion)
-        torques = [(added.effect, added.torque(context)) for added in self.effects]
-        load = rigid + sum((tau for kind, tau in torques if kind.load), np.zeros_like(rigid))
-        tau = rigid + self.friction.torque(motion, step, load)
-        return tau + sum(
-            (extra for kind, extra in torques if sensors or not kind.sensor), np.zeros_like(rigid)
-        )
+        tau = context.predicted
+        assert tau is not None
+        # One fault after the other, each on what the one before has left: first where the encoder says the arm is.
+        faults = sorted((a for a in self.effects if sensors and a.effect.sensor), key=_fault_order)
+        for fault in faults:
+            tau = tau + fault.torque(replace(context, predicted=tau))
+        return tau
+
+    def _mechanical(self, motion: Motion) -> tuple[Array, Array]:
+        """Torque of the arm itself, effects included and sensor faults not, and the load on its joints."""
+        load = self.rigid_body(motion)
+        effects = [added for added in self.effects if not added.effect.sensor]
+        context = self._bare_context(motion, [added.effect for added in effects])
+        for added in effects:
+            if added.effect.load:
+                load = load + added.torque(context)
+        context = replace(context, load=load)
+        tau = load + self.friction.torque(motion, 3, load)
+        for added in effects:
+            if not added.effect.load:
+                tau = tau + added.torque(context)
+        return tau, load
+
+    def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
+        inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
+        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
+        return Context(self.arm, motion, inertial, period)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
         effects = [added.effect for added in self.effects] if needed is None else needed
-        inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
-        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
-        return Context(self.arm, motion, inertial, period)
+        predicted, load = self._mechanical(motion)
+        return replace(
+            self._bare_context(motion, effects),
+            load=load,
+            predicted=predicted,
+            predict=lambda other: self._mechanical(other)[0],
+        )
 
     def inertial_parameters(self) -> Array:
         """(10 n,) link parameters that reproduce the model's rigid-body torques.
@@ -163,8 +189,17 @@ class ReconstructedModel:
         if step not in self._pointwise:
             added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
             inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
-            effects = [(a.effect.load, a.pointwise(self.arm, inertial)) for a in added]
-            self._pointwise[step] = pointwise(self.arm, self.components, self.friction, effects, step)
+            terms = [list(joint) for joint in self.friction.terms]
+            effects = []
+            for a in added:
+                term = a.effect.friction({key: e.value for key, e in a.parameters.items()})
+                if term is None:
+                    effects.append((a.effect.load, a.pointwise(self.arm, inertial)))
+                else:
+                    assert a.effect.joint is not None
+                    terms[a.effect.joint - 1].append(term)
+            friction = FrictionLaw(tuple(map(tuple, terms)))
+            self._pointwise[step] = pointwise(self.arm, self.components, friction, effects, step)
         return self._pointwise[step]
 
     @cached_property
@@ -222,6 +257,10 @@ class ReconstructedModel:
             )
 
 
+def _fault_order(added: AddedEffect) -> int:
+    return ("encoder_offset", "torque_gain", "torque_offset", "time_delay").index(added.effect.name)
+
+
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
     """Read a model file; with ``arm``, refuse a model that was made for another one.
 
@@ -277,11 +316,11 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
     )
     half = np.full((1, arm.n), 0.5)
     for added in model.effects:
-        joint = added.effect.joint
-        if joint is not None and not 1 <= joint <= arm.n:
-            raise ModelError(
-                f"effect {added.effect.name!r} is on joint {joint}; the arm has joints 1 to {arm.n}"
-            )
+        for joint in (added.effect.joint, added.effect.other_joint):
+            if joint is not None and not 1 <= joint <= arm.n:
+                raise ModelError(
+                    f"effect {added.effect.name!r} is on joint {joint}; the arm has joints 1 to {arm.n}"
+                )
     probe = Motion(np.zeros(1), half, half, half, np.array([0]))
     if not np.isfinite(model.predict(probe)).all():
         raise ModelError("a coefficient is not a finite number")
@@ -300,7 +339,7 @@ def _recorded(data: dict[str, Any], n: int) -> dict[str, Any]:
 
 
 def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
-    for key in {"rmse", "rms", "nrmse"} & set(data):
+    for key in {"rmse", "rms", "nrmse", "worst"} & set(data):
         if len(data[key]) != n or not all(x is None or 0 <= float(x) < np.inf for x in data[key]):
             raise ModelError(
                 f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"

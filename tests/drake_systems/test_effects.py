@@ -10,9 +10,10 @@ from armloop.drake_systems.effects import EFFECTS, UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.plant import add_links
 from armloop.drake_systems.speed_mode import Instruments, SpeedModeArm
+from armloop.effects import EFFECTS as LISTED
 from armloop.errors import ScenarioError
 from armloop.excitation import FourierReference
-from armloop.kinematics import nominal_parameters, regressor
+from armloop.kinematics import nominal_parameters, regressor, tool_jacobian
 
 FRICTION = tuple(JointFriction(1.3 * f, f, 0.1, 1.0) for f in (0.5, 0.7, 0.6))
 IDEAL = Instruments(encoder_counts=0, torque_noise=0.0)
@@ -143,6 +144,97 @@ def test_two_effects_add_up(arm, healthy):
     check(difference, only(1, 0.75 * v[:, 0]), v)
 
 
+def test_friction_asymmetry_acts_alike_both_ways(arm, healthy):
+    difference, _, v, _ = added_torque(
+        arm, healthy, UndeclaredEffect("friction_asymmetry", 2, {"level": -0.2})
+    )
+    check(difference, only(2, np.full(len(v), -0.2)), v)
+
+
+def test_stribeck_friction(arm, healthy):
+    effect = UndeclaredEffect("stribeck_friction", 2, {"static_excess": 0.5, "velocity": 0.4})
+    difference, _, v, _ = added_torque(arm, healthy, effect)
+    check(difference, only(2, 0.5 * np.exp(-((v[:, 1] / 0.4) ** 2)) * np.sign(v[:, 1])), v)
+
+
+def test_load_dependent_friction(arm, healthy):
+    effect = UndeclaredEffect("load_dependent_friction", 2, {"coefficient": 0.1})
+    difference, q, v, vdot = added_torque(arm, healthy, effect)
+    load = regressor(arm, q, v, vdot) @ nominal_parameters(arm)
+    check(difference, only(2, 0.1 * np.abs(load[:, 1]) * np.sign(v[:, 1])), v)
+
+
+def test_quadratic_drag(arm, healthy):
+    difference, _, v, _ = added_torque(
+        arm, healthy, UndeclaredEffect("quadratic_drag", 3, {"coefficient": 0.3})
+    )
+    check(difference, only(3, 0.3 * v[:, 2] * np.abs(v[:, 2])), v)
+
+
+def test_friction_drift_fades(arm, healthy):
+    effect = UndeclaredEffect("friction_drift", 1, {"level": 0.5, "time_constant": 1.2})
+    difference, _, v, _ = added_torque(arm, healthy, effect)
+    fading = 0.5 * np.exp(-healthy.time / 1.2)
+    check(difference, only(1, fading * np.sign(v[:, 0])), v)
+
+
+def test_presliding_hysteresis_remembers_the_path_and_forgets_it_between_motions(arm, healthy):
+    effect = UndeclaredEffect("presliding_hysteresis", 3, {"level": 0.6, "width": 0.1})
+    rig = SpeedModeArm(arm, FRICTION, effects=[effect], instruments=IDEAL)
+    runs = [rig.follow(MOTION, rate=100.0, settle=0.2) for _ in range(2)]
+    assert_allclose(runs[0].tau, runs[1].tau, atol=1e-9)
+    t = np.arange(0.0, MOTION.duration, 1e-3)
+    q = MOTION.evaluate(t)[0]
+    stretch, before = 0.0, q[0, 2]
+    law = []
+    for position in q[:, 2]:
+        stretch = min(max(stretch + position - before, -0.1), 0.1)
+        before = position
+        law.append(6.0 * stretch)
+    expected = only(3, np.interp(runs[0].time, t, law))
+    check(runs[0].tau - healthy.tau, expected, MOTION.evaluate(runs[0].time)[1])
+
+
+@pytest.mark.parametrize("ratio", [1.0, -1.0])
+def test_transmission_coupling(arm, healthy, ratio):
+    law = {"inertia": 0.1, "viscous": 0.3, "coulomb": 0.2, "ratio": ratio}
+    effect = UndeclaredEffect("transmission_coupling", 2, law, other_joint=3)
+    difference, _, v, vdot = added_torque(arm, healthy, effect)
+    w, wdot = v[:, 1] + ratio * v[:, 2], vdot[:, 1] + ratio * vdot[:, 2]
+    torque = 0.1 * wdot + 0.3 * w + 0.2 * np.sign(w)
+    expected = only(2, torque) + only(3, ratio * torque)
+    turning = np.abs(w) > 0.05
+    check(difference[turning], expected[turning], v[turning])
+
+
+def test_a_gain_and_a_delay_are_the_recorders(arm, healthy):
+    gain, _, v, _ = added_torque(arm, healthy, UndeclaredEffect("torque_gain", 2, {"gain": 1.25}))
+    check(gain, only(2, 0.25 * healthy.tau[:, 1]), v)
+    late = SpeedModeArm(
+        arm, FRICTION, effects=[UndeclaredEffect("time_delay", None, {"seconds": 0.03})], instruments=IDEAL
+    ).follow(MOTION, rate=100.0, settle=0.2)
+    assert_allclose(late.tau[3:], healthy.tau[:-3], atol=1e-9)
+
+
+def test_an_encoder_offset_shifts_what_is_read_and_nothing_else(arm, healthy):
+    effect = UndeclaredEffect("encoder_offset", 2, {"offset": 0.05})
+    run = SpeedModeArm(arm, FRICTION, effects=[effect], instruments=IDEAL).follow(
+        MOTION, rate=100.0, settle=0.2
+    )
+    assert_allclose(run.q - healthy.q, np.tile([0.0, 0.05, 0.0], (len(run.q), 1)), atol=1e-12)
+    assert_allclose(run.tau, healthy.tau, atol=1e-12)
+
+
+def test_external_contact_pushes_while_it_lasts(arm, healthy):
+    force = np.array([4.0, -3.0, 6.0])
+    effect = UndeclaredEffect("external_contact", None, {"start": 1.0, "end": 1.6, "force": force.tolist()})
+    difference, q, v, _ = added_torque(arm, healthy, effect)
+    during = (healthy.time > 1.01) & (healthy.time < 1.59)
+    expected = np.where(during[:, None], -np.einsum("f,nfj->nj", force, tool_jacobian(arm, q)), 0.0)
+    edges = (np.abs(healthy.time - 1.0) < 0.05) | (np.abs(healthy.time - 1.6) < 0.05)
+    check(difference[~edges], expected[~edges], v[~edges])
+
+
 @pytest.mark.parametrize(
     ("name", "joint", "parameters", "message"),
     [
@@ -154,6 +246,15 @@ def test_two_effects_add_up(arm, healthy):
         ("payload", None, {"mass": -1.0, "com": [0, 0, 0]}, "not be negative"),
         ("torque_offset", 1, {"offset": float("nan")}, "one finite number"),
         ("torque_offset", 1, {"offset": "much"}, "must be a number"),
+        ("stribeck_friction", 1, {"static_excess": 1.0, "velocity": 0.0}, "above 0"),
+        ("coulomb_friction", 1, {"level": -1.0}, "not be negative"),
+        ("external_contact", None, {"start": 2.0, "end": 1.0, "force": [1, 0, 0]}, "after start"),
+        (
+            "transmission_coupling",
+            1,
+            {"inertia": 0.1, "viscous": 0.1, "coulomb": 0.1, "ratio": 1.0},
+            "other_joint",
+        ),
     ],
 )
 def test_refuses_what_is_no_effect(name, joint, parameters, message):
@@ -166,8 +267,5 @@ def test_refuses_a_joint_the_arm_does_not_have(arm):
         realise(arm, [UndeclaredEffect("torque_offset", 4, {"offset": 1.0})])
 
 
-def test_every_effect_is_tested():
-    assert set(EFFECTS) == {
-        "payload", "viscous_friction", "coulomb_friction", "joint_spring", "torque_ripple", "rotor_inertia",
-        "torque_offset", "gravity_tilt",
-    }  # fmt: skip
+def test_every_effect_of_the_table_is_here():
+    assert set(EFFECTS) == set(LISTED)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from armloop.arm import load_arm
-from armloop.drake_systems.effects import EFFECTS
 from armloop.effects import EFFECTS as LISTED
-from armloop.loop.undeclared import draw
+from armloop.loop.undeclared import EFFECTS, draw
 
 
 @pytest.mark.parametrize("name", ["three_axis", "scara"])

@@ -28,6 +28,38 @@ _WHY: dict[frozenset[str], str] = {
     frozenset({"gravity_tilt", "torque_offset"}): (
         "over a small range a tilt is a constant; a run over all postures would tell them apart"
     ),
+    frozenset({"torque_offset", "friction_asymmetry"}): (
+        "a joint that rubs harder one way needs the same constant torque as a sensor that is off; no motion tells them "
+        "apart, but the reading of an unloaded, unpowered drive does"
+    ),
+    frozenset({"coulomb_friction", "load_dependent_friction"}): (
+        "under a constant load both are one level; a run at postures with different loads would tell them apart"
+    ),
+    frozenset({"coulomb_friction", "friction_drift"}): (
+        "over a run that is short against the warming up both are one level; a longer run would tell them apart"
+    ),
+    frozenset({"coulomb_friction", "presliding_hysteresis"}): (
+        "once the joint slides both are one level; a run with many short reversals would tell them apart"
+    ),
+    frozenset({"coulomb_friction", "stribeck_friction"}): (
+        "at low speeds both are one level; a run at several constant speeds would tell them apart"
+    ),
+    frozenset({"quadratic_drag", "viscous_friction"}): (
+        "near one speed both are one level; a run at several speeds up to the fastest would tell them apart"
+    ),
+    frozenset({"encoder_offset", "gravity_tilt"}): (
+        "both turn gravity against a link; a run with fast motion at different postures, or a spirit level, would tell "
+        "them apart"
+    ),
+    frozenset({"encoder_offset", "joint_spring"}): (
+        "over a small range a shifted gravity torque is a spring; a run over the whole range would tell them apart"
+    ),
+    frozenset({"torque_gain", "payload"}): (
+        "both scale the torque of gravity; a run in which friction or inertia dominate would tell them apart"
+    ),
+    frozenset({"rotor_inertia", "transmission_coupling"}): (
+        "while one of the two joints hardly moves both are the same inertia; a run that moves both would tell them apart"
+    ),
     frozenset({"torque_offset", "payload"}): (
         "over few postures a load is a constant; a run over all postures would tell them apart"
     ),

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.diagnosis.alternatives import why_alike
+from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit
-from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.fit import Fit, fit
+from armloop.diagnosis.search import Outcome, search, without_forced
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.effects import hypotheses
 from armloop.errors import InputError
@@ -20,7 +21,7 @@ from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
 from armloop.progress import Progress, silent
-from armloop.signals import condition
+from armloop.signals import condition, smooth
 
 Array = NDArray[np.float64]
 
@@ -36,7 +37,8 @@ class Diagnosis:
         outcome: the search's result.
         model: the model with the effects found.
         unlisted: the law of a residual that no listed effect explains, if there is such a residual.
-        samples: the run as it was judged.
+        contacts: events of the run, found before the search and kept out of it.
+        evidence: the run as it was judged.
     """
 
     verdict: str
@@ -44,6 +46,7 @@ class Diagnosis:
     model: ReconstructedModel
     unlisted: Unlisted | None
     evidence: Evidence
+    contacts: list[Contact]
 
     @property
     def samples(self) -> Samples:
@@ -86,6 +89,7 @@ class Diagnosis:
                         {
                             "effect": rival.name,
                             "joint": rival.joint,
+                            **({"other_joint": rival.other_joint} if rival.pair_wise else {}),
                             "share": share,
                             "why": why_alike(added.effect, rival),
                         }
@@ -94,6 +98,16 @@ class Diagnosis:
                 }
             )
         effects.sort(key=lambda item: -item["share"])
+        effects += [
+            {
+                **contact.added.to_dict(),
+                "share": contact.share,
+                "words": contact.added.effect.sentence(contact.added.parameters),
+                "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
+                "alternatives": [],
+            }
+            for contact in self.contacts
+        ]
         if self.unlisted is not None:
             effects.append(self.unlisted.to_dict())
         return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": _null(self.errors())}
@@ -146,19 +160,55 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
             raise InputError(
                 f"{logs[0].name}: tau{j + 1} is zero throughout; give a log that holds the joint's torque"
             )
-    evidence = Evidence.of(model, samples, hypotheses(model.arm))
-    still = [j + 1 for j in range(model.arm.n) if samples.moving[:, j].sum() < 50]
-    blocks = len(np.unique(evidence.blocks))
-    if len(still) == model.arm.n or blocks < 8:
-        raise InputError(
-            f"{logs[0].name}: too little motion to judge ({blocks} blocks of 1.5 s, joints at rest: {still}); "
-            "log at least 12 s in which the joints move"
+    whole = Evidence.of(model, samples, hypotheses(model.arm))
+    contacts = find_contacts(whole, whole.residual([]))
+    evidence = without(whole, contacts)
+    if _too_still(evidence):
+        if not contacts and not known_contacts(whole).any():
+            raise InputError(f"{logs[0].name}: {_too_still(evidence)}")
+        left = evidence.residual([])
+        nothing = fit(evidence, left, [], [])
+        added = [contact.added for contact in contacts]
+        return Diagnosis(
+            "effects_found",
+            Outcome([], nothing, nothing, left),
+            model.with_effects(added),
+            None,
+            evidence,
+            contacts,
         )
+    blocks = len(np.unique(evidence.blocks))
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
     outcome = search(evidence, progress)
-    unlisted = find_law(evidence, outcome.after, progress)
+    # What the effects leave shows events that they covered, and takes back those that they explain.
+    again = find_contacts(
+        whole, samples.tau - smooth(samples, model.with_effects(outcome.added()).predict(samples.motion))
+    )
+    if (without(whole, again).rows != evidence.rows).any():
+        contacts, evidence = again, without(whole, again)
+        outcome = search(evidence, progress)
+    unlisted = find_law(evidence, outcome.before, outcome.after, progress)
     if unlisted is not None:
-        verdict = "effects_found" if outcome.found else "unlisted_effect"
-    else:
-        verdict = "effects_found" if outcome.found else "no_effect"
-    return Diagnosis(verdict, outcome, model.with_effects(outcome.added()), unlisted, evidence)
+        outcome, forced = without_forced(evidence, outcome, unlisted.joint - 1)
+        if forced:
+            unlisted = find_law(evidence, outcome.before, outcome.after, progress)
+    found = bool(outcome.found or contacts)
+    verdict = "effects_found" if found else "unlisted_effect" if unlisted is not None else "no_effect"
+    added = [*outcome.added(), *(contact.added for contact in contacts)]
+    return Diagnosis(verdict, outcome, model.with_effects(added), unlisted, evidence, contacts)
+
+
+def _too_still(evidence: Evidence) -> str:
+    """What keeps the run from being judged, empty if nothing does."""
+    # A joint that is pushed about within its friction has not moved.
+    ranges = evidence.model.history.get("range")
+    slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
+    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
+    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 50]
+    blocks = len(np.unique(evidence.blocks))
+    if len(still) < evidence.rows.shape[1] and blocks >= 8:
+        return ""
+    return (
+        f"too little motion to judge ({blocks} blocks of 1.5 s, joints at rest: {still}); log at least 12 s in which "
+        "the joints move"
+    )

@@ -33,6 +33,7 @@ class Evidence:
     Attributes:
         samples: the run, conditioned like the model's training logs.
         scale: (n,) the model's residual on its own held-out baseline data, N·m (N).
+        variation: (n,) how much more than that, as energy, it leaves on the worst tenth of those data.
         rows: (N, n) samples that count: the joint slides.
         blocks: (N,) block of each sample.
     """
@@ -40,10 +41,13 @@ class Evidence:
     model: ReconstructedModel
     samples: Samples
     scale: Array
+    variation: Array
     rows: NDArray[np.bool_]
     blocks: NDArray[np.intp]
     context: Context
-    _columns: dict[tuple[str, int | None, float], Array] = field(default_factory=dict, repr=False)
+    _columns: dict[tuple[tuple[str, int | None, int | None], float], Array] = field(
+        default_factory=dict, repr=False
+    )
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -53,12 +57,20 @@ class Evidence:
         # A model without a baseline (written by hand, or noise-free) is weighed by the torque itself.
         own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
+        worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
+        variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, BLOCK_SECONDS)
         context = model.context(samples.motion, effects)
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
-        return Evidence(model, samples, scale, samples.moving, blocks, context)
+        return Evidence(model, samples, scale, variation, samples.moving, blocks, context)
+
+    def knowing(self, known: list[AddedEffect]) -> Evidence:
+        """The same run with columns as a model sees them that has ``known`` effects."""
+        model = self.model.with_effects(known)
+        context = model.context(self.samples.motion, [added.effect for added in known])
+        return replace(self, context=replace(context, period=self.context.period), _columns={})
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -79,7 +91,7 @@ class Evidence:
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) columns of an effect through the run's filter, computed once."""
-        key = (effect.name, effect.joint, shape)
+        key = (effect.place, shape)
         if key not in self._columns:
             self._columns[key] = smooth(self.samples, effect.full_columns(self.context, shape))
         return self._columns[key]

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.effects import Effect, Estimate
-from armloop.regression.moments import Moments, total
+from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]
 
 _ITERATIONS = 30
+_REFINEMENTS = 3
 _RIDGE = 1e-8
 
 
@@ -64,24 +65,45 @@ class Fit:
 
 def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
     """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
-    stacked, sizes = _stack(evidence, residual, effects, [shape.final for shape in shapes])
-    whole = total(stacked.moments())
-    held_out = np.array(stacked.y)
+    held_out = np.zeros(0)
     for k in range(FOLDS):
-        values = [shape.without[k] for shape in shapes]
-        same = values == [shape.final for shape in shapes]
-        judged = stacked if same else _stack(evidence, residual, effects, values)[0]
+        judged, beta, _, _, _ = _solved(evidence, residual, effects, [s.without[k] for s in shapes], k)
+        if k == 0:
+            held_out = np.array(judged.y)
         mine = judged.fold == k
-        beta, _, _ = solve(Moments.of(judged.X[~mine], judged.y[~mine]), effects, sizes)
         held_out[mine] -= judged.X[mine] @ beta
-    beta, x, J = solve(whole, effects, sizes)
+    stacked, beta, x, J, values = _solved(evidence, residual, effects, [s.final for s in shapes], None)
     covariance = _block_covariance(stacked, beta, J)
     parameters, start = [], 0
-    for effect, shape, free in zip(effects, shapes, x, strict=True):
+    for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
-        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], shape.final))
+        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], value))
         start += len(free)
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), held_out, stacked)
+
+
+def _solved(
+    evidence: Evidence,
+    residual: Array,
+    effects: Sequence[Effect],
+    values: Sequence[float],
+    without: int | None,
+) -> tuple[Stacked, Array, list[Array], Array, list[float]]:
+    """Fit on all rows, or on those outside a fold, with nonlinear parameters refined from where they start.
+
+    Returns:
+        The rows, coefficients, free parameters per effect, derivative, and the refined nonlinear parameters.
+    """
+    values = list(values)
+    for attempt in range(_REFINEMENTS + 1):
+        stacked, sizes = _stack(evidence, residual, effects, values)
+        rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
+        beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
+        better = [e.refined(free, value) for e, free, value in zip(effects, x, values, strict=True)]
+        if attempt == _REFINEMENTS or np.allclose(better, values, rtol=1e-3):
+            break
+        values = better
+    return stacked, beta, x, J, values
 
 
 def _stack(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,8 +19,8 @@ Array = NDArray[np.float64]
 
 #: An effect must lower the held-out error by this many standard errors (over blocks) …
 SIGNIFICANCE = 3.0
-#: … and, on some joint, by this part of the energy the model leaves on its own baseline: from run to run the
-#: shortcomings of a model vary about as much, and a law that fits them is easily found.
+#: … and, on some joint, by this part of the energy the model leaves on the worst tenth of its own baseline: a run may
+#: be all of such motion, and a law that fits a model's shortcomings is easily found.
 BASELINE_SHARE = 1.0
 #: A further effect must remove at least this part of what could be explained at first: what a large effect leaves
 #: because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for small ones.
@@ -28,7 +29,10 @@ LEAST_SHARE = 0.01
 ALIKE = 1.0
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
+#: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
+FORCED = 0.3
 _MOST_EFFECTS = 4
+_REFITS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +79,10 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
     while len(found) < _MOST_EFFECTS:
         trials = []
         for effect in listed:
-            if any(f.effect.name == effect.name and f.effect.joint == effect.joint for f in found):
+            if any(f.effect.place == effect.place for f in found):
                 continue
             trial = _trial(evidence, residual, current, effect)
-            if trial is None or not _worth(current, trial, rows_per_joint):
+            if trial is None or not _worth(evidence, current, trial, rows_per_joint):
                 continue
             if _gain(current, trial) >= LEAST_SHARE * explainable:
                 trials.append(trial)
@@ -100,8 +104,38 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
     return Outcome(found, before, after, residual)
 
 
+def without_forced(evidence: Evidence, outcome: Outcome, joint: int) -> tuple[Outcome, bool]:
+    """The outcome without effects that were only the nearest names for a law that is not listed.
+
+    Where a real residual is left on a joint (0-based), and the effects that act there have removed no more than
+    a part of its energy, none of them is what is there.
+
+    Returns:
+        The outcome with the other effects alone, and whether any was struck off.
+    """
+    mine = outcome.before.stacked.joint == joint
+    before, after = (float((f.held_out[mine] ** 2).sum()) for f in (outcome.before, outcome.after))
+    if after < FORCED * before:
+        return outcome, False
+    kept = [k for k, f in enumerate(outcome.found) if not _acts_mainly_on(evidence, f.effect, f.shape, joint)]
+    if len(kept) == len(outcome.found):
+        return outcome, False
+    effects = [outcome.found[k].effect for k in kept]
+    again = fit(evidence, outcome.residual, effects, [outcome.found[k].shape for k in kept])
+    return Outcome([outcome.found[k] for k in kept], outcome.before, again, outcome.residual), True
+
+
+def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:
+    """Whether an effect's columns, weighted, are largest on a joint."""
+    if effect.joint is not None:
+        return joint + 1 in (effect.joint, effect.other_joint)
+    columns = evidence.columns(effect, shape.final) / evidence.scale[:, None]
+    return int(np.argmax((columns**2).sum(axis=(0, 2)))) == joint
+
+
 def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
-    if effect.joint is not None and not evidence.rows[:, effect.joint - 1].any():
+    joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
+    if not all(evidence.rows[:, j].any() for j in joints):
         return None  # a joint at rest shows nothing
     shapes = list(effect.shapes(evidence.context))
     if not shapes:
@@ -118,20 +152,13 @@ def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) ->
 def _best_shape(
     evidence: Evidence, residual: Array, current: Fit, effect: Effect, shapes: list[float]
 ) -> Shape:
-    """The shape whose columns explain most of what the current effects leave on the effect's joint.
+    """The shape whose columns explain most of what the current effects leave on the effect's joints.
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold.
     """
-    assert effect.joint is not None
-    j = effect.joint - 1
-    left = np.array(residual[:, j])
-    rows = evidence.rows[:, j]
-    left[rows] = current.held_out[current.stacked.joint == j] * evidence.scale[j]
-    each = [effect.columns(evidence.context, shape) for shape in shapes]
-    X = smooth(evidence.samples, np.hstack(each))[rows]
-    width = each[0].shape[1]
-    X = X.reshape(len(X), len(shapes), width)
-    fold, y = evidence.fold[rows], left[rows]
+    joints = range(residual.shape[1]) if effect.other_joint or effect.joint is None else [effect.joint - 1]
+    X, y, fold = _shape_problem(evidence, current, effect, shapes, joints)
+    width = X.shape[2]
     G = [np.einsum("ksp,ksr->spr", X[fold == k], X[fold == k]) for k in range(FOLDS)]
     b = [np.einsum("ksp,k->sp", X[fold == k], y[fold == k]) for k in range(FOLDS)]
 
@@ -145,18 +172,34 @@ def _best_shape(
     return Shape(best(every), tuple(best([other for other in every if other != k]) for k in every))
 
 
+def _shape_problem(
+    evidence: Evidence, current: Fit, effect: Effect, shapes: list[float], joints: Iterable[int]
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Columns (R, S, p) of every shape, what is left (R,), and the fold of each row, of the effect's joints."""
+    each = [effect.columns(evidence.context, shape) for shape in shapes]
+    width = each[0].shape[-1]
+    parts, left, fold = [], [], []
+    for j in joints:
+        rows = evidence.rows[:, j]
+        columns = smooth(evidence.samples, np.hstack([c if c.ndim == 2 else c[:, j] for c in each]))[rows]
+        parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
+        left.append(current.held_out[current.stacked.joint == j])
+        fold.append(evidence.fold[rows])
+    return np.concatenate(parts), np.concatenate(left), np.concatenate(fold)
+
+
 def _gain(current: Fit, trial: Fit) -> float:
     return float((current.held_out**2).sum() - (trial.held_out**2).sum())
 
 
-def _worth(current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
+def _worth(evidence: Evidence, current: Fit, trial: Fit, rows_per_joint: NDArray[np.intp]) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     gains = current.block_errors() - trial.block_errors()
     spread = float(np.sqrt(len(gains)) * gains.std(ddof=1))
     if gains.sum() <= SIGNIFICANCE * spread:
         return False
     by_joint = _by_joint(current, trial, len(rows_per_joint))
-    return bool((by_joint > BASELINE_SHARE * rows_per_joint).any())
+    return bool((by_joint > BASELINE_SHARE * evidence.variation * rows_per_joint).any())
 
 
 def _simplest_of_equals(current: Fit, trials: list[Fit], rows_per_joint: NDArray[np.intp]) -> Fit:
@@ -184,10 +227,13 @@ def _by_joint(worse: Fit, better: Fit, n: int) -> Array:
 
 
 def _refit(evidence: Evidence, current: Fit) -> Fit:
-    """Fit once more with the friction that the found loads cause, where the model's friction feels load."""
+    """Fit again with what the found effects change of each other: loads raise friction, gains scale both."""
     if not current.effects:
         return current
-    added = [AddedEffect(e, p) for e, p in zip(current.effects, current.parameters, strict=True)]
-    again = fit(evidence, evidence.residual(added), current.effects, current.shapes)
-    better = (again.held_out**2).sum() < (current.held_out**2).sum()
-    return again if better else current
+    for _ in range(_REFITS):
+        added = [AddedEffect(e, p) for e, p in zip(current.effects, current.parameters, strict=True)]
+        again = fit(evidence.knowing(added), evidence.residual(added), current.effects, current.shapes)
+        if (again.held_out**2).sum() >= (current.held_out**2).sum():
+            break
+        current = again
+    return current

@@ -1,7 +1,7 @@
 """A residual that no listed effect explains: is it real, where is it, and what is its law?
 
-The law is sought with the sparse machinery among products of sines, cosines, velocities and directions, and
-reported only if both halves of the run choose it.
+The law is sought with the sparse machinery among waves of the angles and their sums, velocities, their products
+and directions, and reported only if both halves of the run choose it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit
-from armloop.library.double_feature_set import DoubleFeatureSet
+from armloop.library.angle_sums import AngleSums
 from armloop.motion import Motion
 from armloop.progress import Progress
 from armloop.regression.moments import Moments, total
@@ -25,7 +25,11 @@ Array = NDArray[np.float64]
 
 #: A residual is real if it is this many times the model's own, and exceeds it by three standard errors.
 EXCESS = 2.0
+#: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
+#: exactly, and no further effect.
+REMAINDER = 0.03
 _MOST_TERMS = 4
+_MOST_CANDIDATES = 1500
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,12 @@ class Unlisted:
         }
 
 
-def find_law(evidence: Evidence, after: Fit, progress: Progress) -> Unlisted | None:
-    """The largest residual left, if it is real, and its law; None if the run looks like the baseline."""
+def find_law(evidence: Evidence, before: Fit, after: Fit, progress: Progress) -> Unlisted | None:
+    """The largest residual left, if it is real, and its law; None if the run looks like the baseline.
+
+    Args:
+        before, after: fits without and with the effects found.
+    """
     n = evidence.samples.motion.joints
     ratios = np.zeros(n)
     for j in range(n):
@@ -59,6 +67,8 @@ def find_law(evidence: Evidence, after: Fit, progress: Progress) -> Unlisted | N
         if mine.sum() < 50:
             continue
         error = after.held_out[mine] ** 2
+        if error.sum() < REMAINDER * float((before.held_out[mine] ** 2).sum()):
+            continue
         sums = block_sums(error - EXCESS**2, after.stacked.block[mine])
         if sums.sum() > 3 * np.sqrt(len(sums)) * sums.std(ddof=1):
             ratios[j] = np.sqrt(error.mean())
@@ -77,7 +87,9 @@ def _law(evidence: Evidence, after: Fit, j: int) -> tuple[str, float]:
     rows = np.flatnonzero(evidence.rows[:, j])
     motion = evidence.samples.motion
     moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
-    library = DoubleFeatureSet(tuple(bool(r) for r in evidence.model.arm.revolute), 2, 2, "velocity")
+    revolute = tuple(bool(r) for r in evidence.model.arm.revolute)
+    libraries = [AngleSums(revolute, N1, 2, "velocity") for N1 in (3, 2, 1)]
+    library = next((each for each in libraries if each.size <= _MOST_CANDIDATES), libraries[-1])
     X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
     X = np.hstack([X, X[:, library.order() <= 1] * direction])
     signed = [

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.joint_loads import Law
 from armloop.drake_systems.speed_mode import Instruments, Recording, SpeedModeArm
 from armloop.excitation import (
     MotionRanges,
@@ -217,14 +218,21 @@ def measure_run(
     rate: float = 500.0,
     effects: Sequence[UndeclaredEffect] = (),
     reference: Reference | None = None,
+    law: Law | None = None,
     progress: Progress = silent,
 ) -> MotionLog:
     """Measure one exciting run of the arm, with effects in the plant that the log says nothing of.
 
     duration : s of a Fourier-series trajectory drawn from `seed`, unless a `reference` is given; rate : Hz
+    law : what no list of effects has, see `ArmPlant`
     """
     rig = SpeedModeArm(
-        arm, config.friction, effects=effects, instruments=config.instruments, time_step=config.time_step
+        arm,
+        config.friction,
+        effects=effects,
+        instruments=config.instruments,
+        time_step=config.time_step,
+        law=law,
     )
     if reference is None:
         reference = fourier_reference(config.ranges, duration, seed, harmonics=5)

@@ -20,12 +20,15 @@ class ClampedLaw(NamedTuple):
     """A torque on one joint that falls with its velocity w: clamp(command - slope w, +-limit).
 
     joint : from 0; slope : at least 0, N*m*s/rad (N*s/m); limit : at least 0, N*m (N), may be inf
+    other, ratio : of a motor that two joints share: w = w_joint + ratio w_other, and the torque acts on both
     """
 
     joint: int
     command: float
     slope: float
     limit: float
+    other: int = -1
+    ratio: float = 0.0
 
     def piece(self, w: float) -> int:
         """Return which of the law's three straight pieces w is on: 0 the steep one, +-1 a limit."""
@@ -51,18 +54,28 @@ def implicit_torques(
     joints = range(len(p))
     for attempt in range(_ENOUGH):
         left, right = [row.copy() for row in A], list(p)
-        for (joint, command, slope, limit), piece in zip(laws, pieces, strict=True):
-            if piece:
-                right[joint] += step * piece * limit
-            else:
-                right[joint] += step * command
+        for (joint, command, slope, limit, other, ratio), piece in zip(laws, pieces, strict=True):
+            push = step * (piece * limit if piece else command)
+            right[joint] += push
+            if not piece:
                 left[joint][joint] += step * slope
+            if ratio:
+                right[other] += ratio * push
+                if not piece:
+                    shared = ratio * step * slope
+                    left[joint][other] += shared
+                    left[other][joint] += shared
+                    left[other][other] += ratio * shared
         w = _solve(left, right)
         total = [0.0 for _ in joints]
         settled = True
-        for index, (joint, command, slope, limit) in enumerate(laws):
-            torque, piece = command - slope * w[joint], pieces[index]
-            total[joint] += piece * limit if piece else torque
+        for index, (joint, command, slope, limit, other, ratio) in enumerate(laws):
+            speed = w[joint] + ratio * w[other] if ratio else w[joint]
+            torque, piece = command - slope * speed, pieces[index]
+            acting = piece * limit if piece else torque
+            total[joint] += acting
+            if ratio:
+                total[other] += ratio * acting
             if piece:
                 if piece * torque < limit * (1.0 - _EDGE):
                     pieces[index] = 0

@@ -27,7 +27,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from armloop.arm import Arm
 from armloop.drake_systems.effects import Realisation, UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.joint_loads import JointLoads, ServoGains
+from armloop.drake_systems.joint_loads import JointLoads, Law, ServoGains
 from armloop.errors import ArmError
 
 Array = NDArray[np.float64]
@@ -57,6 +57,7 @@ class ArmPlant(Diagram):
         effects: Sequence[UndeclaredEffect] = (),
         time_step: float = 1e-3,
         servo: ServoGains | None = None,
+        law: Law | None = None,
     ) -> None:
         """Build the plant.
 
@@ -64,6 +65,7 @@ class ArmPlant(Diagram):
         friction : one `JointFriction` per joint
         effects : what the plant has in addition
         time_step : s; servo : gains of a drive in speed mode, None for one in torque mode
+        law : further torques (n,) that the drives must supply, of lists q and v: what no list of effects has
 
         Raises `ArmError` when the arm's inertias cannot move, `ScenarioError` when an effect does not fit it.
         """
@@ -71,7 +73,7 @@ class ArmPlant(Diagram):
         if len(friction) != arm.n:
             raise ValueError(f"friction is given for {len(friction)} joints; {arm.name} has {arm.n}")
         self.arm = arm
-        self._servo = servo
+        self._servo, self._law = servo, law
         self.effects = realise(arm, effects)
         self.friction = _with_effects(friction, self.effects)
         builder = DiagramBuilder()
@@ -95,10 +97,15 @@ class ArmPlant(Diagram):
 
     def _connect(self, builder: DiagramBuilder) -> None:
         plant, effects = self.plant, self.effects
-        loads = builder.AddNamedSystem(
+        loads = self._loads = builder.AddNamedSystem(
             "loads",
             JointLoads(
-                plant, self.friction, servo=self._servo, springs=effects.springs, ripples=effects.ripples
+                plant,
+                self.friction,
+                servo=self._servo,
+                effects=effects,
+                X_tool=self.arm.X_tool,
+                law=self._law,
             ),
         )
         builder.Connect(plant.get_state_output_port(), loads.GetInputPort("state"))
@@ -129,6 +136,7 @@ class ArmPlant(Diagram):
         """Put the arm at positions `q` and velocities `v`, (n,) each, inside a diagram's context."""
         context = self.plant.GetMyMutableContextFromRoot(root_context)
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
+        self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
 
 
 def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = None) -> None:
@@ -166,9 +174,10 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
 
 
 def _with_effects(friction: Sequence[JointFriction], effects: Realisation) -> tuple[JointFriction, ...]:
+    """Friction of Eq. (34) with what effects change of its numbers; the rest of their friction is not of its form."""
     return tuple(
-        JointFriction(f.static + level, f.coulomb + level, f.stribeck_velocity, f.viscous + viscous)
-        for f, level, viscous in zip(friction, effects.coulomb, effects.viscous, strict=True)
+        JointFriction(f.static + dry.level, f.coulomb + dry.level, f.stribeck_velocity, f.viscous + viscous)
+        for f, dry, viscous in zip(friction, effects.dry, effects.viscous, strict=True)
     )
 
 

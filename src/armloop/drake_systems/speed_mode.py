@@ -17,7 +17,7 @@ from pydrake.systems.primitives import LogVectorOutput
 from armloop.arm import Arm
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.joint_loads import ServoGains
+from armloop.drake_systems.joint_loads import Law, ServoGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.reference import TableSource
 from armloop.excitation import Reference
@@ -76,13 +76,14 @@ class SpeedModeArm:
         instruments: Instruments | None = None,
         time_step: float = 1e-3,
         servo: ServoGains = STIFF,
+        law: Law | None = None,
     ) -> None:
         self.arm = arm
         self.instruments = instruments or Instruments()
         self._step = time_step
         builder = DiagramBuilder()
         self.plant = builder.AddSystem(
-            ArmPlant(arm, friction, effects=effects, time_step=time_step, servo=servo)
+            ArmPlant(arm, friction, effects=effects, time_step=time_step, servo=servo, law=law)
         )
         self._source = builder.AddSystem(TableSource(2 * arm.n, time_step))
         builder.Connect(self._source.get_output_port(), self.plant.GetInputPort("desired_state"))
@@ -119,5 +120,13 @@ class SpeedModeArm:
         q = self.instruments.encode(arm, state[:, :n])
         rows = np.arange(first, last, max(1, round(1.0 / (rate * self._step))))
         v = (q[rows + half] - q[rows - half]) / (2 * half * self._step)
-        tau = 0.5 * (torque[rows] + torque[rows + 1]) + self.plant.effects.torque_offset
-        return Recording(t[rows], q[rows], v, tau)
+        tau = 0.5 * (torque[:-1] + torque[1:])
+        faults = self.plant.effects
+        if faults.torque_delay:
+            # Before the motion began the arm stood as at its start.
+            late = t[rows] - faults.torque_delay
+            tau = np.column_stack([np.interp(late, t[:-1], column) for column in tau.T])
+        else:
+            tau = tau[rows]
+        tau = faults.torque_gain * tau + faults.torque_offset
+        return Recording(t[rows], q[rows] + faults.encoder_offset, v, tau)

@@ -20,6 +20,8 @@ from armloop.effects.payload import link_parameters
 from armloop.errors import ModelError
 from armloop.functions import Functions
 
+#: Speed, rad/s (m/s), below which the dry friction of a shared motor fades.
+_SLOW = 0.01
 #: (v, sign(v) or its smooth stand-in, load torque, time) of one joint -> its friction.
 FrictionOfJoint = Callable[[Any, Any, Any, Any], Any]
 
@@ -58,6 +60,29 @@ class _JointEquations(Equations):
         return tau
 
 
+class _SharedMotor(Equations):
+    """A motor that turns with w = v_j + r v_k: inertia, drag and, smoothed as tanh(w / slow), dry friction."""
+
+    def __init__(self, n: int, joints: tuple[int, int], p: dict[str, float], functions: Functions) -> None:
+        self.n, self._joints, self._p, self._functions = n, joints, p, functions
+
+    def inertia(self, q: Numbers) -> Rows:
+        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        j, k = self._joints
+        ratio, inertia = self._p["ratio"], self._p["inertia"]
+        M[j][j], M[k][k] = inertia, ratio * ratio * inertia
+        M[j][k] = M[k][j] = ratio * inertia
+        return M
+
+    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
+        tau: list[Any] = [0.0] * self.n
+        (j, k), p = self._joints, self._p
+        w = v[j] + p["ratio"] * v[k]
+        torque = p["viscous"] * w + p["coulomb"] * self._functions.tanh(w / _SLOW)
+        tau[j], tau[k] = torque, p["ratio"] * torque
+        return tau
+
+
 class _PoseEquations(Equations):
     """Links as their weight alone: no inertia, no Coriolis torques."""
 
@@ -78,11 +103,13 @@ def effect_law(
     parameters: Mapping[str, Value],
     functions: Functions,
     inertial: Array | None = None,
+    other_joint: int | None = None,
 ) -> EffectLaw:
     """The law of an effect with given parameters.
 
     Args:
         joint: 1-based; None for effects of the whole arm.
+        other_joint: 1-based, of a ``transmission_coupling``.
         inertial: (10 n,) link parameters of the model, which ``gravity_tilt`` needs.
 
     Raises:
@@ -105,6 +132,8 @@ def effect_law(
         change = tilted_gravity(arm.gravity, p["roll"], p["pitch"]) - arm.gravity
         # Gravity torques are linear in gravity: the difference of the two directions is one of them.
         return EffectLaw(_PoseEquations(BodyEquations(arm, inertial, functions, change)), load=True)
+    if name == "transmission_coupling" and other_joint is not None:
+        return EffectLaw(_SharedMotor(n, (j, other_joint - 1), p, functions))
     if name == "rotor_inertia":
         return one_joint(inertia=p["inertia"])
     if name == "joint_spring":
@@ -131,5 +160,5 @@ _FRICTION: dict[str, Callable[[dict[str, float], Functions, Any, Any, Any, Any],
     "quadratic_drag": lambda p, f, v, sign, load, t: p["coefficient"] * v * abs(v),
     "friction_drift": lambda p, f, v, sign, load, t: p["level"] * f.exp(-(t / p["time_constant"])) * sign,
     # As if fully slid: what it is before that depends on the past (see the Drake system of presliding).
-    "presliding_hysteresis": lambda p, f, v, sign, load, t: p["level"] * sign,
+    "presliding_hysteresis": lambda p, f, v, sign, load, t: (p["level"] + p.get("level_change", 0.0)) * sign,
 }

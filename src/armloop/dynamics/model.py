@@ -58,7 +58,9 @@ class ModelEquations:
         self.step = step
         self.symmetric = symmetric
         self.functions = functions
-        added = [(a.effect, a.parameters) for a in model.effects if step >= 3 and not a.effect.sensor]
+        # A fault of a sensor is none of the arm, an event of one run none of the next.
+        kept = [a for a in model.effects if step >= 3 and not a.effect.sensor and a.effect.searched]
+        added = [(a.effect, a.parameters) for a in kept]
         inertial = model.inertial_parameters() if any(e.needs_inertial for e, _ in added) else None
         laws = [
             effect_law(
@@ -68,6 +70,7 @@ class ModelEquations:
                 {key: estimate.value for key, estimate in parameters.items()},
                 functions,
                 inertial,
+                effect.other_joint,
             )
             for effect, parameters in added
         ]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion
 
 Array = NDArray[np.float64]
@@ -37,50 +38,77 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What an effect may look at: the arm, the motion, and the known model's rigid-body part.
+    """What an effect may look at: the arm, the motion, and what the known model says of it.
 
     Attributes:
         inertial: (10 n,) link parameters that reproduce the known model's rigid-body torques on this
             motion, or None where no effect needed them.
         period: sample period, s.
+        load: (N, n) torque that passes the joints' bearings and gears, by the known model.
+        predict: the known model's torque (N, n) of any motion, without sensor faults.
+        predicted: (N, n) the same on this motion, with the sensor faults that come before.
     """
 
     arm: Arm
     motion: Motion
     inertial: Array | None = None
     period: float = 0.01
+    load: Array | None = None
+    predict: Callable[[Motion], Array] | None = None
+    predicted: Array | None = None
 
 
 class Effect(ABC):
-    """A physical effect on all joints (``joint`` None) or on one (1-based).
+    """A physical effect on all joints (``joint`` None), on one (1-based), or on a pair.
 
     Class attributes:
         name: as in ``diagnosis.json``.
         joint_wise: whether it sits in one joint.
+        pair_wise: whether it also concerns another joint, ``other_joint``.
         sensor: whether it falsifies what is recorded instead of acting on the arm.
         complexity: number of free parameters, for preferring the simplest of equals.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
+        searched: whether it is one of the hypotheses of a diagnosis; an event of one run is found otherwise.
+        memory: whether it depends on the path or the time, not only on q, v and vdot.
     """
 
     name: ClassVar[str]
     joint_wise: ClassVar[bool] = True
+    pair_wise: ClassVar[bool] = False
     sensor: ClassVar[bool] = False
     complexity: ClassVar[int] = 1
     needs_inertial: ClassVar[bool] = False
     load: ClassVar[bool] = False
+    searched: ClassVar[bool] = True
+    memory: ClassVar[bool] = False
 
-    def __init__(self, joint: int | None = None) -> None:
+    def __init__(self, joint: int | None = None, other_joint: int | None = None) -> None:
         self.joint = joint
+        self.other_joint = other_joint
 
     def label(self) -> str:
         """Readable name, such as ``viscous_friction at joint 2``."""
-        return self.name if self.joint is None else f"{self.name} at joint {self.joint}"
+        if self.joint is None:
+            return self.name
+        if self.other_joint is not None:
+            return f"{self.name} of joints {self.joint} and {self.other_joint}"
+        return f"{self.name} at joint {self.joint}"
+
+    @property
+    def place(self) -> tuple[str, int | None, int | None]:
+        """Name and joints: what makes two effects the same."""
+        return self.name, self.joint, self.other_joint
 
     def shapes(self, context: Context) -> Sequence[float]:
         """Values of the nonlinear parameter to try; one dummy value where there is none."""
         del context
         return (0.0,)
+
+    def refined(self, x: Array, shape: float) -> float:
+        """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
+        del x
+        return shape
 
     @abstractmethod
     def columns(self, context: Context, shape: float) -> Array:
@@ -105,6 +133,11 @@ class Effect(ABC):
     @abstractmethod
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         """(N, n) torque that the drive must supply in addition (or that the sensor adds)."""
+
+    def friction(self, parameters: dict[str, Value]) -> FrictionTerm | None:
+        """The friction term of its joint that a controller supplies for it, where it is one."""
+        del parameters
+        return None
 
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
         """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,)."""
@@ -141,6 +174,15 @@ def number(value: Value) -> float:
     return float(np.asarray(value, dtype=float).reshape(()))
 
 
+def fill(arm: Arm, text: str, joint: int | None) -> str:
+    """A unit with TAU, POS and INERTIA filled in for a joint (1-based)."""
+    assert joint is not None
+    kind = arm.joints[joint - 1]
+    inertia = "kg*m^2" if kind.kind == "revolute" else "kg"
+    unit = text.replace("TAU", kind.torque_unit).replace("POS", kind.position_unit)
+    return unit.replace("INERTIA", inertia)
+
+
 class LinearJointEffect(Effect):
     """An effect of one joint with one linear coefficient: torque = coefficient · column."""
 
@@ -160,16 +202,9 @@ class LinearJointEffect(Effect):
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self.full_columns(context, 0.0)[:, :, 0] * number(parameters[self.parameter])
 
-    def _unit(self, arm: Arm) -> str:
-        assert self.joint is not None
-        joint = arm.joints[self.joint - 1]
-        inertia = "kg*m^2" if joint.kind == "revolute" else "kg"
-        unit = self.unit.replace("TAU", joint.torque_unit).replace("POS", joint.position_unit)
-        return unit.replace("INERTIA", inertia)
-
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         error = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return {self.parameter: Estimate(float(x[0]), error, self._unit(arm))}
+        return {self.parameter: Estimate(float(x[0]), error, fill(arm, self.unit, self.joint))}
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         e = parameters[self.parameter]
@@ -180,3 +215,71 @@ class LinearJointEffect(Effect):
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return not self.nonnegative or number(parameters[self.parameter].value) > 0
+
+
+class ProfiledJointEffect(Effect):
+    """An effect of one joint, linear in one coefficient a for each value of a positive nonlinear parameter s.
+
+    The search tries values of s on a grid; around the best, a·c(s) is taken to first order in log s, with the
+    columns c and dc/dlog s, so that s has a value between the grid's and a standard error.
+
+    Class attributes:
+        parameter, shape_name: names of a and s.
+        unit, shape_unit: their units, with TAU, POS and INERTIA to be filled in.
+        law: as a formula.
+    """
+
+    complexity = 2
+    parameter: ClassVar[str]
+    shape_name: ClassVar[str]
+    unit: ClassVar[str]
+    shape_unit: ClassVar[str]
+    law: ClassVar[str]
+
+    _LOG_STEP: ClassVar[float] = 0.03
+    #: Beyond this the first order says nothing.
+    _FARTHEST: ClassVar[float] = 0.3
+
+    @abstractmethod
+    def column(self, motion: Motion, joint: int, shape: float) -> Array:
+        """(N,) torque per unit of the coefficient at joint ``joint`` (0-based)."""
+
+    def columns(self, context: Context, shape: float) -> Array:
+        assert self.joint is not None
+        j, h = self.joint - 1, self._LOG_STEP
+        low, middle, high = (self.column(context.motion, j, shape * float(np.exp(x))) for x in (-h, 0.0, h))
+        return np.column_stack([middle, (high - low) / (2 * h)])
+
+    def refined(self, x: Array, shape: float) -> float:
+        size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
+        return shape * float(np.exp(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        assert self.joint is not None
+        tau = np.zeros_like(context.motion.q)
+        shape = number(parameters[self.shape_name])
+        tau[:, self.joint - 1] = self.column(context.motion, self.joint - 1, shape)
+        return tau * number(parameters[self.parameter])
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
+        slope = np.array([-x[1] / size**2, 1 / size])
+        value = self.refined(x, shape)
+        error = value * float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
+        return {
+            self.parameter: Estimate(
+                float(x[0]), float(np.sqrt(max(covariance[0, 0], 0.0))), fill(arm, self.unit, self.joint)
+            ),
+            self.shape_name: Estimate(value, error, fill(arm, self.shape_unit, self.joint)),
+        }
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return number(parameters[self.parameter].value) > 0
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        level, shape = parameters[self.parameter], parameters[self.shape_name]
+        return (
+            f"joint {self.joint} needs {self.law} in addition, with {self.parameter} "
+            f"{number(level.value):.4g} ± {number(level.std_error):.2g} {level.unit} and {self.shape_name} "
+            f"{number(shape.value):.3g} ± {number(shape.std_error):.2g} {shape.unit}"
+        )

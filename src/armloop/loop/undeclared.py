@@ -11,14 +11,26 @@ from typing import Any
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.drake_systems.effects import EFFECTS, UndeclaredEffect
+from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.kinematics import nominal_parameters, regressor
+
+#: What the demonstration draws from.
+EFFECTS = (
+    "payload",
+    "viscous_friction",
+    "coulomb_friction",
+    "joint_spring",
+    "torque_ripple",
+    "rotor_inertia",
+    "torque_offset",
+    "gravity_tilt",
+)
 
 
 def draw(arm: Arm, seed: int) -> UndeclaredEffect:
     """Draw an effect, its joint and its size.
 
-    Every effect of the plant is equally likely, at any joint. Sizes are uniform over a range that starts
+    Every effect of :data:`EFFECTS` is equally likely, at any joint. Sizes are uniform over a range that starts
     where an engineer would begin to care, about five percent of the joint's gravity and inertia torque,
     and ends at four times that.
     """

@@ -15,6 +15,9 @@ from armloop.scoring import Score, residual
 
 Array = NDArray[np.float64]
 
+#: Moving samples that make a block's error one.
+_FEWEST = 20
+
 
 @dataclass(frozen=True, eq=False)
 class Tally:
@@ -23,17 +26,20 @@ class Tally:
     Attributes:
         sums: per working condition (0 where samples are not sorted), (2, 3, n): of samples at rest and of
             moving ones, the squared errors, the squared torques and the number.
+        blocks: (B, 2, n) of every block: the squared errors of moving samples, and their number; empty where
+            samples are no time series.
         samples: number of held-out samples.
     """
 
     sums: dict[int, Array]
+    blocks: Array
     samples: int
 
     def __add__(self, other: Tally) -> Tally:
         sums = dict(self.sums)
         for label, values in other.sums.items():
             sums[label] = sums[label] + values if label in sums else values
-        return Tally(sums, self.samples + other.samples)
+        return Tally(sums, np.concatenate([self.blocks, other.blocks]), self.samples + other.samples)
 
     @staticmethod
     def of(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None) -> Tally:
@@ -51,7 +57,13 @@ class Tally:
                 for m in masks
             ]
             sums[int(label)] = np.array(parts)
-        return Tally(sums, int(held.sum()))
+        n = squares.shape[1]
+        blocks = np.zeros((0, 2, n))
+        if samples.cutoff_hz > 0 and held.any():
+            index = np.unique(chunk.blocks[held], return_inverse=True)[1]
+            blocks = np.zeros((int(index.max()) + 1, 2, n))
+            np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
+        return Tally(sums, blocks, int(held.sum()))
 
     def score(self) -> Score:
         """Score of all held-out samples."""
@@ -70,9 +82,20 @@ class Tally:
             max((x for x in joint if x is not None), default=None)
             for joint in zip(*per_condition, strict=True)
         ]
+        worst = self._worst()
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "samples": self.samples}
+        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "samples": self.samples}
+
+    def _worst(self) -> list[float | None]:
+        """RMSE per joint that one block in ten exceeds: a run may consist of such motion."""
+        found: list[float | None] = []
+        for errors, counts in zip(self.blocks[:, 0].T, self.blocks[:, 1].T, strict=True):
+            enough = counts >= _FEWEST
+            many = int(enough.sum()) >= 10
+            mean = errors[enough] / counts[enough]
+            found.append(float(np.sqrt(np.quantile(mean, 0.9))) if many else None)
+        return found
 
 
 def _errors(sums: Array) -> dict[str, Any]:

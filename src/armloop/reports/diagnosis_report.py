@@ -31,6 +31,8 @@ _SHAPE = (
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in a few words."""
     found = [effect_label(f.effect) for f in diagnosis.outcome.found]
+    if diagnosis.contacts:
+        found.append(counted(len(diagnosis.contacts), "external contact"))
     if found:
         return listed(found)
     return (
@@ -43,7 +45,8 @@ def headline(diagnosis: Diagnosis) -> str:
 def strongest_joint(diagnosis: Diagnosis) -> int:
     """The joint (0-based) whose residual exceeds its baseline most."""
     errors = diagnosis.errors()
-    return int(np.nanargmax(np.asarray(errors["before"]) / np.asarray(errors["noise_floor"])))
+    ratio = np.asarray(errors["before"]) / np.asarray(errors["noise_floor"])
+    return 0 if np.isnan(ratio).all() else int(np.nanargmax(ratio))
 
 
 def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[Section]:
@@ -114,6 +117,8 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
         errors["noise_floor"][j],
     )
     found = diagnosis.outcome.found
+    if not found and diagnosis.contacts:
+        return [_contact_card(diagnosis, k) for k in range(min(4, len(diagnosis.contacts)))]
     if not found:
         tone = "good" if diagnosis.verdict == "no_effect" else "bad"
         return [
@@ -155,11 +160,24 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
     ]
 
 
+def _contact_card(diagnosis: Diagnosis, k: int) -> Card:
+    contact = diagnosis.contacts[k]
+    start, end, force = (contact.added.parameters[key].value for key in ("start", "end", "force"))
+    size = float(np.linalg.norm(np.asarray(force)))
+    when = f"{number(float(np.asarray(start)))} to {number(float(np.asarray(end)))} s"
+    return Card(f"{number(size, 2)} N", f"Contact {k + 1}, {when}", "mean force on the tool", "accent")
+
+
 def _findings(diagnosis: Diagnosis) -> list[str]:
     sentences = [
         f"Found: {added.effect.sentence(added.parameters)}. It removes {percent(found.share)} of what can be "
         "explained."
         for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True)
+    ]
+    sentences += [
+        f"Found: {contact.added.effect.sentence(contact.added.parameters)}. The force explains "
+        f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
+        for contact in diagnosis.contacts
     ]
     unlisted = diagnosis.unlisted
     if unlisted is not None:
@@ -193,6 +211,8 @@ def _residual_words(diagnosis: Diagnosis) -> str:
     errors = diagnosis.errors()
     floor = np.asarray(errors["noise_floor"])
     before, after = np.asarray(errors["before"]) / floor, np.asarray(errors["after"]) / floor
+    if not diagnosis.evidence.rows.any():
+        return "No joint moved long enough to judge anything but the contacts."
     if not diagnosis.outcome.found:
         return f"The residual is {numbers(before, 2)} times the baseline's, joint by joint."
     return (

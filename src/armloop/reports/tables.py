@@ -159,6 +159,11 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
                     percent(found.share) if k == 0 else "",
                 ]
             )
+    for contact in diagnosis.contacts:
+        for k, (key, e) in enumerate(contact.added.parameters.items()):
+            label, share = effect_label(contact.added.effect), percent(contact.share)
+            value = with_error(e.value, e.std_error)
+            rows.append([label if k == 0 else "", key, value, unit(e.unit), share if k == 0 else ""])
     if diagnosis.unlisted is not None:
         rows.append(
             [f"unlisted, joint {diagnosis.unlisted.joint}", "law", diagnosis.unlisted.form or MISSING, "", ""]
@@ -186,7 +191,7 @@ def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not
 def diagnosis_table(diagnosis: Diagnosis) -> str:
     """The verdict, the effects found and the errors per joint, for a terminal."""
     parts = [f"Verdict: {diagnosis.verdict}"]
-    if diagnosis.outcome.found or diagnosis.unlisted is not None:
+    if diagnosis.outcome.found or diagnosis.contacts or diagnosis.unlisted is not None:
         parts.append(str(effects_table(diagnosis)))
     return "\n\n".join([*parts, str(errors_table(diagnosis))])
 

@@ -83,15 +83,17 @@ def controller(name: str) -> str:
     return f"PID + {_STEPS.get(rest, rest)}"
 
 
-def effect_name(name: str, joint: int | None) -> str:
+def effect_name(name: str, joint: int | None, other_joint: int | None = None) -> str:
     """``viscous_friction`` at joint 2 as viscous friction, joint 2."""
     plain = name.replace("_", " ")
+    if other_joint is not None:
+        return f"{plain}, joints {joint} and {other_joint}"
     return plain if joint is None else f"{plain}, joint {joint}"
 
 
 def effect_label(effect: Effect) -> str:
     """The name of an effect with its joint."""
-    return effect_name(effect.name, effect.joint)
+    return effect_name(effect.name, effect.joint, effect.other_joint)
 
 
 def counted(count: int, singular: str, plural: str | None = None) -> str:

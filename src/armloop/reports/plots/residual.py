@@ -14,6 +14,8 @@ from armloop.reports.plots.style import (
     AFTER,
     BASELINE,
     BEFORE,
+    BLUE,
+    GREY,
     every,
     figure,
     legend,
@@ -35,13 +37,21 @@ def residual_time_figure(diagnosis: Diagnosis, most_seconds: float = 60.0) -> Fi
     """One row per joint: the held-out residual before and after, with the baseline's level as a band."""
     before, after = held_out_residuals(diagnosis)
     samples, scale, joints = diagnosis.samples, diagnosis.evidence.scale, diagnosis.model.arm.joints
-    time = samples.motion.time - samples.motion.time[0]
+    origin = samples.motion.time[0]
+    time, whole = samples.motion.time - origin, diagnosis.evidence.residual([])
     shown = time <= most_seconds
     n = len(joints)
     made = figure(10, (1.5 if n < 5 else 1.2) * n + 0.7)
     column = panels(made, n, 1, sharex=True)[:, 0]
     for j, (axes, joint) in enumerate(zip(column, joints, strict=True)):
         _band(axes, float(scale[j]))
+        if diagnosis.contacts:
+            # Contacts happen at rest, too: there the residual is no measure of the model, but it shows the push.
+            line = thin(*with_gaps(time[shown], whole[shown, j]))
+            axes.plot(*line, color=GREY, linewidth=0.9, label="all samples, at rest too", rasterized=True)
+        for contact in diagnosis.contacts:
+            start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
+            axes.axvspan(start - origin, end - origin, color=BLUE, alpha=0.15, linewidth=0)
         for values, color, label in _series(diagnosis, before, after):
             line = thin(*with_gaps(time[shown], values[shown, j]))
             axes.plot(*line, color=color, linewidth=0.9, label=label, rasterized=True)

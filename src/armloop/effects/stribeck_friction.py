@@ -1,0 +1,33 @@
+"""Dry friction that is larger at low speed: the Stribeck part of Eq. (34) of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.effects.base import Array, Context, ProfiledJointEffect
+from armloop.motion import Motion
+
+
+class StribeckFriction(ProfiledJointEffect):
+    """tau_j += d exp(-(v_j/v_s)^2) sign(v_j)."""
+
+    name = "stribeck_friction"
+    parameter = "static_excess"
+    shape_name = "velocity"
+    unit = "TAU"
+    shape_unit = "POS/s"
+    law = "d exp(-(v/vs)^2) sign(v)"
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        assert self.joint is not None
+        speed = np.abs(context.motion.v[:, self.joint - 1])
+        slowest, fastest = np.quantile(speed, 0.02), np.quantile(speed, 0.98)
+        # Below the slowest speeds an exponential cannot be seen, beyond half the fastest it is a level with drag.
+        low, high = max(float(slowest), 1e-3 * float(fastest)), 0.5 * float(fastest)
+        return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
+
+    def column(self, motion: Motion, joint: int, shape: float) -> Array:
+        v = motion.v[:, joint]
+        return np.exp(-((v / shape) ** 2)) * np.sign(v)

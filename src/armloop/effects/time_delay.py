@@ -1,0 +1,55 @@
+"""A torque that is recorded later than the motion it belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.effects.base import Array, Context, Effect, Estimate, Value, number
+
+
+class TimeDelay(Effect):
+    """recorded tau(t) = true tau(t - d), all joints alike: a fault of the recording."""
+
+    name = "time_delay"
+    joint_wise = False
+    sensor = True
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        # Delays of some milliseconds to a fifth of a second, either way; at each the column is exact.
+        sizes = np.geomspace(0.002, 0.2, 12)
+        return [float(d) for d in np.concatenate([-sizes[::-1], sizes])]
+
+    def columns(self, context: Context, shape: float) -> Array:
+        return (self._late(context, shape) / shape)[:, :, None]
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        return self._late(context, number(parameters["seconds"]))
+
+    def _late(self, context: Context, delay: float) -> Array:
+        """tau(t - d) - tau(t), run by run; what was before a run is taken to be as at its start."""
+        assert context.predicted is not None
+        motion, tau = context.motion, context.predicted
+        late = np.empty_like(tau)
+        for run in motion.runs():
+            t = motion.time[run]
+            for j in range(tau.shape[1]):
+                late[run, j] = np.interp(t - delay, t, tau[run, j])
+        return late - tau
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        error = float(np.sqrt(max(covariance[0, 0], 0.0)))
+        return {"seconds": Estimate(float(x[0]), error, "s")}
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return abs(number(parameters["seconds"].value)) < 0.3
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        e = parameters["seconds"]
+        way = "later" if number(e.value) > 0 else "earlier"
+        return (
+            f"the torque is recorded {1e3 * abs(number(e.value)):.3g} ± {1e3 * number(e.std_error):.2g} ms {way} than "
+            "the motion: the recording, not the arm"
+        )

@@ -1,0 +1,164 @@
+"""Comparing verdicts with what was hidden: right, wrong, confused with what, at which size, how far off."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from armloop.reports.tables import table
+
+#: The target: where each effect is at least this share of its joint's torque RMS.
+LARGE = 0.03
+#: A parameter is right within a tenth, or three of its standard errors.
+TOLERANCE, ERRORS = 0.1, 3.0
+#: Effects that no motion can tell apart: naming one with the other as its alternative is all there is to say.
+SAME = ({"torque_offset", "friction_asymmetry"},)
+
+Case = tuple[dict[str, Any], dict[str, Any]]
+
+
+def place(effect: dict[str, Any]) -> tuple[Any, ...]:
+    """Name and joints."""
+    return effect["effect" if "effect" in effect else "name"], effect["joint"], effect.get("other_joint")
+
+
+def _readings(effect: dict[str, Any]) -> set[tuple[Any, ...]]:
+    """The places that a found effect stands for: its own, and an alternative that is the same column on any motion."""
+    readings = {place(effect)}
+    for rival in effect["alternatives"]:
+        if any({effect["effect"], rival["effect"]} == pair for pair in SAME):
+            readings.add(place(rival))
+    return readings
+
+
+def is_right(hidden: dict[str, Any], verdict: dict[str, Any]) -> bool:
+    """Whether exactly what was hidden was found, nothing more and nothing less."""
+    found = [effect for effect in verdict["effects"] if effect["effect"] != "unlisted"]
+    unlisted = len(found) < len(verdict["effects"])
+    if hidden["kind"] == "unlisted":
+        return verdict["verdict"] == "unlisted_effect"
+    if hidden["kind"] == "clean":
+        return verdict["verdict"] == "no_effect"
+    if unlisted or len(found) != len(hidden["effects"]):
+        return False
+    truths = [place(effect) for effect in hidden["effects"]]
+    return all(any(truth in _readings(effect) for effect in found) for truth in truths)
+
+
+def deviations(hidden: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str, float, float]]:
+    """(name, relative error, error in standard errors) of the parameters of effects that were named rightly."""
+    out = []
+    for truth in hidden["effects"]:
+        for found in verdict["effects"]:
+            if place(found) != place(truth):
+                continue
+            for key, value in truth["parameters"].items():
+                if key not in found["parameters"] or key in ("phase", "ratio", "order"):
+                    continue
+                estimate = found["parameters"][key]
+                off = np.linalg.norm(np.subtract(estimate["value"], value))
+                error = float(np.linalg.norm(np.atleast_1d(estimate["std_error"])))
+                size = float(np.linalg.norm(np.atleast_1d(value)))
+                out.append(
+                    (f"{truth['name']}.{key}", float(off) / max(size, 1e-9), float(off) / max(error, 1e-12))
+                )
+    return out
+
+
+def print_verdicts(cases: dict[str, Case]) -> int:
+    """Print everything; return 0 if the targets are met."""
+    rows, wrong = [], []
+    for name, (hidden, verdict) in sorted(cases.items()):
+        if not is_right(hidden, verdict):
+            truth = ", ".join(_words(e) for e in hidden["effects"]) or hidden["law"] or "nothing"
+            got = ", ".join(_words(e) for e in verdict["effects"]) or verdict["verdict"]
+            sizes = ", ".join(f"{100 * s:.1f} %" for s in hidden["sizes"])
+            wrong.append([name, truth, sizes, got])
+    print(table(["case", "hidden", "size", "verdict"], wrong, "Not judged rightly"))
+    met = True
+    for kind, target in (("one", 0.95), ("two", 0.85), ("unlisted", 0.9), ("clean", 0.95)):
+        mine = [case for case in cases.values() if case[0]["kind"] == kind]
+        large = [case for case in mine if min(case[0]["sizes"], default=1.0) >= LARGE]
+        right, right_large = (sum(is_right(*case) for case in some) for some in (mine, large))
+        share = right_large / len(large) if large else 1.0
+        met &= share >= target
+        rows.append(
+            [
+                kind,
+                f"{right} of {len(mine)}",
+                f"{right_large} of {len(large)}",
+                f"{share:.0%}",
+                f"{target:.0%}",
+            ]
+        )
+    headers = ["hidden", "right, any size", f"right, size from {LARGE:.0%}", "share", "target"]
+    print(table(headers, rows, "Verdicts"))
+    print(_by_size(cases))
+    print(_by_effect(cases))
+    print(_parameters(cases))
+    return 0 if met else 1
+
+
+def _words(effect: dict[str, Any]) -> str:
+    name, joint, other = place(effect)
+    return f"{name} {joint or ''}{f'+{other}' if other else ''}".strip()
+
+
+def _by_size(cases: dict[str, Case]) -> str:
+    edges = [0.0, 0.015, 0.03, 0.06, 0.12, 1e9]
+    single = [case for case in cases.values() if case[0]["kind"] == "one"]
+    rows = []
+    for low, high in pairwise(edges):
+        mine = [case for case in single if low <= case[0]["sizes"][0] < high]
+        right = sum(is_right(*case) for case in mine)
+        silent = sum(case[1]["verdict"] == "no_effect" for case in mine)
+        label = f"{100 * low:g}–{100 * high:g} %" if high < 1e9 else f"from {100 * low:g} %"
+        rows.append([label, len(mine), right, silent])
+    return table(
+        ["share of torque RMS", "cases", "right", "no_effect"], rows, "Size against the chance of finding it"
+    )
+
+
+def _by_effect(cases: dict[str, Case]) -> str:
+    counts: dict[str, list[int]] = {}
+    confused: dict[str, Counter[str]] = {}
+    for hidden, verdict in cases.values():
+        if hidden["kind"] != "one" or hidden["sizes"][0] < LARGE:
+            continue
+        name = hidden["effects"][0]["name"]
+        count = counts.setdefault(name, [0, 0])
+        count[1] += 1
+        if is_right(hidden, verdict):
+            count[0] += 1
+        else:
+            got = " + ".join(e["effect"] for e in verdict["effects"]) or verdict["verdict"]
+            confused.setdefault(name, Counter())[got] += 1
+    rows = [
+        [
+            name,
+            f"{right} of {total}",
+            ", ".join(f"{k} ({c})" for k, c in confused.get(name, Counter()).items()),
+        ]
+        for name, (right, total) in sorted(counts.items())
+    ]
+    return table(["effect", "right", "taken for"], rows, f"One effect of at least {LARGE:.0%}")
+
+
+def _parameters(cases: dict[str, Case]) -> str:
+    found: dict[str, list[tuple[float, float]]] = {}
+    for hidden, verdict in cases.values():
+        if hidden["kind"] in ("one", "two") and min(hidden["sizes"]) >= LARGE:
+            for key, relative, standard in deviations(hidden, verdict):
+                found.setdefault(key, []).append((relative, standard))
+    rows = []
+    for key, values in sorted(found.items()):
+        relative, standard = np.array(values).T
+        good = np.mean((relative <= TOLERANCE) | (standard <= ERRORS))
+        rows.append(
+            [key, len(values), f"{np.median(relative):.1%}", f"{np.median(standard):.1f}", f"{good:.0%}"]
+        )
+    headers = ["parameter", "cases", "median off by", "median in standard errors", "within 10 % or 3 errors"]
+    return table(headers, rows, "Parameters of effects that were named rightly")
