@@ -25,6 +25,7 @@ COMMANDS = (
     "evaluate",
     "diagnose",
     "track",
+    "tune",
     "reproduce",
 )
 

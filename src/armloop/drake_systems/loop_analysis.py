@@ -21,6 +21,9 @@ from armloop.arm import Arm
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.plant import add_links
+from armloop.dynamics import ModelEquations
+from armloop.functions import MATH
+from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 
@@ -62,6 +65,83 @@ def posture_model(arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike) ->
     return np.asarray(plant.CalcMassMatrix(context)), np.diag([f.viscous for f in friction]), G
 
 
+def model_posture(model: ReconstructedModel, q0: ArrayLike) -> tuple[Array, Array, Array]:
+    """Return M, F, G (n, n) of an identified model at rest at q0 (n,), as `posture_model` does of the arm itself.
+
+    F is the slope of the model's friction between 0.5 and 1 rad/s (0.05 and 0.1 m/s), where dry friction is level.
+    """
+    equations = ModelEquations(model, MATH, symmetric=True)
+    q, n = np.asarray(q0, dtype=float).tolist(), model.arm.n
+    speed = np.where(model.arm.revolute, 1.0, 0.1)
+    fast, slow = (equations.friction((part * speed).tolist()) for part in (1.0, 0.5))
+    F = np.diag((np.array(fast, dtype=float) - np.array(slow, dtype=float)) / (0.5 * speed))
+    h, columns = 1e-5, []
+    for e in np.eye(n):
+        ahead, behind = (equations.gravity((np.array(q) + s * h * e).tolist()) for s in (1.0, -1.0))
+        columns.append((np.array(ahead, dtype=float) - np.array(behind, dtype=float)) / (2 * h))
+    return np.array(equations.mass_matrix(q), dtype=float), F, np.stack(columns, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledArm:
+    """An arm about a posture under torques held over each period: x+ = A x + B u, x = (dq, dq').
+
+    A : (2n, 2n); B : (2n, n); period : s
+    """
+
+    A: Array
+    B: Array
+    period: float
+
+    @staticmethod
+    def of(linear: tuple[Array, Array, Array], period: float) -> SampledArm:
+        """Sample M, F, G with a zero-order hold."""
+        M, F, G = linear
+        n = len(M)
+        inverse = np.linalg.inv(M)
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ G, -inverse @ F]])
+        B = np.vstack([np.zeros((n, n)), inverse])
+        sampled = control.sample_system(control.ss(A, B, np.eye(2 * n), np.zeros((2 * n, n))), period, "zoh")
+        return SampledArm(np.asarray(sampled.A), np.asarray(sampled.B), period)
+
+    def frequencies(self, points: int) -> Array:
+        """Return (points,) rad/s up to Nyquist."""
+        return np.geomspace(1e-2, np.pi / self.period, points)
+
+    def response(self, w: Array) -> Array:
+        """Return (W, 2n, n), the state's answer to torques at frequencies w (W,)."""
+        z = np.exp(1j * w * self.period)
+        size = len(self.A)
+        return np.asarray(
+            np.linalg.solve(
+                z[:, None, None] * np.eye(size) - self.A, np.broadcast_to(self.B, (len(w), *self.B.shape))
+            )
+        )
+
+    def loops(self, gains: PidGains, w: Array) -> Array:
+        """Return (W, n, n) open loops of PID: what the controllers of the rows answer to torques of the columns."""
+        X, n = self.response(w), len(gains.kp)
+        # The controller's law, with the sum that stands for the integral.
+        position = gains.kp + gains.ki * self.period / (np.exp(1j * w * self.period)[:, None] - 1)
+        return np.asarray(position[:, :, None] * X[:, :n] + gains.kd[:, None] * X[:, n:])
+
+    def closed(self, gains: PidGains) -> tuple[Array, Array]:
+        """Return A (3n, 3n) and B (3n, n) of the closed loop: state dq, dq', sum of errors; input the reference's dq."""
+        n = len(gains.kp)
+        kp, ki, kd, h = np.diag(gains.kp), np.diag(gains.ki), np.diag(gains.kd), self.period
+        A = np.block(
+            [
+                [self.A - self.B @ np.hstack([kp, kd]), self.B @ ki],
+                [-h * np.eye(n), np.zeros((n, n)), np.eye(n)],
+            ]
+        )
+        return A, np.vstack([self.B @ kp, h * np.eye(n)])
+
+    def is_stable(self, gains: PidGains) -> bool:
+        """Tell whether every mode of the closed loop decays."""
+        return bool(np.abs(np.linalg.eigvals(self.closed(gains)[0])).max() < 1 - 1e-9)
+
+
 def loop_margins(
     arm: Arm,
     friction: Sequence[JointFriction],
@@ -75,24 +155,18 @@ def loop_margins(
 
     period : s of the controller; points : frequencies looked at, up to Nyquist
     """
-    n = arm.n
-    M, F, G = posture_model(arm, friction, q0)
-    inverse = np.linalg.inv(M)
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ G, -inverse @ F]])
-    B = np.vstack([np.zeros((n, n)), inverse])
-    sampled = control.sample_system(control.ss(A, B, np.eye(2 * n), np.zeros((2 * n, n))), period, "zoh")
-    w = np.geomspace(1e-2, np.pi / period, points)
-    z = np.exp(1j * w * period)
-    X = np.linalg.solve(
-        z[:, None, None] * np.eye(2 * n) - sampled.A, np.broadcast_to(sampled.B, (points, 2 * n, n))
-    )
-    # The controller's law, with the sum that stands for the integral.
-    position = gains.kp + gains.ki * period / (z[:, None] - 1)
-    L = position[:, :, None] * X[:, :n] + gains.kd[:, None] * X[:, n:]  # (points, n, n)
-    return [_margins(_cut(L, i), w) for i in range(n)]
+    sampled = SampledArm.of(posture_model(arm, friction, q0), period)
+    return sampled_margins(sampled, gains, points=points)
 
 
-def _cut(L: Array, i: int) -> Array:
+def sampled_margins(sampled: SampledArm, gains: PidGains, *, points: int = 2000) -> list[LoopMargins]:
+    """Return the margins of every joint's loop of a sampled arm."""
+    w = sampled.frequencies(points)
+    L = sampled.loops(gains, w)
+    return [_margins(cut_loop(L, i), w) for i in range(len(gains.kp))]
+
+
+def cut_loop(L: Array, i: int) -> Array:
     """Return (W,) joint i's loop with the others closed, out of the open loops L (W, n, n)."""
     others = np.arange(L.shape[1]) != i
     closed = np.eye(int(others.sum())) + L[:, others][:, :, others]

@@ -4,6 +4,7 @@ from armloop.loop.collecting import collect_logs
 from armloop.loop.pickup import run_pickup_scenario
 from armloop.loop.run import LoopResult, run_loop
 from armloop.loop.tracking import run_scenario
+from armloop.loop.tuning import tune_scenario
 from armloop.loop.wear import run_wear_scenario
 
 __all__ = [
@@ -13,4 +14,5 @@ __all__ = [
     "run_pickup_scenario",
     "run_scenario",
     "run_wear_scenario",
+    "tune_scenario",
 ]

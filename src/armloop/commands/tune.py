@@ -1,0 +1,56 @@
+"""Margins of a scenario's gains, and gains for a wanted bandwidth and margin."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import add_json
+
+HELP = "margins of a tracking scenario's PID gains, and gains for a wanted bandwidth and phase margin"
+EXAMPLE = "armloop tune three_axis_tracking --bandwidth 5 --margin 60 --out out/tune"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument("scenario", metavar="SCENARIO", help="as for `armloop track`")
+    p.add_argument("--arm", default=None, metavar="URDF", help="the arm of a scenario that leaves it open")
+    p.add_argument(
+        "--bandwidth",
+        type=float,
+        default=5.0,
+        metavar="HZ",
+        help="of every joint's closed loop; 5 by default",
+    )
+    p.add_argument("--margin", type=float, default=60.0, metavar="DEG", help="phase margin; 60 by default")
+    p.add_argument(
+        "--model",
+        default=None,
+        metavar="MODEL.json",
+        help="a reconstructed model to design with; by default the simulated arm's own inertia",
+    )
+    p.add_argument("--out", default=None, help="folder for tune.json, bode.png and step.png")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Analyse the gains of a scenario and propose others."""
+    from math import pi
+
+    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.drake_systems.scenarios import load_tracking
+    from armloop.loop import tune_scenario
+    from armloop.model import load_model
+    from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+
+    folder = out_folder(options.out) if options.out else None
+    scenario = load_tracking(options.scenario, options.arm)
+    model = load_model(options.model, scenario.plant.arm) if options.model else None
+    answer, tuning = tune_scenario(
+        scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress(options)
+    )
+    if options.json:
+        print_json(answer)
+        return
+    print("\n\n".join(str(table(tuning)) for table in (gains_table, margins_table, verified_table)))
+    if folder is not None:
+        print(f"\nwritten: {folder}/tune.json, bode.png, step.png")

@@ -1,0 +1,89 @@
+"""Gains of a tracking scenario: the margins they have, gains that would have others, and what the simulated arm says."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.drake_systems.gain_design import propose_gains
+from armloop.drake_systems.loop_analysis import model_posture, posture_model
+from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.drake_systems.tuned_loop import TunedLoop, Tuning, look_at
+from armloop.files import replacing, write_text
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress
+
+SCHEMA = "armloop/tune/1"
+
+
+def tune_scenario(
+    scenario: TrackingScenario,
+    bandwidth: float,
+    margin: float,
+    model: ReconstructedModel | None,
+    folder: Path | None,
+    progress: Progress,
+) -> tuple[dict[str, Any], Tuning]:
+    """Analyse a scenario's gains, propose others, try both; write tune.json, bode.png and step.png.
+
+    Args:
+        bandwidth: rad/s; margin: deg.
+        model: whose inertia, friction and gravity the proposal is made with; by default the simulated arm's own. What the
+            gains come to is judged on the simulated arm in any case.
+
+    Raises:
+        InputError: there are no such gains.
+        ModelError: the model has no mass matrix.
+    """
+    plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
+    known = posture_model(plant.arm, plant.config.friction, q0) if model is None else model_posture(model, q0)
+    gains = propose_gains(known, plant.config.time_step, bandwidth, margin)
+    progress("trying the scenario's gains")
+    present = look_at(scenario, scenario.gains)
+    progress("trying the proposed gains")
+    tuning = Tuning(scenario, bandwidth, margin, present, look_at(scenario, gains))
+    answer = tuning_answer(tuning)
+    if folder is not None:
+        from armloop.reports.plots.loops import bode_figure, step_figure
+
+        write_text(folder / "tune.json", json.dumps(answer, indent=1) + "\n")
+        for name, draw in (("bode.png", bode_figure), ("step.png", step_figure)):
+            with replacing(folder / name) as draft:
+                draw(tuning).savefig(draft, format="png", dpi=110, facecolor="white")
+    return answer, tuning
+
+
+def tuning_answer(tuning: Tuning) -> dict[str, Any]:
+    """The content of ``tune.json``; null stands for what is not finite (any gain, no crossing)."""
+    scenario = tuning.scenario
+    return {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "arm": scenario.plant.arm.name,
+        "posture": scenario.reference.evaluate([0.0])[0][0].tolist(),
+        "wanted": {"bandwidth_hz": tuning.bandwidth / (2 * np.pi), "margin_deg": tuning.margin},
+        "present": _answer(tuning.present),
+        "proposed": _answer(tuning.proposed),
+    }
+
+
+def _answer(loop: TunedLoop) -> dict[str, Any]:
+    gains, (phase, peak) = loop.gains, loop.worst
+    return {
+        "gains": {"kp": gains.kp.tolist(), "ki": gains.ki.tolist(), "kd": gains.kd.tolist()},
+        "stable": loop.stable,
+        "loop": [
+            {key: value if np.isfinite(value) else None for key, value in asdict(m).items()}
+            for m in loop.margins
+        ],
+        "along_reference": {
+            "phase_margin": [x if np.isfinite(x) else None for x in phase.tolist()],
+            "sensitivity_peak": peak.tolist(),
+        },
+        "step_deviation": loop.deviation().tolist(),
+        "eta_deg": {name: result.eta.tolist() for name, result in loop.tracking.items()},
+    }

@@ -1,0 +1,66 @@
+"""Bode and step plots of PID loops, the scenario's gains beside the proposed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from armloop.reports.plots.style import BLUE, GRID, MUTED, ORANGE, figure, legend, panels, polish
+
+if TYPE_CHECKING:
+    from armloop.drake_systems.tuned_loop import TunedLoop, Tuning
+
+
+def _both(tuning: Tuning) -> Iterator[tuple[str, str, TunedLoop]]:
+    yield "the scenario's gains", ORANGE, tuning.present
+    yield "proposed gains", BLUE, tuning.proposed
+
+
+def bode_figure(tuning: Tuning) -> Figure:
+    """Magnitude and phase of every joint's open loop, the other joints' loops closed; lines at 1 and at -180 deg."""
+    n = len(tuning.present.margins)
+    made = figure(max(5.5, 3.0 * n), 5.2)
+    grid = panels(made, 2, n, sharex=True)
+    for j in range(n):
+        magnitude, phase = grid[0, j], grid[1, j]
+        for label, color, loop in _both(tuning):
+            L, hertz = loop.loops[:, j], loop.w / (2 * np.pi)
+            magnitude.loglog(hertz, np.abs(L), color=color, linewidth=1.4, label=label)
+            phase.semilogx(hertz, np.rad2deg(np.unwrap(np.angle(L))), color=color, linewidth=1.4, label=label)
+        magnitude.axhline(1, color=MUTED, linewidth=1)
+        phase.axhline(-180, color=MUTED, linewidth=1)
+        polish(magnitude, "", "|L|", f"Joint {j + 1}")
+        polish(phase, "frequency [Hz]", "phase [deg]")
+    legend(made, 2)
+    return made
+
+
+def step_figure(tuning: Tuning) -> Figure:
+    """The answer of every joint to a small step of all: linear loop, simulated arm without and with dry friction."""
+    plant = tuning.scenario.plant
+    n = plant.arm.n
+    made = figure(max(5.5, 3.0 * n), 5.2)
+    grid = panels(made, 2, n, sharex="row")
+    for row, (label, color, loop) in enumerate(_both(tuning)):
+        for j in range(n):
+            axes = grid[row, j]
+            axes.plot(
+                loop.time, loop.linear[:, j], color=MUTED, linewidth=3.2, alpha=0.5, label="linear loop"
+            )
+            axes.plot(loop.time, loop.smooth[:, j], color=color, linewidth=1.3, label=f"simulated, {label}")
+            axes.plot(
+                loop.time,
+                loop.dry[:, j],
+                color=color,
+                linewidth=1.1,
+                linestyle=":",
+                label="with dry friction",
+            )
+            axes.axhline(1, color=GRID, linewidth=1)
+            unit = "deg" if plant.arm.revolute[j] else "mm"
+            polish(axes, "time [s]" if row else "", f"step [{unit}]", "" if row else f"Joint {j + 1}")
+    legend(made, 4)
+    return made

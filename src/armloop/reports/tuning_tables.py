@@ -1,0 +1,60 @@
+"""Tables of a tuning: gains, margins and errors, the scenario's own beside the proposed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armloop.reports.tables import Table, make_table, percent
+
+if TYPE_CHECKING:
+    from armloop.drake_systems.tuned_loop import TunedLoop, Tuning
+
+
+def gains_table(tuning: Tuning, title: str | None = "Gains") -> Table:
+    """k_p, k_i, k_d per joint."""
+    rows = [
+        [name, j + 1, *(float(x[j]) for x in (loop.gains.kp, loop.gains.ki, loop.gains.kd))]
+        for name, loop in _both(tuning)
+        for j in range(len(loop.margins))
+    ]
+    return make_table(["gains", "joint", "kp [N·m/rad, N/m]", "ki", "kd"], rows, title)
+
+
+def margins_table(tuning: Tuning, title: str | None = "Loops, the other joints' closed") -> Table:
+    """Phase and gain margin, bandwidth and sensitivity peak per joint; the worst along the reference beside them."""
+    rows: list[list[object]] = []
+    for name, loop in _both(tuning):
+        for j, m in enumerate(loop.margins):
+            rows.append(
+                [
+                    name if loop.stable else f"{name} (UNSTABLE)",
+                    j + 1,
+                    m.phase_margin,
+                    float(loop.worst[0][j]),
+                    m.gain_margin,
+                    m.bandwidth / (2 * np.pi),
+                    m.sensitivity_peak,
+                    float(loop.worst[1][j]),
+                ]
+            )
+    headers = ["phase margin [deg]", "worst", "gain margin", "bandwidth [Hz]", "peak |S|", "worst"]
+    return make_table(["gains", "joint", *headers], rows, title)
+
+
+def verified_table(tuning: Tuning, title: str | None = "On the simulated arm") -> Table:
+    """Per joint how far a small step is from the linear answer, and η by PID alone and with the exact model."""
+    rows: list[list[object]] = []
+    for name, loop in _both(tuning):
+        pid, exact = loop.tracking["pid"], loop.tracking["exact"]
+        for j, unit in enumerate(pid.unit):
+            off = percent(float(loop.deviation()[j]))
+            rows.append([name, j + 1, off, float(pid.eta[j]), float(exact.eta[j]), unit])
+    return make_table(
+        ["gains", "joint", "step off linear", "η PID", "η PID + exact model", "unit"], rows, title
+    )
+
+
+def _both(tuning: Tuning) -> tuple[tuple[str, TunedLoop], ...]:
+    return ("scenario", tuning.present), ("proposed", tuning.proposed)

@@ -1,0 +1,30 @@
+"""The tuning of a scenario, start to end, on a short reference."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from armloop.drake_systems.scenarios import load_tracking
+from armloop.loop import tune_scenario
+from armloop.progress import silent
+from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+
+
+def test_files_tables_and_a_better_loop(tmp_path):
+    built_in = load_tracking("three_axis_tracking")
+    scenario = dataclasses.replace(
+        built_in, reference=dataclasses.replace(built_in.reference, duration=0.6), score=(0.1, 0.6)
+    )
+    answer, tuning = tune_scenario(scenario, 2 * np.pi * 5, 60.0, None, tmp_path, silent)
+    assert json.loads((tmp_path / "tune.json").read_text()) == answer
+    assert {"bode.png", "step.png"} <= {path.name for path in tmp_path.iterdir()}
+    assert answer["present"]["gains"]["kp"] == [80.0] * 3
+    assert answer["present"]["stable"] and answer["proposed"]["stable"]
+    assert max(answer["present"]["step_deviation"] + answer["proposed"]["step_deviation"]) < 0.03
+    # stiffer gains follow better without a model
+    assert np.mean(answer["proposed"]["eta_deg"]["pid"]) < np.mean(answer["present"]["eta_deg"]["pid"])
+    assert min(m["phase_margin"] for m in answer["proposed"]["loop"]) == pytest.approx(60, abs=5)
+    for table in (gains_table, margins_table, verified_table):
+        assert len(table(tuning).rows) == 6
