@@ -30,7 +30,9 @@ class ExactModel:
         realised = realise(arm, effects)
         self._friction = [
             JointFriction(f.static + level, f.coulomb + level, f.stribeck_velocity, f.viscous + viscous)
-            for f, level, viscous in zip(friction, realised.coulomb, realised.viscous, strict=True)
+            for f, level, viscous in zip(
+                friction, [dry.level for dry in realised.dry], realised.viscous, strict=True
+            )
         ]
         self._plant = MultibodyPlant(0.0)
         add_links(self._plant, arm, realised)
