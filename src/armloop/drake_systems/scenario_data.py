@@ -7,9 +7,10 @@ knows `Optional[X]`, not `X | None`.
 from dataclasses import dataclass, field
 from typing import Optional
 
-CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "exact")
-"""PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with the
-simulated arm's own inverse dynamics, which no reconstruction can reach."""
+CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "bounded", "exact")
+"""PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with Step III
+on the motion nearest to the reference that keeps the torque limits; PID with the simulated arm's own inverse dynamics,
+which no reconstruction can reach."""
 PAPER = ("pid", "pid_step1", "pid_step3")
 """The controllers of Fig. 15."""
 
@@ -104,6 +105,14 @@ class WearData:
 
 
 @dataclass
+class LimitsData:
+    """What the drives can do, where it is less than the URDF says."""
+
+    effort: list[float] = field(default_factory=list)  # N*m (N), one per joint
+    used: float = 0.95  # share of the effort that `bounded` plans with; the rest is left to the feedback
+
+
+@dataclass
 class TrackingData:
     """A tracking experiment."""
 
@@ -117,5 +126,6 @@ class TrackingData:
     controllers: list[str] = field(default_factory=lambda: list(PAPER))
     bandwidth: float = 20.0  # rad/s, of computed torque: errors decay critically damped
     random_seed: int = 0
+    limits: Optional[LimitsData] = None
     pickup: Optional[PickupData] = None
     wear: Optional[WearData] = None

@@ -21,6 +21,7 @@ from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.scenario_data import (
     CONTROLLERS,
     PAPER,
+    LimitsData,
     PickupData,
     PlanData,
     PlantData,
@@ -70,6 +71,7 @@ class TrackingScenario:
 
     score : (start, end) s, the interval that is scored; controllers : names among `CONTROLLERS`
     bandwidth : rad/s, of computed torque
+    limits : (n,) N*m (N), the torques that `bounded` plans with
     """
 
     name: str
@@ -82,6 +84,7 @@ class TrackingScenario:
     bandwidth: float = 20.0
     pickup: Pickup | None = None
     wear: Wear | None = None
+    limits: np.ndarray | None = None
 
 
 def plant_names() -> list[str]:
@@ -142,7 +145,7 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
     Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
     """
     path, name, where, data = scenario_entry(spec, TrackingData)
-    plant = _plant_of(data, name, path, where, arm)
+    plant, limits = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
     n, period = plant.arm.n, plant.config.time_step
     reference = reference_of(data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where)
     gains = [per_joint(getattr(data, key), n, f"{where}: {key}") for key in ("kp", "ki", "kd")]
@@ -172,7 +175,25 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         data.bandwidth,
         _pickup(data.pickup, plant.arm, reference, where),
         _wear(data.wear, where),
+        limits,
     )
+
+
+def _limited(data: LimitsData | None, plant: Plant, where: str) -> tuple[Plant, np.ndarray]:
+    """Return the plant with the drives' limits, and (n,) what of them may be planned with."""
+    arm = plant.arm
+    effort, used = np.array([joint.effort for joint in arm.joints]), LimitsData().used
+    if data is not None:
+        effort, used = per_joint(data.effort, arm.n, f"{where}: limits.effort"), data.used
+        if np.any(effort <= 0):
+            raise ScenarioError(f"{where}: limits.effort must be above 0")
+        if not 0.1 <= used <= 1:
+            raise ScenarioError(f"{where}: limits.used is {used}; it must be 0.1 to 1")
+        joints = tuple(
+            dataclasses.replace(joint, effort=float(e)) for joint, e in zip(arm.joints, effort, strict=True)
+        )
+        plant = dataclasses.replace(plant, arm=dataclasses.replace(arm, joints=joints))
+    return plant, used * effort
 
 
 def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:

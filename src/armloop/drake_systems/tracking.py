@@ -13,6 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
+from armloop.drake_systems.bounded_feedforward import bounded_reference
 from armloop.drake_systems.closed_loop import ControlledArm, add_arm_with_controller
 from armloop.drake_systems.computed_torque import AccelerationGains
 from armloop.drake_systems.effects import UndeclaredEffect
@@ -20,6 +21,7 @@ from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,7 @@ MAIN_MODEL = "model"
 STEPS = {"step1": 1, "step2": 2, "step3": 3}
 """The names in `models` of the ones behind `pid_step1`, `pid_step2` and `pid_step3` alone, and their steps."""
 COMPUTED_TORQUE = "computed_torque"
+BOUNDED = "bounded"
 EXACT = "exact"
 
 
@@ -62,13 +65,13 @@ def needs_model(controller: str) -> bool:
 def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
     """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
     own = [
-        name if name == COMPUTED_TORQUE else f"pid_{name}"
+        name if name in (COMPUTED_TORQUE, BOUNDED) else f"pid_{name}"
         for name in models
         if name not in (MAIN_MODEL, EXACT)
     ]
     served = {"pid", EXACT, *own}
     if MAIN_MODEL in models:
-        served |= {COMPUTED_TORQUE, *(f"pid_{name}" for name in STEPS)}
+        served |= {COMPUTED_TORQUE, BOUNDED, *(f"pid_{name}" for name in STEPS)}
     names = [name for name in scenario.controllers if name in served]
     return names + [name for name in own if name not in names]
 
@@ -139,10 +142,9 @@ def track(
     simulator.Initialize()
     simulator.AdvanceTo(scenario.reference.duration)
     log = states.FindLog(context)
-    tables = systems.reference.tables
-    return score(
-        scenario, controller, log.sample_times(), tables, log.data().T, torques.FindLog(context).data().T
-    )
+    time = log.sample_times()
+    tables = systems.reference.tables if controller != BOUNDED else scenario.reference.evaluate(time)
+    return score(scenario, controller, time, tables, log.data().T, torques.FindLog(context).data().T)
 
 
 def add_controlled_arm(
@@ -167,9 +169,12 @@ def add_controlled_arm(
         return add_arm_with_controller(
             builder, plant, gains, scenario.reference, model, controller=controller, effects=effects
         )
-    return add_arm_with_controller(
-        builder, plant, scenario.gains, scenario.reference, model, step, effects=effects
-    )
+    reference = scenario.reference
+    if controller == BOUNDED:
+        if not isinstance(model, ReconstructedModel) or scenario.limits is None:
+            raise ValueError("bounded needs a reconstructed model and the scenario's limits")
+        reference = bounded_reference(reference, model, scenario.limits)
+    return add_arm_with_controller(builder, plant, scenario.gains, reference, model, step, effects=effects)
 
 
 def _feedforward(
@@ -179,7 +184,7 @@ def _feedforward(
     if controller == "pid":
         return None, 3
     name = controller.removeprefix("pid_")
-    model = models.get(name, models.get(MAIN_MODEL) if name in (*STEPS, COMPUTED_TORQUE) else None)
+    model = models.get(name, models.get(MAIN_MODEL) if name in (*STEPS, COMPUTED_TORQUE, BOUNDED) else None)
     if model is None:
         given = ", ".join(models) or "none"
         raise ValueError(f"there is no model for the controller {controller}; the models given are: {given}")

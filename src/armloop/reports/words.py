@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 MISSING = "–"
 
 _STEPS = {"step1": "Step I", "step2": "Step II", "step3": "Step III"}
-_OTHER_CONTROLLERS = {"computed_torque": "computed torque", "exact": "PID + exact model"}
+_OTHER_CONTROLLERS = {
+    "computed_torque": "computed torque",
+    "bounded": "PID + Step III within limits",
+    "exact": "PID + exact model",
+}
 _UNITS = {"*": "·", "^2": "²", "^3": "³"}
 
 

@@ -1,0 +1,105 @@
+"""Motions within torque limits, judged by Drake's inverse dynamics."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exact_model import ExactModel
+from numpy.testing import assert_allclose
+
+from armloop.drake_systems.bounded_feedforward import bounded_reference
+from armloop.drake_systems.exact import exact_model
+from armloop.drake_systems.scenarios import load_plant, load_tracking
+from armloop.drake_systems.tracking import run_tracking
+from armloop.errors import InputError, ScenarioError
+from armloop.excitation import places_reference
+
+PLACES = [[0.9, -0.7, 0.02, -0.3], [-0.6, 0.9, 0.02, 0.4]]
+
+
+@pytest.fixture(scope="module")
+def scara():
+    return load_plant("scara")
+
+
+@pytest.fixture(scope="module")
+def hurry(scara):
+    return places_reference(PLACES, scara.config.ranges, dwell=0.2, pace=2.5)
+
+
+@pytest.fixture(scope="module")
+def effort(scara, hurry):
+    """Three quarters of the largest torque that is asked for; what holds the vertical joint is not touched."""
+    peaks = np.abs(torques(scara, hurry)).max(axis=0)
+    return np.where(scara.arm.revolute, 0.75 * peaks, 50.0)
+
+
+def torques(plant, reference):
+    exact = ExactModel(plant.arm, plant.config.friction)
+    t = np.arange(0.0, reference.duration, 0.01)
+    return np.array([exact.feedforward(*state, 3) for state in zip(*reference.evaluate(t), strict=True)])
+
+
+def test_torques_keep_the_limits(scara, hurry, effort):
+    model = exact_model(scara.arm, scara.config.friction)
+    bounded = bounded_reference(hurry, model, effort)
+    asked, kept = torques(scara, hurry), torques(scara, bounded)
+    assert (np.abs(asked) > effort).any(axis=0).tolist() == [True, True, False, True]
+    # which of the Stribeck levels acts depends on the deviation's own speed
+    doubt = np.array([f.static - f.coulomb for f in scara.config.friction])
+    assert np.all(np.abs(kept) < 1.01 * effort + doubt)
+    assert (np.abs(kept) > 1.02 * effort).mean() < 0.02
+    t = np.linspace(0, hurry.duration, 20_001)
+    # positions, velocities and accelerations belong together
+    q, v, _ = bounded.evaluate(t)
+    assert_allclose(np.gradient(q, t, axis=0)[2:-2], v[2:-2], atol=5e-3)
+
+
+def test_limits_that_do_not_bind_change_nothing(scara, hurry, effort):
+    model = exact_model(scara.arm, scara.config.friction)
+    t = np.linspace(0, hurry.duration, 200)
+    free = bounded_reference(hurry, model, 100 * effort)
+    assert_allclose(free.evaluate(t)[0], hurry.evaluate(t)[0], atol=1e-6)
+
+
+def test_what_gravity_alone_exceeds_is_refused():
+    plant = load_plant("three_axis")
+    stretched = places_reference([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], plant.config.ranges, dwell=0.3, pace=1.0)
+    with pytest.raises(InputError, match="no motion near the reference keeps the torque limits"):
+        bounded_reference(
+            stretched, exact_model(plant.arm, plant.config.friction), np.array([30.0, 0.5, 20.0])
+        )
+
+
+def test_within_limits_the_arm_follows_better_than_clipped(hurry, effort):
+    built_in = load_tracking("torque_limits")
+    plant = built_in.plant
+    assert [joint.effort for joint in plant.arm.joints] == [3.0, 1.75, 50.0, 1.0]
+    joints = tuple(
+        dataclasses.replace(j, effort=float(e)) for j, e in zip(plant.arm.joints, effort, strict=True)
+    )
+    scenario = dataclasses.replace(
+        built_in,
+        plant=dataclasses.replace(plant, arm=dataclasses.replace(plant.arm, joints=joints)),
+        reference=hurry,
+        score=(0.0, hurry.duration),
+        controllers=("pid_step3", "bounded"),
+        limits=0.95 * effort,
+    )
+    results = run_tracking(scenario, {"model": exact_model(plant.arm, plant.config.friction)})
+    clipped, bounded = results["pid_step3"], results["bounded"]
+    turning = [0, 1, 3]
+    assert np.all(bounded.largest[turning] < clipped.largest[turning])
+    assert np.all(bounded.eta[turning] < clipped.eta[turning])
+
+
+def test_what_is_wrong_with_limits_is_told(tmp_path):
+    path = tmp_path / "mine.yaml"
+    for fields, message in (
+        ("effort: [1.0, 2.0]", "limits.effort has 2 numbers"),
+        ("effort: [0.0]", "limits.effort must be above 0"),
+        ("effort: [9.0], used: 2.0", "limits.used is 2.0"),
+    ):
+        path.write_text(f"plant: three_axis\nlimits: {{{fields}}}\n")
+        with pytest.raises(ScenarioError, match=rf"mine.yaml: {message}"):
+            load_tracking(path)
