@@ -17,6 +17,7 @@ pytestmark = pytest.mark.measured
 GAINS = "11.75,11.98,9.83,10.75,10.55,10.9"
 LEFT_OUT = "noload_20_02_12-50sec_12harm.csv"
 LOADED = "load_20_01_31-load.csv"
+PUSHED = "collision_pose_1.csv"
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +89,26 @@ def test_the_log_left_out_shows_no_effect(
 ) -> None:
     found = answer(capsys, ["diagnose", str(model), str(ur10e / LEFT_OUT), "--out", str(tmp_path)])
     assert (found["verdict"], found["effects"]) == ("no_effect", [])
+
+
+def test_four_pushes_by_hand_are_found_where_they_were(
+    model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The arm creeps, so that most of the time its joints stick; the intervals are those of the data's README."""
+    found = answer(capsys, ["diagnose", str(model), str(ur10e / PUSHED), "--out", str(tmp_path)])
+    assert found["verdict"] == "effects_found"
+    assert [effect["effect"] for effect in found["effects"]] == ["external_contact"] * 4
+    intervals = [
+        [effect["parameters"][key]["value"] for key in ("start", "end")] for effect in found["effects"]
+    ]
+    expected = [[2.1, 2.6], [4.8, 5.9], [8.6, 9.3], [12.0, 13.1]]
+    np.testing.assert_allclose(intervals, expected, atol=0.3)
+    assert all(effect["share"] > 0.5 for effect in found["effects"])
+    again = answer(
+        capsys,
+        ["diagnose", str(tmp_path / "model.json"), str(ur10e / PUSHED), "--out", str(tmp_path / "again")],
+    )
+    assert (again["verdict"], again["effects"]) == ("no_effect", [])
 
 
 def test_the_model_is_refused_for_another_arm(

@@ -169,8 +169,9 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
         left = evidence.residual([])
         nothing = fit(evidence, left, [], [])
         added = [contact.added for contact in contacts]
+        verdict = "effects_found" if contacts else "no_effect"
         return Diagnosis(
-            "effects_found",
+            verdict,
             Outcome([], nothing, nothing, left),
             model.with_effects(added),
             None,
