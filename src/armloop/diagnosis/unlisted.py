@@ -23,7 +23,8 @@ from armloop.regression.sparse import Sparse
 
 Array = NDArray[np.float64]
 
-#: A residual is real if it is this many times the model's own, and exceeds it by three standard errors.
+#: A residual is real if it is this many times what the model leaves on the worst tenth of its baseline, and exceeds
+#: that by three standard errors.
 EXCESS = 2.0
 #: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
 #: exactly, and no further effect.
@@ -69,7 +70,7 @@ def find_law(evidence: Evidence, before: Fit, after: Fit, progress: Progress) ->
         error = after.held_out[mine] ** 2
         if error.sum() < REMAINDER * float((before.held_out[mine] ** 2).sum()):
             continue
-        sums = block_sums(error - EXCESS**2, after.stacked.block[mine])
+        sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
         if sums.sum() > 3 * np.sqrt(len(sums)) * sums.std(ddof=1):
             ratios[j] = np.sqrt(error.mean())
     if not ratios.any():
