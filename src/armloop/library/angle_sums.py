@@ -16,18 +16,15 @@ from itertools import combinations_with_replacement, product
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.library.double_feature_set import SECOND_SETS, Factors, product_name, products
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.library.double_feature_set import SECOND_SETS, Candidates, Factors
 
 
 @dataclass(frozen=True)
-class AngleSums:
+class AngleSums(Candidates):
     """Candidates of truncation orders N1 and N2: one wave, powers of prismatic coordinates, rates.
 
     A drop-in for :class:`~armloop.library.double_feature_set.DoubleFeatureSet`, whose independent candidates
-    span the same functions.
+    span the same functions. Names are such as ``cos(2*q2+q3)*v1*v2``.
 
     Attributes:
         revolute: which joints turn.
@@ -55,13 +52,13 @@ class AngleSums:
         return tuple(k if turns else 0 for k, turns in zip(degrees, self.revolute, strict=True))
 
     @cached_property
-    def factors(self) -> Factors:
+    def factors(self) -> Factors:  # type: ignore[override]
         """The elementary functions the index refers to."""
         waves = dict.fromkeys(wave for wave in map(self._wave, self._degrees) if any(wave))
         return Factors(len(self.revolute), tuple(waves))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:
+    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
         """(T, K) indices of each candidate's factors; 0 stands for the factor 1."""
         factors = self.factors
         place = {wave: w for w, wave in enumerate(factors.waves)}
@@ -76,20 +73,6 @@ class AngleSums:
         rows = [sorted(e for e in a + b if e) for b in second for a in first]
         width = max(1, *map(len, rows))
         return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp)
-
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return len(self.index)
-
-    @cached_property
-    def names(self) -> list[str]:
-        """Readable names such as ``cos(2*q2+q3)*v1*v2``."""
-        return [product_name(row, self.factors.names) for row in self.index]
-
-    def columns(self, motion: Motion) -> Array:
-        """(N, T) values of the candidates."""
-        return products(self.factors.evaluate(motion), self.index)
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""

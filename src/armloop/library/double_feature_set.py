@@ -80,8 +80,30 @@ def _phase_name(wave: tuple[int, ...]) -> str:
     return parts.removeprefix("+")
 
 
+class Candidates:
+    """What a library of products of factors can do, whatever its factors are."""
+
+    factors: Factors
+    #: (T, K) indices of each candidate's factors; 0 stands for the factor 1.
+    index: NDArray[np.intp]
+
+    @property
+    def size(self) -> int:
+        """Number of candidates."""
+        return len(self.index)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Readable names such as ``sin(q2)^2*cos(q3)*v1*v2``."""
+        return [product_name(row, self.factors.names) for row in self.index]
+
+    def columns(self, motion: Motion) -> Array:
+        """(N, T) values of the candidates."""
+        return products(self.factors.evaluate(motion), self.index)
+
+
 @dataclass(frozen=True)
-class DoubleFeatureSet:
+class DoubleFeatureSet(Candidates):
     """Candidates of truncation orders N1 and N2.
 
     Attributes:
@@ -99,12 +121,12 @@ class DoubleFeatureSet:
     independent: bool = True
 
     @cached_property
-    def factors(self) -> Factors:
+    def factors(self) -> Factors:  # type: ignore[override]
         """The elementary functions the index refers to."""
         return Factors(len(self.revolute))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:
+    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
         """(T, N1 + N2) indices of each candidate's factors; 0 stands for the factor 1."""
         factors, n = self.factors, len(self.revolute)
         s, c, p = (factors.block(kind) for kind in "scq")
@@ -118,20 +140,6 @@ class DoubleFeatureSet:
         width = max(1, self.N1 + (self.N2 if rates else 0))
         rows = [sorted(a + b) for b in second for a in first]
         return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
-
-    @property
-    def size(self) -> int:
-        """Number of candidates."""
-        return len(self.index)
-
-    @cached_property
-    def names(self) -> list[str]:
-        """Readable names such as ``sin(q2)^2*cos(q3)*v1*v2``."""
-        return [product_name(row, self.factors.names) for row in self.index]
-
-    def columns(self, motion: Motion) -> Array:
-        """(N, T) values of the candidates."""
-        return products(self.factors.evaluate(motion), self.index)
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""
