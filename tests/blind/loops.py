@@ -3,7 +3,7 @@
 Every seed is a whole loop without the tracking: its own data collection, its own reconstructed model, its
 own second run. Clean runs have nothing hidden in them. The diagnosis is handed the model's file and the log.
 
-    python tests/blind/undeclared.py --seeds 20 --clean 5
+    python tests/blind/loops.py --seeds 20 --clean 5
 """
 
 from __future__ import annotations

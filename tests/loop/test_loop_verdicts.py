@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[1] / "blind" / "undeclared.py"
+SCRIPT = Path(__file__).resolve().parents[1] / "blind" / "loops.py"
 
 
 def blind():
