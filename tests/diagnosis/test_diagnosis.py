@@ -340,3 +340,21 @@ def test_a_reconstructed_model_serves_as_well_as_an_exact_one() -> None:
     np.testing.assert_allclose(parameters["com"]["value"], expected["com"], atol=0.03)
     clean = diagnose(reconstructed, [run(None, seed=24)]).to_dict()
     assert (clean["verdict"], clean["effects"]) == ("no_effect", [])
+
+
+def test_an_effect_must_exceed_what_the_model_leaves_on_the_worst_of_its_baseline(
+    model: ReconstructedModel,
+) -> None:
+    log = run(lambda m: on_joint(m, 1, 0.03 * np.sign(m.v[:, 0])), seed=7)
+    assert [e["effect"] for e in diagnose(model, [log]).to_dict()["effects"]] == ["coulomb_friction"]
+    worst = [5 * rmse for rmse in model.baseline["rmse"]]
+    careful = replace(model, baseline={**model.baseline, "worst": worst})
+    answer = diagnose(careful, [log]).to_dict()
+    assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
+
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 1, 0.1 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])
+
+    strange = run(law, seed=6)
+    assert diagnose(model, [strange]).verdict == "unlisted_effect"
+    assert diagnose(careful, [strange]).verdict == "no_effect"
