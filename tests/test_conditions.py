@@ -199,3 +199,18 @@ def test_the_study_tells_the_two_indicators_apart():
         assert rand[case, "paper"] < 0.7
     robust = [r for r in study.results if r.indicator == "robust"]
     assert max(r.missed for r in robust) < 0.01 and max(r.blind for r in robust) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_fast_motion_is_no_standstill_beside_joints_that_read_zero(seed: int) -> None:
+    # one joint moves, the others shake a little with it and else read exactly zero, as rounded records do
+    rng = np.random.default_rng(seed)
+    speed = np.repeat(rng.choice([0.0, 0.05, 0.3, 0.6, 0.9], 60), 50) * rng.choice([-1, 1])
+    v = np.zeros((len(speed), 3))
+    v[:, 0] = speed + 2e-3 * rng.normal(size=len(speed))
+    shaken = (np.abs(speed) > 0.2) & (rng.random(len(speed)) < 0.2)
+    v[shaken, 1:] = 5e-3 * rng.normal(size=(int(shaken.sum()), 2))
+    vdot = np.gradient(speed, 0.01)[:, None] * [1.0, 0.0, 0.0] + 1e-3 * rng.normal(size=v.shape)
+    motion = Motion(0.01 * np.arange(len(v)), np.cumsum(v, axis=0) * 0.01, v, vdot, np.array([0]))
+    static = sort_samples(motion).condition == Condition.STATIC
+    assert np.abs(v[static]).max(initial=0.0) < 0.02
