@@ -13,6 +13,7 @@ from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
+from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.search import Outcome, search, without_forced
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.effects import hypotheses
@@ -85,6 +86,8 @@ class Diagnosis:
                     **added.to_dict(),
                     "share": found.share,
                     "words": added.effect.sentence(added.parameters),
+                    "sensor": added.effect.sensor,
+                    **({"remedy": remedy(added)} if added.effect.sensor else {}),
                     "alternatives": [
                         {
                             "effect": rival.name,
