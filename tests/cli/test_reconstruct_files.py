@@ -57,3 +57,43 @@ def test_what_cannot_compute_is_said_in_one_line(
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert expected in line
     assert not (tmp_path / "model.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (
+            ("--library", "rigid-body", "--friction", "coulomb,sticky"),
+            "unknown friction law 'sticky'; there are: coulomb,",
+        ),
+        (("--library", "lagrangian", "--friction", ","), "no friction law is named; there are: coulomb,"),
+        (("--friction", "coulomb"), "laws are chosen with --library rigid-body or lagrangian"),
+        (
+            ("--method", "sindy", "--friction", "coulomb"),
+            "laws are chosen with --library rigid-body or lagrangian",
+        ),
+    ],
+)
+def test_friction_laws_that_cannot_be_chosen_are_said_in_one_line(
+    files: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    more: tuple[str, ...],
+    expected: str,
+) -> None:
+    assert reconstruct(files, tmp_path / "model.json", *more) == 2
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert expected in line
+    assert not (tmp_path / "model.json").exists()
+
+
+def test_friction_is_restricted_to_the_laws_named(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ("--library", "rigid-body", "--friction", "coulomb, viscous")
+    assert reconstruct(files, tmp_path / "model.json", *more) == 0
+    assert any(
+        "nothing but coulomb, viscous" in note for note in json.loads(capsys.readouterr().out)["notes"]
+    )
+    terms = json.loads((tmp_path / "model.json").read_text())["friction"]
+    assert {term["kind"] for joint in terms for term in joint} <= {"smooth_sign", "viscous"}

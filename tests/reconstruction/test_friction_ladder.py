@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.log import MotionLog
 from armloop.motion import Motion
 from armloop.reconstruction import Options, reconstruct
-from armloop.reconstruction.friction_ladder import inner_folds
+from armloop.reconstruction.friction_ladder import LAWS, inner_folds, restricted, rungs
 from armloop.signals import Conditioning, condition
 
 
@@ -34,6 +35,27 @@ def test_without_physics_coefficients_may_have_any_sign():
     free = reconstruct(logs, three_axis(), library="rigid-body", options=Options(physical=False))
     assert "constraints" not in free.model.history
     assert max(free.held_out.moving["nrmse"]) < 0.05
+
+
+@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+def test_only_the_laws_that_are_named_are_chosen(library: str) -> None:
+    def kinds(*names: str) -> set[str]:
+        options = Options(friction=names, standard_errors=False)
+        model = reconstruct([a_run(1, 0.1)], three_axis(), library=library, options=options).model
+        assert f"friction: nothing but {', '.join(names)} was allowed" in model.history["notes"]
+        return {term.kind for joint in model.friction.terms for term in joint}
+
+    assert kinds("viscous", "coulomb") == {"smooth_sign", "viscous"}
+    assert kinds("viscous") == {"viscous"}
+
+
+def test_every_element_of_the_ladder_belongs_to_a_law_with_a_name() -> None:
+    motion = fourier_motion(5.0, 100.0, 1)
+    ladder = rungs(three_axis(), motion)
+    elements = {term.kind for rung in ladder for own in rung.elements for term in own}
+    assert elements == {kind for law in LAWS.values() for kind in law}
+    assert restricted(ladder, tuple(LAWS)) == restricted(ladder, None) == ladder
+    assert [rung.name for rung in restricted(ladder, ("presliding", "coulomb"))] == ["coulomb", "presliding"]
 
 
 def test_folds_are_runs_where_there_are_enough_and_blocks_else():

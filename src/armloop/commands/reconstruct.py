@@ -53,6 +53,15 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--coefficients", action="store_true", help="print every coefficient with its standard error, too"
     )
     p.add_argument(
+        "--friction",
+        default=None,
+        metavar="LAW,..",
+        help="friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, "
+        "viscous, offset (levels differ by direction), stribeck, nonlinear_viscous, viscous_by_direction, "
+        "coulomb_by_load, presliding (memory: spring-like before it slides), presliding_by_load; the first is taken "
+        "anyway, each other where it earns its place on held-out data (default: all)",
+    )
+    p.add_argument(
         "--no-physical",
         action="store_true",
         help="do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)",
@@ -118,6 +127,7 @@ def run(options: argparse.Namespace) -> None:
                 max_order=options.max_order,
                 physical=not options.no_physical,
                 snr=_snr(options),
+                friction=_laws(options.friction),
             ),
             progress(options),
             recorded,
@@ -148,6 +158,11 @@ def run(options: argparse.Namespace) -> None:
     for note in result.notes:
         print(f"note: {note}")
     print(f"model written to {options.out}")
+
+
+def _laws(text: str | None) -> tuple[str, ...] | None:
+    """The names of ``--friction``."""
+    return None if text is None else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _snr(options: argparse.Namespace) -> tuple[float, float, float] | None:

@@ -9,10 +9,13 @@ scatter over the folds; else for the joints alone for which it falls by more tha
 hands back the rungs it does not miss.
 
 Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
+
+A user may restrict the ladder to some laws, by the names in :data:`LAWS`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -22,6 +25,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.blocks import block_numbers
+from armloop.errors import InputError
 from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion, Samples
 from armloop.reconstruction.options import Options
@@ -39,6 +43,18 @@ _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
 _FADES = (0.003, 0.01, 0.03, 0.1)
 _WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
+#: What a user calls the laws, and the kinds of elements that each consists of.
+LAWS = {
+    "coulomb": ("smooth_sign",),
+    "viscous": ("viscous",),
+    "offset": ("offset",),
+    "stribeck": ("stribeck_peak",),
+    "nonlinear_viscous": ("root", "quadratic", "cubic"),
+    "viscous_by_direction": ("viscous_forward", "viscous_backward"),
+    "coulomb_by_load": ("load_smooth_sign",),
+    "presliding": ("hysteresis",),
+    "presliding_by_load": ("load_hysteresis",),
+}
 #: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
 _STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
 
@@ -112,6 +128,32 @@ def rungs(arm: Arm, motion: Motion) -> list[Rung]:
     ]
 
 
+def check_laws(names: Sequence[str] | None) -> None:
+    """Raise ``InputError`` unless every name is one of :data:`LAWS`, and there is one; None stands for all of them."""
+    if names is None:
+        return
+    for name in names:
+        if name not in LAWS:
+            raise InputError(f"unknown friction law {name!r}; there are: {', '.join(LAWS)}")
+    if not names:
+        raise InputError(f"no friction law is named; there are: {', '.join(LAWS)}")
+
+
+def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
+    """The rungs with the elements of some laws alone; all of them for None. Rungs left empty are dropped."""
+    if names is None:
+        return ladder
+    kinds = {kind: name for name in names for kind in LAWS[name]}
+    kept = []
+    for rung in ladder:
+        elements = [[term for term in own if term.kind in kinds] for own in rung.elements]
+        whole = elements == rung.elements
+        called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
+        if called:
+            kept.append(rung if whole else Rung(" and ".join(called), elements))
+    return kept
+
+
 def climb(
     arm: Arm,
     samples: Samples,
@@ -127,9 +169,10 @@ def climb(
         columns: (N, n, r) shared columns, filtered.
         rows: (N, n) samples to use.
         load: (N, n) torque that friction by load depends on.
+        options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    ladder = rungs(arm, samples.motion)
+    ladder = restricted(rungs(arm, samples.motion), options.friction)
     candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
     fold, judged = inner_folds(samples, np.asarray(rows.any(axis=1)), options)
     pooled = Pooled(samples, columns, candidates, rows, load, fold, judged, options.physical)
@@ -141,6 +184,8 @@ def climb(
     if plenty:
         climbs.append(state.hand_back())
     notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
+    if options.friction is not None:
+        notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
     return Ladder(laws, state.prior, climbs, notes + _notes(climbs))
 
@@ -200,7 +245,7 @@ class _State:
         return [[place for level in own for place in self._places[level]] for own in taken]
 
     def take(self, level: int, name: str, one_by_one: bool) -> Climb:
-        """Take a rung for all joints or for some if it earns its place; the first, which all drives have, anyway."""
+        """Take a rung for all joints or for some if it earns its place; the first, what every drive has, anyway."""
         before = self._error(self._errors)
         everyone = [[*own, level] for own in self.taken]
         errors = self._held_out(everyone)

@@ -20,6 +20,7 @@ from armloop.progress import Progress, silent
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
+from armloop.reconstruction.friction_ladder import check_laws
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
@@ -96,7 +97,7 @@ def reconstruct(
             the other libraries read everything.
 
     Raises:
-        InputError: logs that do not fit the arm, an unknown method, or too little excitation.
+        InputError: logs that do not fit the arm, an unknown method or friction law, or too little excitation.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
@@ -106,6 +107,12 @@ def reconstruct(
     if method == "sindy" and library != "double-feature-set":
         raise InputError(f"method 'sindy' works on the library double-feature-set, not on {library!r}")
     options = options or Options()
+    if options.friction is not None and library == "double-feature-set":
+        raise InputError(
+            "the double feature set has friction of its own (Coulomb, Stribeck, terms of the velocities); "
+            "laws are chosen with --library rigid-body or lagrangian"
+        )
+    check_laws(options.friction)
     conditioning = conditioning or default_conditioning(library)
     for log in logs:
         if log.joints != arm.n:
