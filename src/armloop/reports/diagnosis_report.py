@@ -23,6 +23,7 @@ from armloop.reports.plots import (
     residual_time_figure,
     shares_figure,
 )
+from armloop.reports.residuals import moving_joints
 from armloop.reports.tables import formulas
 from armloop.reports.words import counted, effect_label, listed, number, numbers, percent, unit, with_error
 
@@ -64,20 +65,19 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
         "what the model leaves on its own baseline data, and every listed effect at every joint was tried "
         "on blocks of data it had not been fitted to; of equals, the simplest stands."
     )
-    accused, *remedies = blame(diagnosis) or [""]
+    accused = " ".join(blame(diagnosis))
     tables = [effects_table(diagnosis)] if diagnosis.outcome.found or diagnosis.unlisted is not None else []
     tables += [events_table(diagnosis)] if diagnosis.contacts else []
     verdict = Section(
         "Diagnosis",
-        [intro, *findings(diagnosis), *remedies],
+        [intro, *findings(diagnosis)],
         [Picture(shares_figure(diagnosis), _SHARES)] if diagnosis.outcome.found else [],
         [*tables, errors_table(diagnosis)],
         notes=[*([accused] if accused else []), *alternatives(diagnosis)],
     )
-    pictures = [
-        Picture(residual_time_figure(diagnosis), _TIME),
-        Picture(residual_shape_figure(diagnosis), _SHAPE),
-    ]
+    pictures = [Picture(residual_time_figure(diagnosis), _TIME)]
+    if moving_joints(diagnosis):
+        pictures.append(Picture(residual_shape_figure(diagnosis), _SHAPE))
     if diagnosis.outcome.found:
         left = residual_shape_figure(diagnosis, what_is_left=True)
         pictures.append(Picture(left, _LEFT, "What is left, on its own scale"))
@@ -190,12 +190,13 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
             "accent",
         ),
         Card(
-            f"{with_error(estimate.value, estimate.std_error)} {unit(estimate.unit)}".rstrip(),
-            key.replace("_", " ").capitalize(),
+            with_error(estimate.value, estimate.std_error),
+            _with_unit(key.replace("_", " ").capitalize(), unit(estimate.unit)),
+            "± standard error over blocks",
         ),
         Card(
-            f"{number(before)} → {number(after)} {u}",
-            f"Held-out RMSE, joint {j + 1}",
+            f"{number(before)} → {number(after)}",
+            f"Held-out RMSE, joint {j + 1} [{u}]",
             f"the model's own baseline: {number(floor)} {u}",
             "good",
         ),
@@ -206,6 +207,10 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
             "good",
         ),
     ]
+
+
+def _with_unit(title: str, of: str) -> str:
+    return f"{title} [{of}]" if of else title
 
 
 def _contact_card(diagnosis: Diagnosis, k: int) -> Card:

@@ -29,16 +29,22 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         "explained."
         for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True)
     ]
-    sentences += [
-        f"Found: {contact.added.effect.sentence(contact.added.parameters)}. The force explains "
-        f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
-        for contact in diagnosis.contacts
-    ]
+    if len(diagnosis.contacts) == 1:
+        (contact,) = diagnosis.contacts
+        sentences.append(
+            f"Found: {contact.added.effect.sentence(contact.added.parameters)}. The force explains "
+            f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
+        )
+    elif diagnosis.contacts:
+        sentences.append(
+            f"Found: {len(diagnosis.contacts)} pushes at the tool, listed below; their samples are kept out of "
+            "everything else."
+        )
     unlisted = diagnosis.unlisted
     if unlisted is not None:
         u = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
         law = (
-            f"follows {unlisted.form}"
+            f"follows {unlisted.form}, which would leave {number(unlisted.rmse_with_form)} {u}"
             if unlisted.form
             else "follows no law that both halves of the run agree on"
         )
@@ -58,9 +64,10 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     if not faulty:
         return []
     arm = [effect_label(a.effect) for a in added if not a.effect.sensor]
-    who = f"{listed([effect_label(a.effect) for a in faulty])}: the sensor is at fault, not the arm."
+    what = "recording" if all(a.effect.name == "time_delay" for a in faulty) else "sensor"
+    who = f"{listed([effect_label(a.effect) for a in faulty])}: the {what} is at fault, not the arm."
     apart = (
-        " The augmented model keeps this apart from the dynamics: it predicts what the sensor records, and its "
+        " The augmented model keeps this apart from the dynamics: it predicts what is recorded, and its "
         "feedforward, inertia and gravity are those of the arm"
     )
     apart += f" with {listed(arm)}." if arm else ", unchanged."

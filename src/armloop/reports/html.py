@@ -22,7 +22,9 @@ from armloop.reports.tables import Table
 _THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE: "var(--surface)"}
 _DPI = 150
 #: Blanks that no line should end at: before a unit or %, after ± and arrows.
-_TIES = re.compile(r"(?<=[±→×]) | (?=%)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))")
+_TIES = re.compile(
+    r"(?<=[±→×]) | (?=%)|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
+)
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 #: Runs laid end to end are this far apart, as a part of all of them.
 _GAP = 0.02
+#: Fewer samples than this show no law.
+_LEAST = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,11 @@ def _unstacked(diagnosis: Diagnosis, fit: Fit) -> Array:
     full = np.full(rows.shape, np.nan)
     full[rows] = fit.held_out * np.broadcast_to(diagnosis.evidence.scale, rows.shape)[rows]
     return full
+
+
+def moving_joints(diagnosis: Diagnosis) -> list[int]:
+    """Joints (0-based) with enough motion to draw a residual against it."""
+    return [int(j) for j in np.flatnonzero(diagnosis.evidence.rows.sum(axis=0) >= _LEAST)]
 
 
 def joint_load(diagnosis: Diagnosis) -> Array:

@@ -39,6 +39,6 @@ def feedforward_figure(diagnosis: Diagnosis, closing: Closing) -> Figure:
         axes.margins(x=0.01)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         title = f"Joint {j + 1}: {number(change.rms[j])} {u} RMS"
-        polish(axes, clock if j == changed[-1] else "", f"torque [{u}]" if u != "N" else "force [N]", title)
+        polish(axes, clock if j == changed[-1] else "", f"{'force' if u == 'N' else 'torque'} [{u}]", title)
     legend(made, 3)
     return made

@@ -25,7 +25,7 @@ from armloop.reports.plots.style import (
     thin,
     with_gaps,
 )
-from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
+from armloop.reports.residuals import held_out_residuals, joint_load, moving_joints, time_axis
 from armloop.reports.words import unit
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
 
 
 def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> Figure:
-    """One row per joint: the residual against position, velocity and load (dots, bins' means), and its spectrum.
+    """One row per joint that moves: the residual against position, velocity, load (dots, bins' means), its spectrum.
 
     Args:
         what_is_left: draw only what the effects leave, so that its axes fit it.
@@ -76,29 +76,31 @@ def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> F
     motion, scale, joints = diagnosis.samples.motion, diagnosis.evidence.scale, diagnosis.model.arm.joints
     load, (rows, series) = joint_load(diagnosis), _series(diagnosis)
     series = series[-1:] if what_is_left else series
-    n, mixed = len(joints), len({joint.kind for joint in joints}) > 1
+    moved = moving_joints(diagnosis)
+    n, mixed = len(moved), len({joint.kind for joint in joints}) > 1
     made = figure(10.5, (2.0 if n < 5 else 1.7) * n + 0.8)
     grid = panels(made, n, 4, gap=0.5, rows_gap=0.72 if mixed else 0.5)
-    for j, joint in enumerate(joints):
+    for line, j in zip(grid, moved, strict=True):
+        joint, last = joints[j], j == moved[-1]
         u, at = unit(joint.torque_unit), joint.position_unit
         names = (f"position [{at}]", f"velocity [{at}/s]", f"load [{u}]")
         for k, x in enumerate((motion.q[:, j], motion.v[:, j], load[:, j])):
-            axes = grid[j, k]
+            axes = line[k]
             _band(axes, float(scale[j]))
             for values, color, label in series:
                 _cloud(axes, x[rows], values[:, j], color, label)
             title = _title(diagnosis, series, j) if k == 0 else ""
-            polish(axes, names[k] if mixed or j == n - 1 else "", f"residual [{u}]" if k == 0 else "", title)
+            polish(axes, names[k] if mixed or last else "", f"residual [{u}]" if k == 0 else "", title)
             if k:
-                axes.sharey(grid[j, 0])
+                axes.sharey(line[0])
                 axes.tick_params(labelleft=False)
             axes.xaxis.set_major_locator(MaxNLocator(5))
             axes.yaxis.set_major_locator(MaxNLocator(5))
-            if j == 0 and k:
+            if j == moved[0] and k:
                 _head(axes, f"against {names[k].split(' [')[0]}")
-        _spectra(grid[j, 3], diagnosis, rows, series, j)
-        polish(grid[j, 3], "frequency [Hz]" if mixed or j == n - 1 else "")
-        _head(grid[j, 3], f"spectrum [{u}/√Hz]")
+        _spectra(line[3], diagnosis, rows, series, j)
+        polish(line[3], "frequency [Hz]" if mixed or last else "")
+        _head(line[3], f"spectrum [{u}/√Hz]")
     legend(made, 4)
     return made
 
@@ -152,10 +154,10 @@ def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: S
     inside = (rows >= run.start) & (rows < run.stop)
     period = samples.period * float(np.median(np.diff(rows[inside]))) if inside.sum() > 1 else samples.period
     length = min(int(inside.sum()), max(64, round(_SPECTRUM_SECONDS / period)))
+    if not np.isfinite(series[0][0][inside, j]).any():
+        return
     for values, color, label in series:
         y = values[inside, j]
-        if not np.isfinite(y).any():
-            continue
         f, power = welch(np.nan_to_num(y), fs=1 / period, nperseg=length)
         shown = (f > 0) & (f <= (1.1 * samples.cutoff_hz or np.inf)) & (power > 0)
         axes.loglog(f[shown], np.sqrt(power[shown]), color=color, linewidth=1.3, label=label)
@@ -163,7 +165,9 @@ def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: S
         # what the baseline's residual would show, were it spread evenly below the filter's corner
         level = scale / np.sqrt(samples.cutoff_hz)
         axes.axhspan(level / 2, 2 * level, color=BASELINE, alpha=0.22, linewidth=0)
-    for axis, sub in ((axes.xaxis, (1.0,)), (axes.yaxis, (1.0,))):
-        axis.set_major_locator(LogLocator(subs=sub, numticks=5))
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        # over less than two decades, powers of ten alone would label next to nothing
+        axis.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0), numticks=5))
         axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         axis.set_minor_formatter(NullFormatter())
