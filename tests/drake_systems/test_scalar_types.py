@@ -22,6 +22,7 @@ from armloop.drake_systems import (
     PidController,
     PidGains,
     PreslidingFriction,
+    RateLimiter,
     Stop,
     model_equations,
 )
@@ -84,6 +85,7 @@ SYSTEMS = {
     },
     "friction": lambda: JointFrictionSystem(FRICTION, 0.2),
     "presliding": lambda: PreslidingFriction(3, ELEMENTS, 0.01),
+    "rate limiter": lambda: RateLimiter([0.5, 2.0, 2.0], [0.1, 900.0, 20.0], 0.01),
     "pid": lambda: PidController(PidGains.paper(3), 0.01),
     **{f"effect {name}": lambda name=name: effect_torque(name) for name in PARAMETERS},
 }
