@@ -14,7 +14,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, w
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
-from armloop.diagnosis.search import Outcome, search, without_forced
+from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.effects import hypotheses
 from armloop.errors import InputError
@@ -191,11 +191,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     if (without(whole, again).rows != evidence.rows).any():
         contacts, evidence = again, without(whole, again)
         outcome = search(evidence, progress)
-    unlisted = find_law(evidence, outcome.before, outcome.after, progress)
-    if unlisted is not None:
-        outcome, forced = without_forced(evidence, outcome, unlisted.joint - 1)
-        if forced:
-            unlisted = find_law(evidence, outcome.before, outcome.after, progress)
+    unlisted, outcome = find_law(evidence, outcome, progress)
     found = bool(outcome.found or contacts)
     verdict = "effects_found" if found else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]
@@ -208,7 +204,7 @@ def _too_still(evidence: Evidence) -> str:
     ranges = evidence.model.history.get("range")
     slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
     moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
-    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 50]
+    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 20]
     blocks = len(np.unique(evidence.blocks))
     if len(still) < evidence.rows.shape[1] and blocks >= 8:
         return ""
