@@ -68,6 +68,7 @@ def effect_torque(name):
 
 SYSTEMS = {
     **{f"feedforward of {k}": lambda m=m: Feedforward(m(), m().arm.n) for k, m in STILL_MODELS.items()},
+    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), 4, stacked=True),
     "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 3, 2),
     **{
         f"computed torque of {k}": lambda m=m: ComputedTorque(m(), AccelerationGains.critical(m().arm.n))

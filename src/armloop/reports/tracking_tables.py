@@ -46,7 +46,7 @@ def spread_table(result: WearResult, title: str | None = "Tracking error η over
 def metrics_table(
     results: Mapping[str, TrackingResult], title: str | None = "How the joints followed"
 ) -> Table:
-    """RMS and largest error, RMS torque, time clipped, time in stick and settling after reversals, per controller and joint."""
+    """RMS and largest error, RMS torque, share clipped, time in stick, settling after reversals per controller and joint."""
     rows: list[list[object]] = []
     for name, result in results.items():
         m = result.metrics
