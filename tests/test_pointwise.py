@@ -65,7 +65,7 @@ def test_one_array_for_a_sample_gives_the_same(kind, step):
     law = (
         FrictionTerm("sign", 0.7),
         FrictionTerm("stribeck", -0.2, 0.1),
-        FrictionTerm("viscous", 2.0, step=2),
+        FrictionTerm("viscous", 2.0),
     )
     offset = (FrictionTerm("offset", 0.1),)
     model = {
