@@ -16,6 +16,7 @@ from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.diagnosis.whereabouts import whereabouts
 from armloop.effects import hypotheses
 from armloop.errors import InputError
 from armloop.log import MotionLog
@@ -112,7 +113,8 @@ class Diagnosis:
             for contact in self.contacts
         ]
         if self.unlisted is not None:
-            effects.append(self.unlisted.to_dict())
+            where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
+            effects.append({**self.unlisted.to_dict(), "where": where.to_dict()})
         return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": _null(self.errors())}
 
 
