@@ -55,6 +55,11 @@ class Diagnosis:
         """The run, conditioned."""
         return self.evidence.samples
 
+    @property
+    def judged(self) -> bool:
+        """Whether the run, contacts apart, holds enough motion to look for anything else in it."""
+        return not _too_still(self.evidence)
+
     def errors(self) -> dict[str, Any]:
         """RMSE per joint of held-out moving samples, before and after, beside the baseline's; NaN for joints at rest."""
         scale = self.evidence.scale

@@ -41,6 +41,8 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             f"Found: {len(diagnosis.contacts)} pushes at the tool, listed below; their samples are kept out of "
             "everything else."
         )
+    if diagnosis.contacts and not diagnosis.judged:
+        sentences.append("Apart from that the joints hardly move: nothing else could be looked for.")
     unlisted = diagnosis.unlisted
     if unlisted is not None:
         u = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
