@@ -222,13 +222,15 @@ class _Planner:
         effort = (1 - wish.reserve) * np.array([joint.effort for joint in model.arm.joints])
         limits = Limits(ranges, effort, lambda motion: model.predict(motion, sensors=False))
         check_rest(model.arm, limits)
-        drawn = random_references(limits, wish.whole_duration, _TYPICAL, wish.seed)
+        drawn = random_references(limits, PERIOD, _TYPICAL, wish.seed)
         if not drawn:
             raise InputError(
                 f"{model.arm.name}: hardly any motion keeps within the effort limits; widen them"
             )
         evidence = diagnosis.evidence
-        stages = [Stage.of_reference(evidence, each) for each in drawn[:_STAGES]]
+        # in their whole length, over which friction may drift
+        whole = [replace(each, duration=wish.whole_duration) for each in drawn[:_STAGES]]
+        stages = [Stage.of_reference(evidence, each) for each in whole]
         typical = [sampled(each, _STEP) for each in drawn]
         return _Planner(evidence, limits, typical, stages, wish, progress)
 
