@@ -108,7 +108,9 @@ def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> lis
     fitted = {Path(path).resolve() for path in options.logs}
     for path in options.held_out:
         if Path(path).resolve() in fitted:
-            raise InputError(f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted")
+            raise InputError(
+                f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted"
+            )
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
     for log in logs:
         condition([log], model.conditioning)  # what is wrong with a log is said before the long work

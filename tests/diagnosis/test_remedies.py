@@ -1,0 +1,42 @@
+"""Every sensor's fault comes with what to do about it; what acts on the arm needs no such words."""
+
+import pytest
+
+from armloop.diagnosis.remedies import remedy
+from armloop.effects import EFFECTS, Estimate, effect
+from armloop.model import AddedEffect
+
+FAULTS = {
+    "torque_gain": (2, "gain", 1.25, "1", ["Divide the torque readings of joint 2 by 1.25", "0.8 times"]),
+    "torque_offset": (1, "offset", -0.4, "N*m", ["Subtract -0.4 N*m from the torque readings of joint 1"]),
+    "encoder_offset": (
+        3,
+        "offset",
+        0.04,
+        "rad",
+        ["Subtract 0.04 rad from the position readings of joint 3", "the joint stands -0.04 rad from where"],
+    ),
+    "time_delay": (None, "seconds", 0.03, "s", ["Shift the torque record by 30 ms back"]),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_has_its_remedy(name: str) -> None:
+    joint, key, value, unit, parts = FAULTS[name]
+    words = remedy(AddedEffect(effect(name, joint), {key: Estimate(value, 0.0, unit)}))
+    assert all(part in words for part in parts), words
+    assert "feedforward" in words and not words.endswith(".")
+
+
+def test_all_listed_sensors_have_one_and_nothing_else_has() -> None:
+    assert {name for name, kind in EFFECTS.items() if kind.sensor} == set(FAULTS)
+    for name, kind in EFFECTS.items():
+        if not kind.sensor:
+            one = effect(name, 1 if kind.joint_wise else None, 2 if kind.pair_wise else None)
+            assert remedy(AddedEffect(one, {})) == ""
+
+
+def test_a_sensor_of_the_users_own_gets_general_words() -> None:
+    own = effect("torque_gain", 2)
+    own.name = "bent_sensor"  # type: ignore[misc]
+    assert remedy(AddedEffect(own, {})).startswith("Correct the reading of joint 2 before anything uses it")
