@@ -45,7 +45,7 @@ def make(seed: int, cases: int, place: Path) -> str:
 
 def judge(folder: Path, out: Path) -> dict[str, dict[str, Any]]:
     """Diagnose one arm's runs in a process that knows their folder and nothing else."""
-    threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     done = subprocess.run(
         [sys.executable, str(VERDICTS), str(folder), str(out)],
         env={**os.environ, **threads},
