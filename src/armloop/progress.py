@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 Progress = Callable[[str], None]
@@ -10,3 +11,17 @@ Progress = Callable[[str], None]
 def silent(message: str) -> None:
     """Say nothing."""
     del message
+
+
+def paced(progress: Progress, seconds: float = 2.0) -> Progress:
+    """The same, passing on at most one line in so many seconds, the first not before they have passed."""
+    last = time.monotonic()
+
+    def tell(message: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= seconds:
+            last = now
+            progress(message)
+
+    return tell

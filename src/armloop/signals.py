@@ -196,7 +196,8 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     still = np.abs(v) <= dead_zone
     reach = int(np.ceil(how.smear / (how.cutoff_hz * period)))
     smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
-    stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period)))
+    # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.
+    stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period) + 1e-6))
     keep = slice(trim, len(grid) - trim, stride)
     return grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,10 @@ from armloop.signals import condition, smooth
 Array = NDArray[np.float64]
 
 SCHEMA = "armloop/diagnosis/1"
+
+#: Samples kept per period of the filter's corner: effects are smooth laws of the filtered motion, or steps whose
+#: smearing a hundredth of a second shows.
+OVERSAMPLING = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +168,8 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
                 f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
             )
     progress("conditioning the run like the model's training logs")
-    samples = condition(logs, model.conditioning)
+    how = model.conditioning
+    samples = condition(logs, replace(how, oversampling=min(how.oversampling, OVERSAMPLING)))
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
             raise InputError(

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 _ITERATIONS = 30
 _REFINEMENTS = 3
-_RIDGE = 1e-8
+_RIDGE, _STRONG_RIDGE = 1e-8, 1e-3
+_NOTHING = 1e-20
 
 
 class Shape(NamedTuple):
@@ -124,8 +125,29 @@ def solve(
     if not effects:
         return np.zeros(0), [], np.zeros((0, 0))
     edges = np.cumsum([0, *sizes])
-    unconstrained = _ridge(moments.G, moments.b)
-    x = [e.start(unconstrained[a:b]) for e, a, b in zip(effects, edges, edges[1:], strict=False)]
+    found = None
+    # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
+    for ridge in (_RIDGE, _STRONG_RIDGE):
+        free = _ridge(moments.G, moments.b, ridge)
+        x = [e.start(free[a:b]) for e, a, b in zip(effects, edges, edges[1:], strict=False)]
+        error, *answer = _gauss_newton(moments, effects, x)
+        if found is None or error < found[0]:
+            found = error, *answer
+        if _is_linear(found[3]):
+            break
+    assert found is not None
+    return found[1], found[2], found[3]
+
+
+def _is_linear(J: Array) -> bool:
+    """Whether coefficients are the free parameters themselves, so that there is but one minimum."""
+    return J.shape[0] == J.shape[1] and bool((np.eye(len(J)) == J).all())
+
+
+def _gauss_newton(
+    moments: Moments, effects: Sequence[Effect], x: list[Array]
+) -> tuple[float, Array, list[Array], Array]:
+    """Squared error, coefficients, free parameters and derivative at the minimum reached from x."""
     beta, J = _embed(effects, x)
     error = moments.squared_error(beta)
     for _ in range(_ITERATIONS):
@@ -142,7 +164,7 @@ def solve(
         x, beta, J, error = trial, new_beta, new_J, new_error
         if converged:
             break
-    return beta, x, J
+    return error, beta, x, J
 
 
 def _split(flat: Array, like: Sequence[Array]) -> list[Array]:
@@ -160,11 +182,17 @@ def _embed(effects: Sequence[Effect], x: Sequence[Array]) -> tuple[Array, Array]
     return beta, J
 
 
-def _ridge(G: Array, b: Array) -> Array:
-    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
-    scale[np.diag(G) <= 0] = 0.0
-    scaled = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
+def _ridge(G: Array, b: Array, ridge: float = _RIDGE) -> Array:
+    scale = _scale(G)
+    scaled = G * np.outer(scale, scale) + ridge * np.eye(len(G))
     return scale * np.linalg.solve(scaled, scale * b)
+
+
+def _scale(G: Array) -> Array:
+    """(p,) factors that make columns with the moments G one long; zero for what is no column but rounding errors."""
+    size = np.diag(G)
+    there = size > _NOTHING * size.max(initial=0.0)
+    return np.where(there, 1 / np.sqrt(np.where(there, size, 1.0)), 0.0)
 
 
 def _block_covariance(stacked: Stacked, beta: Array, J: Array) -> Array:
@@ -175,7 +203,7 @@ def _block_covariance(stacked: Stacked, beta: Array, J: Array) -> Array:
     _, index = np.unique(stacked.block, return_inverse=True)
     sums = np.zeros((index.max() + 1, X.shape[1]))
     np.add.at(sums, index, scores)
-    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+    scale = _scale(G)
     bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
     blocks = len(sums)
     return np.asarray(bread @ (sums.T @ sums) @ bread) * blocks / max(blocks - 1, 1)

@@ -79,6 +79,13 @@ def rows_per_joint(fit: Fit) -> NDArray[np.intp]:
     return np.bincount(fit.stacked.joint, minlength=fit.stacked.joints)
 
 
+def energy_by_joint(fit: Fit) -> Array:
+    """(n,) held-out squared error, weighted, of each joint."""
+    return np.asarray(
+        np.bincount(fit.stacked.joint, weights=fit.held_out**2, minlength=fit.stacked.joints)
+    )
+
+
 def by_joint(worse: Fit, better: Fit) -> Array:
     """(n,) how much held-out squared error one fit leaves more than another, joint by joint."""
     difference = worse.held_out**2 - better.held_out**2

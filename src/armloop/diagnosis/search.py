@@ -14,17 +14,26 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.judgement import gain, is_behind, is_worth, simplest_of_equals
+from armloop.diagnosis.judgement import (
+    by_joint,
+    energy_by_joint,
+    gain,
+    is_behind,
+    is_worth,
+    rows_per_joint,
+    simplest_of_equals,
+)
 from armloop.diagnosis.trials import Known
 from armloop.effects import Effect, hypotheses
 from armloop.model import AddedEffect
-from armloop.progress import Progress
+from armloop.progress import Progress, paced
 
 Array = NDArray[np.float64]
 
-#: A further effect must remove at least this part of what could be explained at first: what a large effect leaves
-#: because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for small ones.
-LEAST_SHARE = 0.003
+#: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
+#: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for
+#: small ones.
+LEAST_SHARE = 0.005
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
 _MOST_EFFECTS = 4
@@ -67,10 +76,11 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
     """Greedy forward search; all effects are re-estimated together, and exchanged where another does better."""
     listed = hypotheses(evidence.model.arm)
     nothing = known = Known.of(evidence)
-    explainable = max(nothing.error - len(nothing.fit.held_out), 1e-9)
+    explainable = np.maximum(energy_by_joint(nothing.fit) - rows_per_joint(nothing.fit), 1e-9)
+    tell = paced(progress)
     found: list[Found] = []
     while len(found) < _MOST_EFFECTS:
-        best = _best(known, listed, explainable)
+        best = _best(known, listed, explainable, tell)
         if best is None:
             break
         found.append(best)
@@ -85,33 +95,34 @@ def _known(evidence: Evidence, found: Sequence[Found]) -> Known:
     return Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
 
 
-def _best(known: Known, listed: Sequence[Effect], explainable: float) -> Found | None:
+def _best(known: Known, listed: Sequence[Effect], explainable: Array, tell: Progress) -> Found | None:
     """The simplest of the best further effects, with its rivals; None where none is worth it."""
     trials = []
     taken = {effect.place for effect in known.fit.effects}
-    for effect in listed:
+    for k, effect in enumerate(listed):
+        tell(f"{k} of {len(listed)} hypotheses tried")
         trial = known.trial(effect) if effect.place not in taken else None
         if trial is None or not is_worth(known.evidence, known.fit, trial):
             continue
-        if gain(known.fit, trial) >= LEAST_SHARE * explainable:
+        if (by_joint(known.fit, trial) >= LEAST_SHARE * explainable).any():
             trials.append(trial)
     if not trials:
         return None
     best = simplest_of_equals(known.fit, trials)
     most = gain(known.fit, best)
     rivals = [
-        (trial.effects[-1], gain(known.fit, trial) / explainable)
+        (trial.effects[-1], gain(known.fit, trial) / explainable.sum())
         for trial in trials
         if trial is not best and gain(known.fit, trial) >= RIVAL_SHARE * most
     ]
-    return Found(best.effects[-1], best.shapes[-1], min(most / explainable, 1.0), rivals)
+    return Found(best.effects[-1], best.shapes[-1], min(most / explainable.sum(), 1.0), rivals)
 
 
 def _exchanged(
     evidence: Evidence,
     found: list[Found],
     listed: Sequence[Effect],
-    explainable: float,
+    explainable: Array,
     progress: Progress,
 ) -> list[Found]:
     """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
@@ -119,7 +130,7 @@ def _exchanged(
         changed = False
         for k in range(len(found) - 1, -1, -1):
             others = [f for i, f in enumerate(found) if i != k]
-            best = _best(_known(evidence, others), listed, explainable)
+            best = _best(_known(evidence, others), listed, explainable, paced(progress))
             if best is None:
                 progress(f"beside the others {found[k].effect.label()} explains nothing")
                 return _exchanged(evidence, others, listed, explainable, progress)
@@ -135,7 +146,7 @@ def _exchanged(
 
 
 def _at_one_blow(
-    evidence: Evidence, nothing: Known, found: list[Found], explainable: float, progress: Progress
+    evidence: Evidence, nothing: Known, found: list[Found], explainable: Array, progress: Progress
 ) -> list[Found]:
     """One effect of the whole arm where it does all that several did: a load shows on every joint."""
     several = _known(evidence, found).fit
@@ -145,7 +156,7 @@ def _at_one_blow(
         trial = nothing.trial(effect) if effect.name not in kinds else None
         if trial is not None and not is_behind(nothing.fit, trial, several):
             progress(f"{effect.label()} explains alone what {len(found)} effects did")
-            share = min(gain(nothing.fit, trial) / explainable, 1.0)
+            share = min(gain(nothing.fit, trial) / explainable.sum(), 1.0)
             return [Found(effect, trial.shapes[-1], share)]
     return found
 
