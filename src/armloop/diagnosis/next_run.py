@@ -71,13 +71,13 @@ class Wish:
         ranges: of motion; by default those of the model's training data.
         reserve: part of the effort limits that is kept free.
         duration: s, rounded up to whole periods of 20 s.
-        starts, seed: of the optimiser.
+        starts, seed: of the optimiser; by default 2 starts up to four joints, else one.
     """
 
     ranges: MotionRanges | None = None
     reserve: float = 0.2
     duration: float = 60.0
-    starts: int = 2
+    starts: int | None = None
     seed: int = 0
 
     @property
@@ -292,7 +292,8 @@ class _Planner:
 
     def _optimised(self, regression: Regression, criterion: Criterion) -> Design:
         problem = Problem(self.series, regression, criterion, self.limits)
-        design = problem.optimise(self.wish.starts, self.wish.seed, _EFFORT, self.progress)
+        starts = self.wish.starts or (2 if problem.series.joints <= 4 else 1)
+        design = problem.optimise(starts, self.wish.seed, _EFFORT, self.progress)
         if design is None:
             raise InputError("no motion within the limits was found; widen the ranges or the effort")
         return design
