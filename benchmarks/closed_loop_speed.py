@@ -284,16 +284,24 @@ def _build() -> None:
     _shared = ours(model_of(50))
 
 
-def monte_carlo(seconds: float) -> tuple[float, float]:
-    """Eight equal runs in one forked process and in two: how many times faster, and how much more CPU a run takes."""
-    taken, spent = [], []
-    for processes in (1, 2):
-        with multiprocessing.get_context("fork").Pool(processes, _build) as pool:
+def monte_carlo(seconds: float, rounds: int) -> tuple[float, float]:
+    """Eight equal runs in one forked process and in two, in turns: how many times faster two are.
+
+    By the clock, and by the CPU time of a run, which is what two cores would give that nobody else uses: the best of
+    several turns each.
+    """
+    fork = multiprocessing.get_context("fork")
+    taken, spent = {1: np.inf, 2: np.inf}, {1: np.inf, 2: np.inf}
+    with fork.Pool(1, _build) as one, fork.Pool(2, _build) as two:
+        for pool, processes in ((one, 1), (two, 2)):
             pool.map(_simulate, [0.1] * 4 * processes, chunksize=1)
-            began = time.perf_counter()
-            spent.append(float(np.mean(pool.map(_simulate, [seconds] * 8, chunksize=1))))
-            taken.append(time.perf_counter() - began)
-    return taken[0] / taken[1], spent[1] / spent[0]
+        for _ in range(rounds):
+            for pool, processes in ((one, 1), (two, 2)):
+                began = time.perf_counter()
+                times = pool.map(_simulate, [seconds] * 8, chunksize=1)
+                taken[processes] = min(taken[processes], time.perf_counter() - began)
+                spent[processes] = min(spent[processes], float(np.mean(times)))
+    return taken[1] / taken[2], 2 * spent[1] / spent[2]
 
 
 def main() -> None:
@@ -340,11 +348,11 @@ def main() -> None:
         "One evaluation (target: at most 5 us above empty); the sources evaluate a thousand periods at once"
     )
     print(table(["system", "us", "above empty", "above reading"], rows, title))
-    speedup, dearer = monte_carlo(options.seconds)
-    print(f"Monte Carlo: two processes are {speedup:.2f} times as fast as one (target: 1.80),")
+    clock, cpu = monte_carlo(options.seconds, options.rounds)
     print(
-        f"a run then takes {dearer:.2f} times the CPU time; {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}"
+        f"Monte Carlo: two processes are {clock:.2f} times as fast as one by the clock, {cpu:.2f} by CPU time"
     )
+    print(f"(target: 1.80); {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
 
 
 if __name__ == "__main__":

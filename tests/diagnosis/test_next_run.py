@@ -206,7 +206,7 @@ def test_the_command_writes_the_reference_within_stated_limits(folder, capsys) -
     assert command(folder, *words) == 0
     printed = capsys.readouterr().out
     assert "The motion to make next" in printed and "next run" in printed
-    assert "No motion within the limits tells torque_offset at joint 2 from friction_asymmetry" in printed
+    assert "No motion within the limits tells torque offset, joint 2, from friction asymmetry" in printed
     answer = json.loads((folder / "out" / "diagnosis.json").read_text())["next_run"]
     assert answer["reference"] == str(path) and answer["duration"] == 20.0  # whole periods
     assert {"found", "alternative", "apart"} == set(answer["alternatives"][0])

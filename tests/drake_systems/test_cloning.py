@@ -21,6 +21,7 @@ from armloop.drake_systems import (
     JointFriction,
     PidGains,
     ReferenceSource,
+    StickingForwardDynamics,
     add_arm_with_controller,
 )
 from armloop.drake_systems.effects import UndeclaredEffect
@@ -70,15 +71,20 @@ def stepped(plant, context):
     return update.get_vector(0).CopyToVector()
 
 
-@pytest.mark.parametrize("effects", [(), EFFECTS])
-def test_the_simulated_arms_step_has_the_right_derivative(effects):
-    plant = ArmPlant(ARM, DRY, effects=effects)
+@pytest.mark.parametrize("kind", ["arm", "arm with effects", "model"])
+def test_a_step_that_may_stick_has_the_right_derivative(kind):
+    effects = EFFECTS if kind == "arm with effects" else ()
+    own = kind == "model"
+    plant = StickingForwardDynamics(model_of(ARM)) if own else ArmPlant(ARM, DRY, effects=effects)
     x0 = np.r_[Q0, 0.5, -0.3, 0.4]
     tau = np.array([3.0, 4.0, 1.0])
 
     def after(x):
         context = plant.CreateDefaultContext()
-        plant.set_state(context, x[:3], x[3:6])
+        if own:
+            context.SetDiscreteState(x[:6])
+        else:
+            plant.set_state(context, x[:3], x[3:6])
         plant.GetInputPort("tau").FixValue(context, x[6:])
         return stepped(plant, context)
 

@@ -5,13 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 from exact_model import ExactModel
+from exact_parts import scara_terms
 from numpy.testing import assert_allclose
+from pydrake.systems.framework import DiagramBuilder
 
+from armloop.components import SparseTerms
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.scenario_data import CONTROLLERS
 from armloop.drake_systems.scenarios import load_tracking
-from armloop.drake_systems.tracking import controllers_for, run_tracking, track
+from armloop.drake_systems.tracking import add_controlled_arm, controllers_for, run_tracking, track
 from armloop.excitation import FourierReference
 
 
@@ -112,6 +115,35 @@ def test_all_controllers_of_a_scenario(short):
     rows = results["pid"].scored
     assert_allclose(metrics.effort, np.sqrt((results["pid"].tau[rows] ** 2).mean(axis=0)))
     assert np.all(metrics.stick <= 0.5)
+
+
+def test_computed_torque_is_as_stiff_as_pid_and_needs_every_inertia():
+    """A model that lacks the light vertical joint's inertia would leave that joint to itself."""
+    scenario = load_tracking("scara_pick_and_place")
+    arm, friction = scenario.plant.arm, scenario.plant.config.friction
+    *others, inertia = scara_terms(arm)
+    poor = SparseTerms(3, inertia.index, inertia.coefficients * [1.0, 1.0, 0.0, 1.0])
+    model = dataclasses.replace(exact_model(arm, friction), components=(*others, poor))
+    builder = DiagramBuilder()
+    law = add_controlled_arm(builder, scenario, "computed_torque", {"model": model}).controller
+    context = law.CreateDefaultContext()
+    q0 = scenario.reference.evaluate([0.0])[0][0]
+    for port, value in (("q_ref", q0), ("v_ref", 0 * q0), ("vdot_ref", 0 * q0)):
+        law.GetInputPort(port).FixValue(context, value)
+
+    def torque(q):
+        law.GetInputPort("state").FixValue(context, np.r_[q, 0 * q])
+        return law.GetOutputPort("tau").Eval(context)
+
+    h = 1e-5
+    stiffness = [(torque(q0 - h * e) - torque(q0 + h * e))[j] / (2 * h) for j, e in enumerate(np.eye(4))]
+    turning = [0, 1, 3]
+    assert_allclose(np.array(stiffness)[turning], scenario.gains.kp[turning], rtol=0.02)
+    # a tenth of the sampling rate is the most, 100 rad/s: 2000 N/m of 0.2 kg are just that
+    assert 1000 < stiffness[2] < 2010
+    stated = dataclasses.replace(scenario, bandwidth=20.0)
+    law = add_controlled_arm(DiagramBuilder(), stated, "computed_torque", {"model": model}).controller
+    assert_allclose(law._gains[0], 400.0)
 
 
 class Steps:

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from armloop.arm import Arm, load_arm
 from armloop.components import SparseTerms
 from armloop.drake_systems.plant import add_links
-from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix
+from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix, with_mass_matrix
 from armloop.errors import ModelError
 from armloop.library.friction import FrictionTerm
 
@@ -116,6 +116,22 @@ def test_the_nearest_rigid_body_averages_the_errors_of_terms_out():
             for m in (noisy, nearest_rigid_body(noisy))
         ]
         assert errors[1] < errors[0], seed
+
+
+def test_a_joint_whose_inertia_the_terms_lack_gets_that_of_its_body():
+    arm = ARMS["scara"]
+    *others, inertia = scara_terms(arm)
+    whole = model_of(arm, *others, inertia)
+    assert with_mass_matrix(whole) is whole
+    # the vertical joint's, the third of the four
+    without = SparseTerms(3, inertia.index, inertia.coefficients * [1.0, 1.0, 0.0, 1.0])
+    q = np.array([0.2, 0.4, 0.1, 0.0])
+    poor = model_of(arm, *others, without)
+    assert Dynamics(poor).mass_matrix(q)[2, 2] == 0
+    M = Dynamics(with_mass_matrix(poor)).mass_matrix(q)
+    assert np.linalg.eigvalsh(M).min() > 0
+    with pytest.raises(ModelError, match="not positive definite"):
+        with_mass_matrix(model_of(arm, *others, SparseTerms(3, inertia.index, -inertia.coefficients)))
 
 
 def test_terms_that_no_mass_matrix_holds_are_named():

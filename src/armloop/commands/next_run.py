@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 #: Rows per second of the reference.
 _RATE = 500.0
+_WIDTH = 110
 
 
 def add_next_run(p: argparse.ArgumentParser) -> None:
@@ -107,22 +109,23 @@ def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Plann
 def _words(path: str, run: NextRun) -> str:
     from armloop.diagnosis.next_run import FAR_ENOUGH
     from armloop.reports.tables import make_table
-    from armloop.reports.words import number, percent
+    from armloop.reports.words import effect_label, number, percent
 
-    lines = []
+    table, lines = "", []
     told = [each for each in run.told if each.then is not None]
     if told:
         title = "The motion to make next: how much of the one's torque the other cannot stand for"
         rows = [
-            [each.found.label(), each.rival.label(), percent(each.now), percent(each.then)] for each in told
+            [effect_label(each.found), effect_label(each.rival), percent(each.now), percent(each.then)]
+            for each in told
         ]
-        lines.append(str(make_table(["found", "alternative", "this run", "next run"], rows, title, (0, 1))))
+        table = f"{make_table(['found', 'alternative', 'this run', 'next run'], rows, title, (0, 1))}\n"
     if run.purpose == "precision":
         for effect, factor in run.sharper:
             result = (
-                f"measures {effect.label()} with {number(factor, 2)} times the standard error of this run"
+                f"measures {effect_label(effect)} with {number(factor, 2)} times the standard error of this run"
                 if factor < 0.95
-                else f"measures {effect.label()} no better than this run did: within the limits there is little to gain"
+                else f"measures {effect_label(effect)} no better than this run did: the limits leave little to gain"
             )
             lines.append(f"The motion to make next {result}.")
     if run.purpose == "unlisted":
@@ -131,7 +134,7 @@ def _words(path: str, run: NextRun) -> str:
             "postures and speeds, the others moving apart from it."
         )
     for each in run.told:
-        names = f"{each.found.label()} from {each.rival.label()}"
+        names = f"{effect_label(each.found)}, from {effect_label(each.rival)}"
         if each.then is None:
             lines.append(f"No motion within the limits tells {names}.")
         elif each.then < FAR_ENOUGH:
@@ -142,4 +145,4 @@ def _words(path: str, run: NextRun) -> str:
         f"Reference written to {path}, {number(run.reference.duration)} s. It knows nothing of obstacles, nor of the arm "
         "hitting itself: watch it in slow motion first."
     )
-    return "\n".join(lines)
+    return table + "\n".join(textwrap.fill(line, _WIDTH, subsequent_indent="  ") for line in lines)

@@ -23,7 +23,7 @@ from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.rate_limiter import RateLimiter, RateLimiter_
 from armloop.drake_systems.reference import ReferenceSource
-from armloop.drake_systems.sticking import StickingForwardDynamics
+from armloop.drake_systems.sticking import StickingForwardDynamics, StickingForwardDynamics_
 
 __all__ = [
     "CONTROLLERS",
@@ -50,6 +50,7 @@ __all__ = [
     "RateLimiter_",
     "ReferenceSource",
     "StickingForwardDynamics",
+    "StickingForwardDynamics_",
     "Stop",
     "add_arm_with_controller",
     "add_joint_forces",

@@ -85,6 +85,9 @@ def ComputedTorque_(T: type) -> Any:
         (forward Euler), or continuous without one. Direct feedthrough of all inputs. Scalar types float,
         AutoDiffXd and Expression; for the last two the model must be a `ReconstructedModel`.
 
+        Precondition: M is positive definite. It is not checked, as any model will do that predicts; a joint whose
+        inertia sparse terms lack gets no feedback. `armloop.dynamics.with_mass_matrix(model)` sees to it.
+
         Not supported: torque limits (saturate `tau` behind it), friction with memory (taken as fully slid),
         models of a step below 3, which hold no inertia. A torque that is not finite raises `RuntimeError`.
         """

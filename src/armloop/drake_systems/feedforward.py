@@ -39,6 +39,9 @@ def Feedforward_(T: type) -> Any:
         behind each other: reading one port instead of three saves a sixth of the time of 300 terms. Output port:
         `tau_ff` (n,), N*m (N). A reference that is known ahead is cheaper still: `ReferenceSource`.
 
+        Precondition: the model is of n joints, and the reference within what it was fitted on. Not supported: effects of
+        the sensors, which no controller should supply.
+
         Stateless, direct feedthrough. Scalar types float, AutoDiffXd and Expression; for the last two the model
         must be a `ReconstructedModel`, and dry friction has the derivative 0, which is wrong at rest. Friction
         with memory acts as if fully slid. A prediction that is not finite raises `RuntimeError`: an unset or

@@ -27,7 +27,7 @@ def JointFrictionSystem_(T: type) -> Any:
 
         An explicit force cannot make a joint stick: it creeps at the speed at which tanh carries the load, and
         in a discrete plant with the step h it chatters unless h f_s (M^-1)_ii < 2 `smoothing`. `ArmPlant` and
-        `StickingForwardDynamics` stick.
+        `StickingForwardDynamics` stick. Not supported: friction that grows with the load (`EffectTorque` has it).
         """
 
         def _construct(
@@ -87,6 +87,7 @@ def PreslidingFriction_(T: type) -> Any:
 
         `set_relaxed` starts all elements relaxed at given positions; without it the first sample moves them there from
         zero. A plant of step h needs h^2 (M^-1)_ii sum(level / w) < 1; elements have no damping of their own.
+        Not supported: levels that depend on the speed or the load; add `JointFrictionSystem` for what slides.
         """
 
         def _construct(

@@ -46,7 +46,15 @@ class ArmPlant(Diagram):
     step that starts now, after the clamp.
     Speed mode (servo). Input port `desired_state` (2n,): q_d, then v_d at the end of the coming step.
     Output port `state`. The drives' torques follow from `servo_torque`.
-    All input ports must be connected. Discrete with period `time_step`.
+    All input ports must be connected. Discrete with period `time_step`. Direct feedthrough to `tau_drive` only.
+
+    Scalar types float and AutoDiffXd, so that it can be cloned and linearised: where a joint sticks it stays, where it
+    slides the sign of its friction is kept. Not Expression. Joint limits are Drake's, stiff but soft; velocity limits
+    are not enforced.
+
+    Not supported: contact and collision (an `external_contact` pushes with a given force), flexible joints and links, more
+    than one drive on a joint but for `transmission_coupling`. Faults of the record (gain, offset, encoder, delay) are the
+    instruments', not the plant's.
     """
 
     def __init__(

@@ -24,7 +24,8 @@ def RateLimiter_(T: type) -> Any:
 
         Input port: `u` (n,), the torque asked for. Output port: `tau` (n,), N*m (N). One discrete state (n,), y of the
         last period, updated with the period h; zero at the start unless `set_torque` is called. Direct feedthrough: it
-        is meant for a discrete plant of the same period. Scalar types float, AutoDiffXd and Expression.
+        is meant for a discrete plant of the same period. Scalar types float, AutoDiffXd and Expression. Not supported:
+        telling the controller, whose integral goes on growing behind the limits.
         """
 
         def _construct(

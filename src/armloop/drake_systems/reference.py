@@ -64,6 +64,9 @@ class ReferenceSource(Diagram):
     zero without a model. After the reference's duration the last values are held. Scalar types float and
     AutoDiffXd, in which they are constants; not Expression, in which a table cannot be looked up.
     A torque that is not finite raises `RuntimeError` when its time has come.
+
+    Precondition: whoever reads it has the same period and no offset. Not supported: a model's friction with memory (as if
+    fully slid).
     """
 
     def __init__(

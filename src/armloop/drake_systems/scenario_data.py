@@ -127,7 +127,9 @@ class TrackingData:
     reference: ReferenceData = field(default_factory=ReferenceData)
     score: list[float] = field(default_factory=lambda: [20.0, 40.0])  # s, start and end; []: the whole run
     controllers: list[str] = field(default_factory=lambda: list(PAPER))
-    bandwidth: float = 20.0  # rad/s, of computed torque: errors decay critically damped
+    # rad/s, of computed torque, whose errors decay critically damped; by default each joint's is such that it is as stiff
+    # as kp makes it where the reference begins, but at most a tenth of the sampling rate
+    bandwidth: Optional[float] = None
     random_seed: int = 0
     limits: Optional[LimitsData] = None
     pickup: Optional[PickupData] = None

@@ -70,7 +70,7 @@ class TrackingScenario:
     """A tracking experiment, validated.
 
     score : (start, end) s, the interval that is scored; controllers : names among `CONTROLLERS`
-    bandwidth : rad/s, of computed torque
+    bandwidth : rad/s, of computed torque; None for what makes it as stiff as kp
     rate : (n,) N*m/s (N/s), how fast the drives can change their torques; None for any
     used : share of the drives' limits that `bounded` plans with
     """
@@ -82,7 +82,7 @@ class TrackingScenario:
     score: tuple[float, float]
     controllers: tuple[str, ...] = PAPER
     seed: int = 0
-    bandwidth: float = 20.0
+    bandwidth: float | None = None
     pickup: Pickup | None = None
     wear: Wear | None = None
     rate: np.ndarray | None = None
@@ -162,7 +162,7 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         raise ScenarioError(
             f"{where}: score is {score}; it must be a start and an end in 0 to {reference.duration:g} s"
         )
-    if not 0 < data.bandwidth <= 1 / period:
+    if data.bandwidth is not None and not 0 < data.bandwidth <= 1 / period:
         raise ScenarioError(
             f"{where}: bandwidth is {data.bandwidth}; it must be above 0 and at most {1 / period:g} rad/s"
         )

@@ -4,65 +4,92 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydrake.systems.framework import LeafSystem
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
 from armloop.drake_systems.joint_loads import STICKING_GAIN
+from armloop.drake_systems.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
-from armloop.functions import MATH
 from armloop.model import ReconstructedModel
 
 
-class StickingForwardDynamics(LeafSystem):
-    """An arm that moves as an identified model says, in steps of h, with dry friction that sticks.
+@TemplateSystem.define("StickingForwardDynamics_", T_list=[float, AutoDiffXd])
+def StickingForwardDynamics_(T: type) -> Any:
+    """Return the class for one scalar type."""
 
-    M(q) (w - v) = h (tau - C(q, v) v - tau_g(q) - f(w)),  q' = q + h w,  v' = w
+    class Impl(LeafSystem_[T]):
+        """An arm that moves as an identified model says, in steps of h, with dry friction that sticks.
 
-    Dry friction has the sign of the velocity w that the step ends with, and the level at the velocity v that it
-    starts with: a joint holds still below its static friction and creeps no faster than its load / 1e8. What is
-    smooth in v (viscous friction) is taken at v and needs h f_v (M^-1)_ii < 2. Smoothed Coulomb terms of a model
-    stick too. Friction that grows with the load takes the load without the acceleration's part.
+        M(q) (w - v) = h (tau - C(q, v) v - tau_g(q) - f(w)),  q' = q + h w,  v' = w
 
-    Input port: `tau` (n,), the drives' torques over the step, N*m (N). Output port: `state` (2n,), q, then v.
-    2n discrete states with the period `time_step`. Scalar type float only: sticking has no derivative; to plan or
-    linearise take `ForwardDynamics`.
+        Dry friction has the sign of the velocity w that the step ends with, and the level at the velocity v that it
+        starts with: a joint holds still below its static friction and creeps no faster than its load / 1e8. What is
+        smooth in v (viscous friction) is taken at v and needs h f_v (M^-1)_ii < 2. Smoothed Coulomb terms of a model
+        stick too. Friction that grows with the load takes the load without the acceleration's part.
 
-    Precondition: (M + M^T) / 2, which is taken for M, is positive definite over the training range (checked on construction,
-    raises `ModelError`). Effects that a diagnosis added are included, sensor effects left out.
+        Input port: `tau` (n,), the drives' torques over the step, N*m (N). Output port: `state` (2n,), q, then v.
+        2n discrete states with the period `time_step`. Scalar types float and AutoDiffXd, in which a joint
+        that sticks stays and one that slides keeps the sign of its friction; not Expression, which cannot tell one from
+        the other. To plan take `ForwardDynamics`, which is smooth.
 
-    Not supported: joint and torque limits, contact, friction with memory (as if fully slid).
-    """
+        Precondition: (M + M^T) / 2, which is taken for M, is positive definite over the training range (checked on
+        construction, raises `ModelError`). Effects that a diagnosis added are included, sensor effects left out.
 
-    def __init__(self, model: ReconstructedModel, time_step: float = 1e-3) -> None:
-        """model : of n joints; time_step : h in s."""
-        super().__init__()
-        if not time_step > 0:
-            raise ValueError(f"time_step is {time_step}; it must be above 0 s")
-        require_mass_matrix(model)
-        self._equations = ModelEquations(model, MATH, sharp=True, symmetric=True)
-        self._step = float(time_step)
-        n = self._n = model.arm.n
-        self._tau = self.DeclareVectorInputPort("tau", n)
-        index = self.DeclareDiscreteState(2 * n)
-        self.DeclarePeriodicDiscreteUpdateEvent(time_step, 0.0, self._update)
-        self.DeclareStateOutputPort("state", index)
+        Not supported: joint and torque limits, contact, friction with memory (as if fully slid).
+        """
 
-    def _update(self, context: Any, discrete: Any) -> None:
-        n, h, equations = self._n, self._step, self._equations
-        state = context.get_discrete_state_vector().value().tolist()
-        q, v, tau, t = state[:n], state[n:], self._tau.Eval(context).tolist(), context.get_time()
-        still, joints = [0.0] * n, range(n)
-        M, rest = equations.mass_matrix(q), equations.rigid(q, v, still)
-        load = equations.load(q, v, still) if equations.load_matters else None
-        forward, backward = (equations.friction(v, load, t, [sign] * n) for sign in (1.0, -1.0))
-        laws = [ClampedLaw(j, 0.0, STICKING_GAIN, max(0.5 * (forward[j] - backward[j]), 0.0)) for j in joints]
-        momentum = [
-            sum(m * x for m, x in zip(M[j], v, strict=True))
-            + h * (tau[j] - rest[j] - 0.5 * (forward[j] + backward[j]))
-            for j in joints
-        ]
-        pieces = [law.piece(x) for law, x in zip(laws, v, strict=True)]
-        dry = implicit_torques(M, momentum, laws, pieces, h)
-        w = solve(M, [p + h * x for p, x in zip(momentum, dry, strict=True)])
-        discrete.set_value([x + h * y for x, y in zip(q, w, strict=True)] + w)
+        def _construct(
+            self,
+            model: ReconstructedModel,
+            time_step: float = 1e-3,
+            *,
+            check: bool = True,
+            converter: Any = None,
+        ) -> None:
+            """model : of n joints; time_step : h in s; check : whether to try M over the training range."""
+            if not time_step > 0:
+                raise ValueError(f"time_step is {time_step}; it must be above 0 s")
+            if check:
+                require_mass_matrix(model)
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = model, time_step
+            self._equations = ModelEquations(model, functions_of(T), sharp=True, symmetric=True)
+            self._step = float(time_step)
+            n = self._n = model.arm.n
+            self._tau = self.DeclareVectorInputPort("tau", n)
+            index = self.DeclareDiscreteState(2 * n)
+            self.DeclarePeriodicDiscreteUpdateEvent(time_step, 0.0, self._update)
+            self.DeclareStateOutputPort("state", index)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            # What is converted has been checked: M does not change with the scalar type.
+            Impl._construct(self, *other._arguments, check=False, converter=converter)
+
+        def _update(self, context: Any, discrete: Any) -> None:
+            n, h, equations = self._n, self._step, self._equations
+            state = context.get_discrete_state_vector().CopyToVector().tolist()
+            q, v, tau, t = state[:n], state[n:], self._tau.Eval(context).tolist(), context.get_time()
+            still, joints = [0.0] * n, range(n)
+            M, rest = equations.mass_matrix(q), equations.rigid(q, v, still)
+            load = equations.load(q, v, still) if equations.load_matters else None
+            forward, backward = (equations.friction(v, load, t, [sign] * n) for sign in (1.0, -1.0))
+            laws = [
+                ClampedLaw(j, 0.0, STICKING_GAIN, max(0.5 * (forward[j] - backward[j]), 0.0)) for j in joints
+            ]
+            momentum = [
+                sum(m * x for m, x in zip(M[j], v, strict=True))
+                + h * (tau[j] - rest[j] - 0.5 * (forward[j] + backward[j]))
+                for j in joints
+            ]
+            pieces = [law.piece(x) for law, x in zip(laws, v, strict=True)]
+            dry = implicit_torques(M, momentum, laws, pieces, h)
+            w = solve(M, [p + h * x for p, x in zip(momentum, dry, strict=True)])
+            discrete.set_value(vector(T, [x + h * y for x, y in zip(q, w, strict=True)] + w))
+
+    return Impl
+
+
+StickingForwardDynamics = StickingForwardDynamics_[None]

@@ -22,6 +22,7 @@ from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
+from armloop.dynamics import Dynamics, with_mass_matrix
 from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
@@ -31,6 +32,7 @@ MAIN_MODEL = "model"
 STEPS = {"step1": 1, "step2": 2, "step3": 3}
 """The names in `models` of the ones behind `pid_step1`, `pid_step2` and `pid_step3` alone, and their steps."""
 COMPUTED_TORQUE = "computed_torque"
+_BANDWIDTH = 20.0  # rad/s, of computed torque with a model that has no mass matrix to show
 BOUNDED = "bounded"
 EXACT = "exact"
 
@@ -213,14 +215,16 @@ def add_controlled_arm(
 
     Raises `ValueError` when `models` has none for the controller.
     """
-    plant, n = scenario.plant, scenario.plant.arm.n
+    plant = scenario.plant
     if controller == EXACT:
         model: FeedforwardModel | None = exact_model(plant.arm, plant.config.friction, effects)
         step = 3
     else:
         model, step = _feedforward(controller, models)
     if controller == COMPUTED_TORQUE:
-        gains = AccelerationGains.critical(n, scenario.bandwidth)
+        if isinstance(model, ReconstructedModel):
+            model = with_mass_matrix(model)
+        gains = _as_stiff(scenario, model)
         return add_arm_with_controller(
             builder,
             plant,
@@ -243,6 +247,16 @@ def add_controlled_arm(
         period = plant.config.time_step
         arm.reference.set_torques(bounded.torque(period * np.arange(len(arm.reference.tables[0]))))
     return arm
+
+
+def _as_stiff(scenario: TrackingScenario, model: FeedforwardModel | None) -> AccelerationGains:
+    """Return critically damped gains of the scenario's bandwidth, by default such that M_ii w^2 = kp at the start."""
+    n, bandwidth = scenario.plant.arm.n, scenario.bandwidth
+    if bandwidth is not None or not isinstance(model, ReconstructedModel):
+        return AccelerationGains.critical(n, bandwidth or _BANDWIDTH)
+    inertia = np.diag(Dynamics(model, symmetric=True).mass_matrix(scenario.reference.evaluate([0.0])[0][0]))
+    w = np.minimum(np.sqrt(scenario.gains.kp / inertia), 0.1 / scenario.plant.config.time_step)
+    return AccelerationGains(w**2, 2 * w)
 
 
 def _planned(scenario: TrackingScenario) -> tuple[Array, Array | None]:

@@ -3,7 +3,7 @@
 from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
 from armloop.dynamics.effects import EffectLaw, effect_law
 from armloop.dynamics.model import ModelEquations
-from armloop.dynamics.rigid import nearest_rigid_body
+from armloop.dynamics.rigid import nearest_rigid_body, with_mass_matrix
 
 __all__ = [
     "Dynamics",
@@ -13,4 +13,5 @@ __all__ = [
     "nearest_rigid_body",
     "require_mass_matrix",
     "training_range",
+    "with_mass_matrix",
 ]

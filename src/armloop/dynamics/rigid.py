@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armloop.components import RigidBody
+from armloop.dynamics.arrays import require_mass_matrix
+from armloop.errors import ModelError
 from armloop.library.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel
 
@@ -23,3 +25,20 @@ def nearest_rigid_body(model: ReconstructedModel) -> ReconstructedModel:
     full = model.inertial_parameters()
     base = BaseParameters.of_arm(model.arm)
     return replace(model, components=(RigidBody(full, tuple(base.names), base.from_full(full)),))
+
+
+def with_mass_matrix(model: ReconstructedModel) -> ReconstructedModel:
+    """The model itself where its M is positive definite over the training range, else the rigid body nearest to it.
+
+    Sparse terms of noisy data may lack the inertia of a light joint altogether: they predict its torque well, but a
+    controller that multiplies an acceleration by M would not move it.
+
+    Raises:
+        ModelError: M of the nearest rigid body is not positive definite either.
+    """
+    try:
+        require_mass_matrix(model)
+    except ModelError:
+        model = nearest_rigid_body(model)
+        require_mass_matrix(model)
+    return model

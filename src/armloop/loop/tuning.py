@@ -13,6 +13,7 @@ from armloop.drake_systems.gain_design import propose_gains
 from armloop.drake_systems.loop_analysis import model_posture, posture_model
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.tuned_loop import TunedLoop, Tuning, look_at
+from armloop.dynamics import with_mass_matrix
 from armloop.files import replacing, write_text
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -33,7 +34,8 @@ def tune_scenario(
 
     Args:
         bandwidth: rad/s; margin: deg.
-        model: whose inertia, friction and gravity the proposal is made with; by default the simulated arm's own. What the
+        model: whose inertia, friction and gravity the proposal is made with, those of the nearest rigid body where its mass
+            matrix cannot be inverted; by default the simulated arm's own. What the
             gains come to is judged on the simulated arm in any case.
 
     Raises:
@@ -41,7 +43,11 @@ def tune_scenario(
         ModelError: the model has no mass matrix.
     """
     plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
-    known = posture_model(plant.arm, plant.config.friction, q0) if model is None else model_posture(model, q0)
+    known = (
+        posture_model(plant.arm, plant.config.friction, q0)
+        if model is None
+        else model_posture(with_mass_matrix(model), q0)
+    )
     gains = propose_gains(known, plant.config.time_step, bandwidth, margin)
     progress("trying the scenario's gains")
     present = look_at(scenario, scenario.gains)
