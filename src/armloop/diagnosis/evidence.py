@@ -96,6 +96,10 @@ class Evidence:
             self._columns[key] = smooth(self.samples, effect.full_columns(self.context, shape))
         return self._columns[key]
 
+    def only(self, rows: NDArray[np.bool_]) -> Evidence:
+        """The same run where only rows (N, n) count."""
+        return replace(self, rows=rows)
+
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
         """The weighted regression problem of all joints, one row per joint and counted sample."""
         X = np.concatenate(columns, axis=2) if columns else np.zeros((*residual.shape, 0))

@@ -81,7 +81,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
         for effect in listed:
             if any(f.effect.place == effect.place for f in found):
                 continue
-            trial = _trial(evidence, residual, current, effect)
+            trial = try_effect(evidence, residual, current, effect)
             if trial is None or not _worth(evidence, current, trial, rows_per_joint):
                 continue
             if _gain(current, trial) >= LEAST_SHARE * explainable:
@@ -100,7 +100,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
             f"found {best.effects[-1].label()}: removes {gain / explainable:.0%} of what can be explained"
         )
         current = best
-    after = _refit(evidence, current)
+    after = refit(evidence, current)
     return Outcome(found, before, after, residual)
 
 
@@ -133,7 +133,8 @@ def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int
     return int(np.argmax((columns**2).sum(axis=(0, 2)))) == joint
 
 
-def _trial(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
+def try_effect(evidence: Evidence, residual: Array, current: Fit, effect: Effect) -> Fit | None:
+    """The fit with one effect more; None where its joints are at rest, or its parameters not physical."""
     joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
     if not all(evidence.rows[:, j].any() for j in joints):
         return None  # a joint at rest shows nothing
@@ -226,7 +227,7 @@ def _by_joint(worse: Fit, better: Fit, n: int) -> Array:
     return np.asarray(np.bincount(worse.stacked.joint, weights=difference, minlength=n))
 
 
-def _refit(evidence: Evidence, current: Fit) -> Fit:
+def refit(evidence: Evidence, current: Fit) -> Fit:
     """Fit again with what the found effects change of each other: loads raise friction, gains scale both."""
     if not current.effects:
         return current
