@@ -258,7 +258,8 @@ class ReconstructedModel:
 
 
 def _fault_order(added: AddedEffect) -> int:
-    return ("encoder_offset", "torque_gain", "torque_offset", "time_delay").index(added.effect.name)
+    order = ("encoder_offset", "torque_gain", "torque_offset", "time_delay")
+    return order.index(added.effect.name) if added.effect.name in order else len(order)
 
 
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:

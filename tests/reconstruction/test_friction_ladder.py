@@ -56,6 +56,8 @@ def test_every_element_of_the_ladder_belongs_to_a_law_with_a_name() -> None:
     assert elements == {kind for law in LAWS.values() for kind in law}
     assert restricted(ladder, tuple(LAWS)) == restricted(ladder, None) == ladder
     assert [rung.name for rung in restricted(ladder, ("presliding", "coulomb"))] == ["coulomb", "presliding"]
+    sharp, fading = (restricted(ladder, (name,))[0].elements[0] for name in ("coulomb", "coulomb_fading"))
+    assert len(sharp) == 1 < len(fading) and sharp[0].parameter == min(term.parameter for term in fading)
 
 
 def test_folds_are_runs_where_there_are_enough_and_blocks_else():

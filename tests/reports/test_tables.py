@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.reports.tables import (
-    diagnosis_table,
     eta_table,
     formulas,
     make_table,

@@ -18,6 +18,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--out", required=True, help="folder for diagnosis.json, model.json (augmented), report.html"
     )
+    p.add_argument(
+        "--held-out",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="LOG",
+        help="further runs of the arm as it is now, never fitted: error before and after on each of them",
+    )
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
     add_recorded(p, "as the model's training logs")
     add_json(p)
@@ -25,22 +33,25 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Trace what a model lacks on a run."""
-    from armloop.commands.shared import model_and_logs, out_folder, print_json, progress
+    from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
+    from armloop.diagnosis import close
     from armloop.diagnosis import diagnose as run
     from armloop.files import write_text
     from armloop.reports.diagnosis_report import diagnosis_report
-    from armloop.reports.tables import diagnosis_table
+    from armloop.reports.diagnosis_tables import diagnosis_table
 
     folder = out_folder(options.out)
     model, logs = model_and_logs(options)
+    apart = held_out_logs(options, model)
     result = run(model, logs, progress(options))
-    answer = result.to_dict()
-    page = diagnosis_report(result, model, [log.name for log in logs])
+    closing = close(model, result.model, result.samples, apart)
+    answer = {**result.to_dict(), **closing.to_dict()}
+    page = diagnosis_report(result, model, [log.name for log in logs], closing)
     write_text(folder / "diagnosis.json", json.dumps(answer, indent=1) + "\n")
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)
     if options.json:
         print_json(answer)
         return
-    print(diagnosis_table(result))
+    print(diagnosis_table(result, closing))
     print(f"\nwritten: {folder}/diagnosis.json, model.json (augmented), report.html")

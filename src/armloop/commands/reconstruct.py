@@ -57,9 +57,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         default=None,
         metavar="LAW,..",
         help="friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, "
-        "viscous, offset (levels differ by direction), stribeck, nonlinear_viscous, viscous_by_direction, "
-        "coulomb_by_load, presliding (memory: spring-like before it slides), presliding_by_load; the first is taken "
-        "anyway, each other where it earns its place on held-out data (default: all)",
+        "coulomb_fading (its sign fades in with the speed), viscous, offset (levels differ by direction), stribeck, "
+        "nonlinear_viscous, viscous_by_direction, coulomb_by_load, presliding (memory: spring-like before it slides), "
+        "presliding_by_load; the first of these is taken anyway, each other where it earns its place on held-out data "
+        "(default: all)",
     )
     p.add_argument(
         "--no-physical",

@@ -100,3 +100,12 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
     if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":
         raise ModelError(f"{options.model}: predicts torque in N·m; currents in A need --drive-gains")
     return model, read_logs(options.logs, model.arm.n, recorded)
+
+
+def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> list[MotionLog]:
+    """The logs of ``--held-out``; raises ``InputError`` for one that is also to be fitted."""
+    fitted = {Path(path).resolve() for path in options.logs}
+    for path in options.held_out:
+        if Path(path).resolve() in fitted:
+            raise InputError(f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted")
+    return read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))

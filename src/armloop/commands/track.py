@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from math import inf
+from typing import TYPE_CHECKING
 
 from armloop.commands.arguments import add_json
+
+if TYPE_CHECKING:
+    from armloop.drake_systems.live import LiveView
+    from armloop.drake_systems.scenarios import TrackingScenario
 
 HELP = "compare controllers in closed loop in Drake: mean absolute tracking error per joint"
 EXAMPLE = (
     "armloop track three_axis_tracking --model step1=model.json --model step3=model.json --out out/track"
 )
+
+_PATIENCE = 30.0  # s that are waited for a browser
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -36,6 +45,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "model is reconstructed from data collected on the scenario's arm first, if a controller needs it",
     )
     p.add_argument("--out", default=None, help="folder for tracking.json, plots and replay.html")
+    p.add_argument(
+        "--meshcat",
+        action="store_true",
+        help="show the arms while they move, in a browser on this computer; waits half a minute for it at most",
+    )
+    p.add_argument(
+        "--rate",
+        type=float,
+        default=None,
+        metavar="R",
+        help="simulated seconds per second of --meshcat; 1 by default, 0: as fast as it goes, without waiting",
+    )
     add_json(p)
 
 
@@ -61,16 +82,21 @@ def run(options: argparse.Namespace) -> None:
         if name in models:
             raise InputError(f"--model {item!r}: {name!r} is given twice")
         models[name] = load_model(path, scenario.plant.arm)
+    if options.rate is not None and not options.meshcat:
+        raise InputError("--rate is the pace of --meshcat; give both, or leave it out")
+    view = _view(options, scenario) if options.meshcat else None
     if scenario.pickup is not None:
-        answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options))
+        answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options), view)
         tables = [phases_table(pickup.phases)]
-        files = "tracking.json, tracking.png, diagnosis.json, augmented.json, since_the_grasp.csv"
+        files = (
+            "tracking.json, tracking.png, diagnosis.json, augmented.json, since_the_grasp.csv, replay.html"
+        )
     elif scenario.wear is not None:
         answer, wear = run_wear_scenario(scenario, models, folder, progress(options))
         tables = [spread_table(wear)]
         files = "tracking.json, spread.png"
     else:
-        answer, results = run_scenario(scenario, models, folder, progress(options))
+        answer, results = run_scenario(scenario, models, folder, progress(options), view)
         paper = scenario.name.startswith("three_axis_tracking")
         tables = [eta_table(results, paper=paper), metrics_table(results)]
         files = "tracking.json, tracking.png, replay.html"
@@ -83,3 +109,20 @@ def run(options: argparse.Namespace) -> None:
         print(f"\nverdict from the log since the grasp: {answer['diagnosis']['verdict']}; {'; '.join(found)}")
     if folder is not None:
         print(f"\nwritten: {folder}/{files}")
+
+
+def _view(options: argparse.Namespace, scenario: TrackingScenario) -> LiveView:
+    """The live view of ``--meshcat``, its address told, once a browser looks or nobody came."""
+    from armloop.drake_systems.live import LiveView
+    from armloop.errors import InputError
+
+    if scenario.wear is not None:
+        raise InputError(f"--meshcat: {scenario.name} runs many times at once; there is nothing to look at")
+    rate = 1.0 if options.rate is None else options.rate
+    if not 0 <= rate < inf:
+        raise InputError(f"--rate {rate:g}: it must be a number of at least 0")
+    view = LiveView(scenario.plant.arm, rate)
+    stream = sys.stderr if options.json else sys.stdout
+    print(f"live view: {view.address}", file=stream, flush=True)
+    view.wait(_PATIENCE)
+    return view

@@ -14,6 +14,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 from armloop.arm import Arm
 from armloop.drake_systems.scalars import functions_of, vector
 from armloop.dynamics import effect_law
+from armloop.dynamics.own_effects import OwnEffectEquations
 from armloop.effects import Value
 
 
@@ -66,7 +67,9 @@ def EffectTorque_(T: type) -> Any:
             n = self._n = arm.n
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             equations = self._law.equations
-            inertia = equations is not None and name in ("payload", "rotor_inertia", "transmission_coupling")
+            inertia = name in ("payload", "rotor_inertia", "transmission_coupling") or (
+                isinstance(equations, OwnEffectEquations) and equations.has_inertia
+            )
             self._vdot = self.DeclareVectorInputPort("vdot", n) if inertia else None
             by_load = name == "load_dependent_friction"
             self._load = self.DeclareVectorInputPort("load", n) if by_load else None

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.drake_systems.own_effects import Law, check_own, own_law
 from armloop.errors import ScenarioError
 
 _PARAMETERS: dict[str, tuple[str, ...]] = {
@@ -53,14 +54,14 @@ _AT_LEAST_ZERO = (
 _ABOVE_ZERO = ("velocity", "time_constant", "width")
 
 EFFECTS: tuple[str, ...] = tuple(_PARAMETERS)
-"""The effects that can be put into a plant."""
+"""The listed effects, all of which can be put into a plant; a user's own can, too."""
 
 
 @dataclass(frozen=True)
 class UndeclaredEffect:
     """One effect in the plant.
 
-    name : one of `EFFECTS`
+    name : one of `EFFECTS`, or an effect of the user's own (`armloop.effects.register`), whose parameters are its own
     joint : 1-based joint number; None for what belongs to the whole arm
     other_joint : the other joint of a `transmission_coupling`, else None
     parameters : SI units, by name:
@@ -88,7 +89,8 @@ class UndeclaredEffect:
 
     def __post_init__(self) -> None:
         if self.name not in _PARAMETERS:
-            raise ScenarioError(f"effect {self.name!r} is unknown; the plant can have: {', '.join(EFFECTS)}")
+            check_own(self.name, self.joint, self.other_joint)
+            return
         if (self.joint is None) != (self.name in _WHOLE_ARM):
             needed = "no joint: it belongs to the whole arm" if self.name in _WHOLE_ARM else "a joint, from 1"
             raise ScenarioError(f"effect {self.name}: joint is {self.joint}; it must have {needed}")
@@ -152,6 +154,7 @@ class Realisation:
     contacts : (S, 5) rows of start, end, force in the base frame
     payloads : pairs of mass and centre of mass (3,) in the last link's frame
     R_WB : (3, 3) rotation of the base in the level world
+    own : laws of the user's own effects
     """
 
     viscous: NDArray[np.float64]
@@ -169,6 +172,7 @@ class Realisation:
     contacts: NDArray[np.float64]
     payloads: tuple[tuple[float, NDArray[np.float64]], ...] = ()
     R_WB: NDArray[np.float64] = field(default_factory=lambda: np.eye(3))
+    own: tuple[Law, ...] = ()
 
 
 def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
@@ -185,6 +189,7 @@ def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
     rows: dict[str, list[tuple[float, ...]]] = {key: [] for key in _ROWS}
     payloads: list[tuple[float, NDArray[np.float64]]] = []
     R_WB = np.eye(3)
+    own: list[Law] = []
     for effect in effects:
         for joint in (effect.joint, effect.other_joint):
             if joint is not None and not 1 <= joint <= arm.n:
@@ -233,6 +238,8 @@ def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
                 rows["contacts"].append((p["start"], p["end"], *p["force"]))
             case "gravity_tilt":
                 R_WB = R_WB @ _tilt(float(p["roll"]), float(p["pitch"]))
+            case _:
+                own.append(own_law(arm, effect.name, effect.joint, effect.other_joint, p))
     return Realisation(
         **sums,
         torque_gain=gain,
@@ -241,6 +248,7 @@ def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
         **{key: np.array(rows[key], dtype=float).reshape(-1, width) for key, width in _ROWS.items()},
         payloads=tuple(payloads),
         R_WB=R_WB,
+        own=tuple(own),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +15,9 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from armloop.drake_systems.effects import DryFriction, Realisation
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
+from armloop.drake_systems.own_effects import Law
 
 Array = NDArray[np.float64]
-
-Law = Callable[[list[float], list[float]], Sequence[float]]
 
 STICKING_GAIN = 1e8
 """A sticking joint creeps at its load divided by this, N*m*s/rad (N*s/m)."""
@@ -88,7 +87,7 @@ class JointLoads(LeafSystem):
         self._couplings = [(int(j), int(k), *rest) for j, k, *rest in effects.couplings.tolist()]
         self._contacts = [(start, end, np.array(force)) for start, end, *force in effects.contacts.tolist()]
         self._tool = np.zeros(3) if X_tool is None else np.asarray(X_tool)[:3, 3]
-        self._law = law
+        self._laws = [*effects.own, *([] if law is None else [law])]
         self._servo = servo
         self._state = self.DeclareVectorInputPort("state", 2 * n)
         if servo is None:
@@ -135,8 +134,8 @@ class JointLoads(LeafSystem):
         if self._presliding:
             for (j, level, width), stretch in zip(self._presliding, self._stretches(context, q), strict=True):
                 load[j] -= level * stretch / width
-        if self._law is not None:
-            load = [x - y for x, y in zip(load, self._law(q, v), strict=True)]
+        for law in self._laws:
+            load = [x - y for x, y in zip(load, law(q, v), strict=True)]
         for start, end, force in self._contacts:
             if start <= context.get_time() < end:
                 push = self._jacobian().T @ force

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.pid import PidController
 from armloop.drake_systems.scenarios import TrackingScenario
-from armloop.drake_systems.tracking import MAIN_MODEL, TrackingResult, add_controlled_arm, score
+from armloop.drake_systems.tracking import MAIN_MODEL, RecordedArm, TrackingResult, score
 from armloop.log import MotionLog
 
 Array = NDArray[np.float64]
@@ -43,6 +43,7 @@ def run_pickup(
     scenario: TrackingScenario,
     model: FeedforwardModel,
     learn: Callable[[MotionLog], FeedforwardModel],
+    view: LiveView | None = None,
 ) -> PickupResult:
     """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
 
@@ -50,14 +51,16 @@ def run_pickup(
     At `pickup.diagnose_at` the simulation halts, `learn` is given the log since the grasp (encoders, the drives'
     torques with the sensor's noise, 1 / (2 time steps) Hz), and what it returns is the feedforward from then on. The
     integrator is then put back to what it held at the grasp: what it has learned since is in the model now.
+
+    view : shows the run, and holds it to its rate
     """
     pickup = scenario.pickup
     if pickup is None:
         raise ValueError(f"{scenario.name} has no pickup")
-    free = _Run(scenario, model, ())
+    free = _Run(scenario, model, (), view)
     free.systems.start_on_reference(free.context)
     free.advance(pickup.at)
-    loaded = _Run(scenario, model, (pickup.payload,))
+    loaded = _Run(scenario, model, (pickup.payload,), view)
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)
@@ -80,15 +83,21 @@ class _Run:
     """The controlled arm with loggers, and a simulator."""
 
     def __init__(
-        self, scenario: TrackingScenario, model: FeedforwardModel, effects: tuple[UndeclaredEffect, ...]
+        self,
+        scenario: TrackingScenario,
+        model: FeedforwardModel,
+        effects: tuple[UndeclaredEffect, ...],
+        view: LiveView | None,
     ) -> None:
-        builder, period = DiagramBuilder(), scenario.plant.config.time_step
-        self.systems = add_controlled_arm(builder, scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
-        self._logs = [
-            LogVectorOutput(self.systems.plant.GetOutputPort(name), builder, period)
-            for name in ("state", "tau_drive")
-        ]
+        self._arm = RecordedArm(scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
+        self.systems = self._arm.systems
+        builder = DiagramBuilder()
+        builder.AddNamedSystem(CONTROLLER, self._arm.diagram)
+        if view is not None:
+            view.add_to(builder, {CONTROLLER: self._arm.diagram})
         self._simulator = Simulator(builder.Build())
+        if view is not None:
+            view.pace(self._simulator)
         self._started = False
         self.context = self._simulator.get_mutable_context()
 
@@ -96,6 +105,8 @@ class _Run:
         if not self._started:
             self._simulator.Initialize()
             self._started = True
+        # real time goes on from here, however long the diagnosis took
+        self._simulator.ResetStatistics()
         self._simulator.AdvanceTo(until)
 
     def integral(self) -> Array:
@@ -112,8 +123,7 @@ class _Run:
 
     def recorded(self) -> tuple[Array, Array, Array]:
         """Return time (N,), state (N, 2n) and the drives' torques (N, n)."""
-        state, tau = (log.FindLog(self.context) for log in self._logs)
-        return state.sample_times().copy(), state.data().T.copy(), tau.data().T.copy()
+        return self._arm.recorded(self.context)
 
 
 def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> MotionLog:

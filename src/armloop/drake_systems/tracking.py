@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.drake_systems.bounded_feedforward import bounded_reference
@@ -19,6 +19,7 @@ from armloop.drake_systems.computed_torque import AccelerationGains
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.model import ReconstructedModel
@@ -131,20 +132,74 @@ def track(
     The diagram is that of `add_arm_with_controller`, with loggers. Raises `ValueError` when `models` has none
     for the controller.
     """
-    period = scenario.plant.config.time_step
-    builder = DiagramBuilder()
-    systems = add_controlled_arm(builder, scenario, controller, models, effects)
-    states = LogVectorOutput(systems.plant.GetOutputPort("state"), builder, period)
-    torques = LogVectorOutput(systems.plant.GetOutputPort("tau_drive"), builder, period)
-    simulator = Simulator(builder.Build())
-    context = simulator.get_mutable_context()
-    systems.start_on_reference(context)
+    run = RecordedArm(scenario, controller, models, effects)
+    simulator = Simulator(run.diagram)
+    run.systems.start_on_reference(simulator.get_mutable_context())
     simulator.Initialize()
     simulator.AdvanceTo(scenario.reference.duration)
-    log = states.FindLog(context)
-    time = log.sample_times()
-    tables = systems.reference.tables if controller != BOUNDED else scenario.reference.evaluate(time)
-    return score(scenario, controller, time, tables, log.data().T, torques.FindLog(context).data().T)
+    return run.result(simulator.get_context())
+
+
+def track_in_view(
+    scenario: TrackingScenario,
+    models: Mapping[str, FeedforwardModel],
+    view: LiveView,
+    effects: Sequence[UndeclaredEffect] = (),
+) -> dict[str, TrackingResult]:
+    """Do as `run_tracking`, all controllers at once in one simulation that a live view shows and holds to its rate."""
+    builder = DiagramBuilder()
+    runs = {name: RecordedArm(scenario, name, models, effects) for name in controllers_for(scenario, models)}
+    for name, run in runs.items():
+        builder.AddNamedSystem(name, run.diagram)
+    view.add_to(builder, {name: run.diagram for name, run in runs.items()})
+    simulator = Simulator(builder.Build())
+    for run in runs.values():
+        run.systems.start_on_reference(simulator.get_mutable_context())
+    view.pace(simulator)
+    simulator.Initialize()
+    simulator.AdvanceTo(scenario.reference.duration)
+    return {name: run.result(simulator.get_context()) for name, run in runs.items()}
+
+
+class RecordedArm:
+    """One controller's diagram with loggers, to simulate by itself or in a diagram around it.
+
+    Attributes:
+        diagram: output ports `state` (2n,) and `q_ref` (n,).
+        systems: see `ControlledArm`.
+    """
+
+    def __init__(
+        self,
+        scenario: TrackingScenario,
+        controller: str,
+        models: Mapping[str, FeedforwardModel],
+        effects: Sequence[UndeclaredEffect] = (),
+    ) -> None:
+        """See `track`."""
+        self._scenario, self._controller = scenario, controller
+        builder, period = DiagramBuilder(), scenario.plant.config.time_step
+        self.systems = add_controlled_arm(builder, scenario, controller, models, effects)
+        plant, reference = self.systems.plant, self.systems.reference
+        self._logs = [
+            LogVectorOutput(plant.GetOutputPort(name), builder, period) for name in ("state", "tau_drive")
+        ]
+        builder.ExportOutput(plant.GetOutputPort("state"), "state")
+        builder.ExportOutput(reference.GetOutputPort("q_ref"), "q_ref")
+        self.diagram = builder.Build()
+
+    def recorded(self, root_context: Context) -> tuple[Array, Array, Array]:
+        """Return time (N,), state (N, 2n) and the drives' torques (N, n)."""
+        state, tau = (log.FindLog(root_context) for log in self._logs)
+        return state.sample_times().copy(), state.data().T.copy(), tau.data().T.copy()
+
+    def result(self, root_context: Context) -> TrackingResult:
+        """Return what the run came to so far."""
+        time, state, tau = self.recorded(root_context)
+        # what is bounded follows another motion, and is judged by what was asked for
+        reference = self._scenario.reference
+        tables = reference.evaluate(time) if self._controller == BOUNDED else self.systems.reference.tables
+        return score(self._scenario, self._controller, time, tables, state, tau)
 
 
 def add_controlled_arm(

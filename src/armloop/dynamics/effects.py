@@ -2,6 +2,7 @@
 
 The laws are those of :mod:`armloop.effects`, whose columns serve arrays; here they take any kind of number, for
 systems that are differentiated or written out as formulas. Sensor effects act on records, not on arms, and have none.
+A user's own effect is asked for its torque at samples (:mod:`armloop.dynamics.own_effects`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 
 from armloop.arm import Arm
 from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
+from armloop.dynamics.own_effects import OwnEffectEquations
+from armloop.effects import EFFECTS, effect
 from armloop.effects.base import Value, number
 from armloop.effects.gravity_tilt import tilted_gravity
 from armloop.effects.payload import link_parameters
@@ -143,6 +146,9 @@ def effect_law(
     if name in _FRICTION:
         law = _FRICTION[name]
         return EffectLaw(None, j, lambda v, sign, load, t: law(p, functions, v, sign, load, t))
+    if name not in EFFECTS:
+        own = effect(name, joint, other_joint)
+        return EffectLaw(OwnEffectEquations(arm, own, parameters, inertial), j, load=own.load)
     raise ModelError(
         f"effect {name}: no law of q, v and vdot; those with one are: "
         + ", ".join(["payload", "gravity_tilt", "rotor_inertia", "joint_spring", "torque_ripple", *_FRICTION])

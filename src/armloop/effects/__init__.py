@@ -1,59 +1,58 @@
-"""Physical effects that a model can lack, one file each, and how to build them by name."""
+"""Physical effects that a model can lack, one file each, and how to build them by name.
+
+Users add their own by :func:`register` or as entry points (see :mod:`armloop.effects.own`).
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from armloop.arm import Arm
-from armloop.effects.base import Context, Effect, Estimate, Value
-from armloop.effects.coulomb_friction import CoulombFriction
-from armloop.effects.encoder_offset import EncoderOffset
-from armloop.effects.external_contact import ExternalContact
-from armloop.effects.friction_asymmetry import FrictionAsymmetry
-from armloop.effects.friction_drift import FrictionDrift
-from armloop.effects.gravity_tilt import GravityTilt
-from armloop.effects.joint_spring import JointSpring
-from armloop.effects.load_dependent_friction import LoadDependentFriction
-from armloop.effects.payload import Payload
-from armloop.effects.presliding_hysteresis import PreslidingHysteresis
-from armloop.effects.quadratic_drag import QuadraticDrag
-from armloop.effects.rotor_inertia import RotorInertia
-from armloop.effects.stribeck_friction import StribeckFriction
-from armloop.effects.time_delay import TimeDelay
-from armloop.effects.torque_gain import TorqueGain
-from armloop.effects.torque_offset import TorqueOffset
-from armloop.effects.torque_ripple import TorqueRipple
-from armloop.effects.transmission_coupling import TransmissionCoupling
-from armloop.effects.viscous_friction import ViscousFriction
+from armloop.effects.base import (
+    Context,
+    Effect,
+    Estimate,
+    LinearJointEffect,
+    ProfiledJointEffect,
+    Value,
+)
+from armloop.effects.listed import EFFECTS
+from armloop.effects.own import find, own_effects, own_names, register
 from armloop.errors import ModelError
 
-__all__ = ["EFFECTS", "Context", "Effect", "Estimate", "Value", "effect", "hypotheses"]
+__all__ = [
+    "EFFECTS",
+    "Context",
+    "Effect",
+    "Estimate",
+    "LinearJointEffect",
+    "ProfiledJointEffect",
+    "Value",
+    "effect",
+    "effect_kind",
+    "hypotheses",
+    "own_effects",
+    "own_names",
+    "register",
+]
 
-#: Every listed effect by its name in ``diagnosis.json``.
-EFFECTS: dict[str, type[Effect]] = {
-    kind.name: kind
-    for kind in (
-        Payload,
-        ViscousFriction,
-        CoulombFriction,
-        JointSpring,
-        TorqueRipple,
-        RotorInertia,
-        TorqueOffset,
-        GravityTilt,
-        StribeckFriction,
-        FrictionAsymmetry,
-        LoadDependentFriction,
-        QuadraticDrag,
-        FrictionDrift,
-        PreslidingHysteresis,
-        TransmissionCoupling,
-        TorqueGain,
-        EncoderOffset,
-        TimeDelay,
-        ExternalContact,
-    )
-}
+
+def effect_kind(name: Any) -> type[Effect]:
+    """The class of an effect, listed or a user's own.
+
+    Raises:
+        ModelError: there is none of that name.
+    """
+    kind = EFFECTS.get(name) if isinstance(name, str) else None
+    if kind is None and isinstance(name, str):
+        kind = find(name)
+    if kind is None:
+        own = f"; of your own: {', '.join(own_names())}" if own_names() else ""
+        raise ModelError(
+            f"unknown effect {name!r}; install the package that brings it (entry points armloop.effects), or register its "
+            f"class with armloop.effects.register. Listed are: {', '.join(EFFECTS)}{own}"
+        )
+    return kind
 
 
 def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
@@ -62,9 +61,7 @@ def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
     Raises:
         ModelError: there is no such effect, or a joint is missing or superfluous.
     """
-    if name not in EFFECTS:
-        raise ModelError(f"unknown effect {name!r}; there are: {', '.join(EFFECTS)}")
-    kind = EFFECTS[name]
+    kind = effect_kind(name)
     for field, value, needed in (
         ("joint", joint, kind.joint_wise),
         ("other_joint", other_joint, kind.pair_wise),
@@ -79,9 +76,13 @@ def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
 
 
 def hypotheses(arm: Arm) -> list[Effect]:
-    """Every effect that is searched for, at every joint of an arm and at every pair of joints."""
+    """Every effect that is searched for, at every joint of an arm and at every pair of joints.
+
+    Raises:
+        InputError: an effect of the user's own cannot be loaded.
+    """
     listed: list[Effect] = []
-    for kind in EFFECTS.values():
+    for kind in [*EFFECTS.values(), *own_effects().values()]:
         if not kind.searched:
             continue
         if kind.pair_wise:

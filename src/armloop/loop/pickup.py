@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from armloop.diagnosis import Diagnosis, diagnose
+from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.pickup import PickupResult, run_pickup
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.tracking import MAIN_MODEL
@@ -24,8 +25,10 @@ def run_pickup_scenario(
     models: Mapping[str, ReconstructedModel],
     folder: Path | None,
     progress: Progress,
+    view: LiveView | None = None,
 ) -> tuple[dict[str, Any], PickupResult]:
-    """Run a scenario with a pickup, and write tracking.json, diagnosis.json, the log, the augmented model and a plot.
+    """Run a scenario with a pickup, and write tracking.json, diagnosis.json, the log, the augmented model, a plot
+    and a replay.
 
     Returns:
         The content of ``tracking.json`` (controllers: ``pid_step3`` with the load, ``pid_augmented`` after the swap; all
@@ -41,7 +44,7 @@ def run_pickup_scenario(
             f"--model: {scenario.name} needs a model named step3 or model; given: {', '.join(chosen)}"
         )
     progress(f"tracking {scenario.reference.duration:g} s; a load is grasped on the way")
-    result, diagnosis = track_pickup(scenario, model, progress)
+    result, diagnosis = track_pickup(scenario, model, progress, view)
     phases = result.phases
     answer = tracking_answer(
         scenario, {"pid_step3": phases["loaded"], "pid_augmented": phases["augmented"]}
@@ -50,6 +53,7 @@ def run_pickup_scenario(
         "diagnosis": diagnosis.to_dict(),
     }
     if folder is not None:
+        from armloop.drake_systems.replay import write_replay
         from armloop.reports.plots import tracking_figure
         from armloop.reports.tracking_tables import PHASES
 
@@ -60,11 +64,17 @@ def run_pickup_scenario(
         save_made(folder, chosen, models)
         with replacing(folder / "tracking.png") as draft:
             tracking_figure(phases, PHASES).savefig(draft, format="png", dpi=110)
+        progress("recording the replay")
+        # every phase holds the whole run
+        write_replay(folder / "replay.html", scenario.plant.arm, {"pid_step3": phases["augmented"]})
     return answer, result
 
 
 def track_pickup(
-    scenario: TrackingScenario, model: ReconstructedModel, progress: Progress
+    scenario: TrackingScenario,
+    model: ReconstructedModel,
+    progress: Progress,
+    view: LiveView | None = None,
 ) -> tuple[PickupResult, Diagnosis]:
     """Run a scenario with a pickup; the diagnosis sees the model and the log since the grasp, nothing else."""
     found: list[Diagnosis] = []
@@ -74,5 +84,5 @@ def track_pickup(
         found.append(diagnose(model, [log], progress))
         return found[0].model
 
-    result = run_pickup(scenario, model, learn)
+    result = run_pickup(scenario, model, learn, view)
     return result, found[0]

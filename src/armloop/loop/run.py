@@ -73,8 +73,9 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
 
     What the diagnosis is given of the second run are two files: the model and the log.
     """
+    from armloop.reports.diagnosis_tables import diagnosis_table
     from armloop.reports.loop_report import loop_figure, loop_report
-    from armloop.reports.tables import diagnosis_table, eta_table, score_table, steps_table
+    from armloop.reports.tables import eta_table, score_table, steps_table
 
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant

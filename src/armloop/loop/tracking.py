@@ -10,10 +10,17 @@ from typing import Any
 import numpy as np
 
 from armloop.drake_systems.collection import collect
+from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.loop_analysis import loop_margins
 from armloop.drake_systems.metrics import BAND
 from armloop.drake_systems.scenarios import TrackingScenario, load_plan
-from armloop.drake_systems.tracking import MAIN_MODEL, TrackingResult, needs_model, run_tracking
+from armloop.drake_systems.tracking import (
+    MAIN_MODEL,
+    TrackingResult,
+    needs_model,
+    run_tracking,
+    track_in_view,
+)
 from armloop.files import replacing, write_text
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -27,19 +34,20 @@ def run_scenario(
     models: Mapping[str, ReconstructedModel],
     folder: Path | None,
     progress: Progress,
+    view: LiveView | None = None,
 ) -> tuple[dict[str, Any], dict[str, TrackingResult]]:
     """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
 
     Without any model one is reconstructed first, from data collected on the scenario's own arm, if a controller of
     the scenario needs one.
-    ``models`` are named as in :func:`armloop.drake_systems.tracking.run_tracking`.
+    ``models`` are named as in :func:`armloop.drake_systems.tracking.run_tracking`; a ``view`` shows all controllers at once.
 
     Returns:
         The content of ``tracking.json`` and the results by controller.
     """
     chosen = models_for(scenario, models, progress)
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
-    results = run_tracking(scenario, chosen)
+    results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
     answer = tracking_answer(scenario, results)
     if folder is not None:
         from armloop.drake_systems.replay import write_replay

@@ -43,9 +43,11 @@ _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
 _FADES = (0.003, 0.01, 0.03, 0.1)
 _WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
-#: What a user calls the laws, and the kinds of elements that each consists of.
+#: What a user calls the laws, and the kinds of elements that each consists of. Of the directions that fade in, plain
+#: Coulomb friction is the sharpest: the others stand in for what happens before the joint slides.
 LAWS = {
     "coulomb": ("smooth_sign",),
+    "coulomb_fading": ("smooth_sign",),
     "viscous": ("viscous",),
     "offset": ("offset",),
     "stribeck": ("stribeck_peak",),
@@ -144,9 +146,16 @@ def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
     if names is None:
         return ladder
     kinds = {kind: name for name in names for kind in LAWS[name]}
+
+    def allowed(own: list[FrictionTerm]) -> list[FrictionTerm]:
+        named = [term for term in own if term.kind in kinds]
+        sharpest = min((term.parameter for term in own if term.kind == "smooth_sign"), default=0.0)
+        fading = "coulomb_fading" in names
+        return [t for t in named if fading or t.kind != "smooth_sign" or t.parameter == sharpest]
+
     kept = []
     for rung in ladder:
-        elements = [[term for term in own if term.kind in kinds] for own in rung.elements]
+        elements = [allowed(own) for own in rung.elements]
         whole = elements == rung.elements
         called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
         if called:

@@ -6,11 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.diagnosis import Diagnosis
+from armloop.diagnosis import Closing, Diagnosis
 from armloop.model import ReconstructedModel
+from armloop.reports.diagnosis_tables import (
+    effects_table,
+    errors_table,
+    events_table,
+    feedforward_table,
+    held_out_table,
+)
+from armloop.reports.findings import alternatives, blame, findings, headline, nothing_to_supply
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots import residual_shape_figure, residual_time_figure, shares_figure
-from armloop.reports.tables import effects_table, errors_table, formulas
+from armloop.reports.plots import (
+    feedforward_figure,
+    residual_shape_figure,
+    residual_time_figure,
+    shares_figure,
+)
+from armloop.reports.residuals import moving_joints
+from armloop.reports.tables import formulas
 from armloop.reports.words import counted, effect_label, listed, number, numbers, percent, unit, with_error
 
 _SHARES = (
@@ -23,23 +37,15 @@ _TIME = (
     "residual inside it means nothing."
 )
 _SHAPE = (
-    "The same residual against position and velocity, where its law shows as the mean line, and its "
-    "spectrum, where a ripple shows as a peak. The grey band is the baseline's level."
+    "The same residual against position, velocity and load, where its law shows as the mean line, and its "
+    "spectrum, where what comes back shows as a peak. The load is the torque that passes the joint, friction "
+    "apart. The grey band is the baseline's level."
 )
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """The verdict in a few words."""
-    found = [effect_label(f.effect) for f in diagnosis.outcome.found]
-    if diagnosis.contacts:
-        found.append(counted(len(diagnosis.contacts), "external contact"))
-    if found:
-        return listed(found)
-    return (
-        "no effect"
-        if diagnosis.verdict == "no_effect"
-        else f"unlisted effect, joint {_unlisted_joint(diagnosis)}"
-    )
+_LEFT = "What the effects leave, on a scale of its own: a law that shows here is one that was not found."
+_ADDS = (
+    "The feedforward with the augmented model minus the feedforward with the model before, along the run's "
+    "motion. A sensor's fault and a contact are not in it: no controller should supply them."
+)
 
 
 def strongest_joint(diagnosis: Diagnosis) -> int:
@@ -59,26 +65,58 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
         "what the model leaves on its own baseline data, and every listed effect at every joint was tried "
         "on blocks of data it had not been fitted to; of equals, the simplest stands."
     )
-    text = [intro, *(_capital(sentence) for sentence in _findings(diagnosis))]
+    accused = " ".join(blame(diagnosis))
+    tables = [effects_table(diagnosis)] if diagnosis.outcome.found or diagnosis.unlisted is not None else []
+    tables += [events_table(diagnosis)] if diagnosis.contacts else []
     verdict = Section(
         "Diagnosis",
-        text,
+        [intro, *findings(diagnosis)],
         [Picture(shares_figure(diagnosis), _SHARES)] if diagnosis.outcome.found else [],
-        [*([effects_table(diagnosis)] if diagnosis.verdict != "no_effect" else []), errors_table(diagnosis)],
-        notes=_alternatives(diagnosis),
+        [*tables, errors_table(diagnosis)],
+        notes=[*([accused] if accused else []), *alternatives(diagnosis)],
     )
-    residual = Section(
-        "Residual",
-        [_residual_words(diagnosis)],
+    pictures = [Picture(residual_time_figure(diagnosis), _TIME)]
+    if moving_joints(diagnosis):
+        pictures.append(Picture(residual_shape_figure(diagnosis), _SHAPE))
+    if diagnosis.outcome.found:
+        left = residual_shape_figure(diagnosis, what_is_left=True)
+        pictures.append(Picture(left, _LEFT, "What is left, on its own scale"))
+    return [verdict, Section("Residual", [_residual_words(diagnosis)], pictures)]
+
+
+def closing_section(diagnosis: Diagnosis, closing: Closing) -> Section:
+    """What a controller now adds, and the errors on whole runs that were not fitted."""
+    arm, changes = diagnosis.model.arm, bool(closing.feedforward.largest.any())
+    added = [*diagnosis.outcome.added(), *(contact.added for contact in diagnosis.contacts)]
+    if changes:
+        same = [f"{j + 1}" for j in np.flatnonzero(closing.feedforward.largest == 0)]
+        text = ["With the augmented model as feedforward a controller supplies this in addition."]
+        if same:
+            text[0] += f" At {'joint' if len(same) == 1 else 'joints'} {listed(same)} nothing changes."
+    else:
+        text = [nothing_to_supply(added)]
+    if closing.held_out:
+        text.append(
+            f"Beside the blocks held out of the run, {counted(len(closing.held_out), 'whole run')} that no effect was "
+            "fitted to went through both models."
+        )
+    return Section(
+        "What it changes",
+        text,
+        [Picture(feedforward_figure(diagnosis, closing), _ADDS)] if changes else [],
         [
-            Picture(residual_time_figure(diagnosis), _TIME),
-            Picture(residual_shape_figure(diagnosis), _SHAPE),
+            *([feedforward_table(diagnosis, closing)] if changes else []),
+            *([held_out_table(closing, arm)] if closing.held_out else []),
         ],
     )
-    return [verdict, residual]
 
 
-def diagnosis_report(diagnosis: Diagnosis, model: ReconstructedModel, log_names: Sequence[str]) -> str:
+def diagnosis_report(
+    diagnosis: Diagnosis,
+    model: ReconstructedModel,
+    log_names: Sequence[str],
+    closing: Closing | None = None,
+) -> str:
     """One HTML page on a diagnosis; ``model`` is the model before, without the effects."""
     count = len(diagnosis.outcome.found)
     text = [
@@ -91,19 +129,29 @@ def diagnosis_report(diagnosis: Diagnosis, model: ReconstructedModel, log_names:
             "prediction, evaluation and feedforward control."
         )
     models = Section("The model", text, formulas=[("The model as formulas, one per joint", formulas(model))])
-    lead = (
-        f"A run of {model.arm.name} that the model could not explain, and what it takes to explain it."
-        if diagnosis.verdict != "no_effect"
-        else f"A run of {model.arm.name} that the model explains as well as its own baseline data."
-    )
+    sections = diagnosis_sections(diagnosis, log_names)
+    if closing is not None:
+        sections.append(closing_section(diagnosis, closing))
     return render(
         Report(
             f"Diagnosis: {headline(diagnosis)}",
-            lead,
-            [*diagnosis_sections(diagnosis, log_names), models],
+            _lead(diagnosis),
+            [*sections, models],
             diagnosis_cards(diagnosis),
         )
     )
+
+
+def _lead(diagnosis: Diagnosis) -> str:
+    name = diagnosis.model.arm.name
+    if diagnosis.verdict == "no_effect":
+        return f"A run of {name} that the model explains as well as its own baseline data."
+    if diagnosis.verdict == "unlisted_effect":
+        return f"A run of {name} that neither the model nor any listed effect explains."
+    found = [f.effect for f in diagnosis.outcome.found]
+    if found and all(effect.sensor for effect in found) and not diagnosis.contacts:
+        return f"A run of {name} that the model could not explain: the sensor is at fault, not the arm."
+    return f"A run of {name} that the model could not explain, and what it takes to explain it."
 
 
 def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
@@ -142,12 +190,13 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
             "accent",
         ),
         Card(
-            f"{with_error(estimate.value, estimate.std_error)} {unit(estimate.unit)}",
-            key.replace("_", " ").capitalize(),
+            with_error(estimate.value, estimate.std_error),
+            _with_unit(key.replace("_", " ").capitalize(), unit(estimate.unit)),
+            "± standard error over blocks",
         ),
         Card(
-            f"{number(before)} → {number(after)} {u}",
-            f"Held-out RMSE, joint {j + 1}",
+            f"{number(before)} → {number(after)}",
+            f"Held-out RMSE, joint {j + 1} [{u}]",
             f"the model's own baseline: {number(floor)} {u}",
             "good",
         ),
@@ -160,51 +209,16 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
     ]
 
 
+def _with_unit(title: str, of: str) -> str:
+    return f"{title} [{of}]" if of else title
+
+
 def _contact_card(diagnosis: Diagnosis, k: int) -> Card:
     contact = diagnosis.contacts[k]
     start, end, force = (contact.added.parameters[key].value for key in ("start", "end", "force"))
     size = float(np.linalg.norm(np.asarray(force)))
     when = f"{number(float(np.asarray(start)))} to {number(float(np.asarray(end)))} s"
     return Card(f"{number(size, 2)} N", f"Contact {k + 1}, {when}", "mean force on the tool", "accent")
-
-
-def _findings(diagnosis: Diagnosis) -> list[str]:
-    sentences = [
-        f"Found: {added.effect.sentence(added.parameters)}. It removes {percent(found.share)} of what can be "
-        "explained."
-        for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True)
-    ]
-    sentences += [
-        f"Found: {contact.added.effect.sentence(contact.added.parameters)}. The force explains "
-        f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
-        for contact in diagnosis.contacts
-    ]
-    unlisted = diagnosis.unlisted
-    if unlisted is not None:
-        u = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
-        law = (
-            f"follows {unlisted.form}"
-            if unlisted.form
-            else "follows no law that both halves of the run agree on"
-        )
-        sentences.append(
-            f"Joint {unlisted.joint} keeps a residual of {number(unlisted.rmse)} {u} (baseline "
-            f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}."
-        )
-    return sentences or [
-        "The residual is that of the baseline: the model lacks nothing that this run could show."
-    ]
-
-
-def _alternatives(diagnosis: Diagnosis) -> list[str]:
-    notes = []
-    for effect in diagnosis.to_dict()["effects"]:
-        for rival in effect["alternatives"]:
-            name = rival["effect"].replace("_", " ") + (
-                f" at joint {rival['joint']}" if rival["joint"] else ""
-            )
-            notes.append(f"Not told apart: {name} ({percent(rival['share'])}). {_capital(rival['why'])}.")
-    return notes
 
 
 def _residual_words(diagnosis: Diagnosis) -> str:
@@ -220,12 +234,3 @@ def _residual_words(diagnosis: Diagnosis) -> str:
         f"effects added it is {numbers(after, 2)} times. One means that the model explains this run as well "
         "as its own training data."
     )
-
-
-def _unlisted_joint(diagnosis: Diagnosis) -> int:
-    assert diagnosis.unlisted is not None
-    return diagnosis.unlisted.joint
-
-
-def _capital(sentence: str) -> str:
-    return sentence[:1].upper() + sentence[1:]

@@ -21,16 +21,21 @@ from armloop.reports.tables import Table
 
 _THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE: "var(--surface)"}
 _DPI = 150
+#: Blanks that no line should end at: before a unit or %, after ± and arrows.
+_TIES = re.compile(
+    r"(?<=[±→×]) | (?=%)|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
+)
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with a caption that says what it shows."""
+    """A figure with a caption that says what it shows; with a ``summary``, folded away behind it until asked for."""
 
     figure: Figure
     caption: str = ""
+    summary: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,13 @@ def render(report: Report) -> str:
         loader=PackageLoader("armloop.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["svg"] = lambda figure: Markup(svg(figure))
+    environment.filters["tied"] = tied
     return environment.get_template("report.html").render(report=report, version=__version__)
+
+
+def tied(text: str) -> str:
+    """Keep a number's sign, error and unit on one line with it."""
+    return _TIES.sub("\u00a0", text)
 
 
 def svg(figure: Figure) -> str:

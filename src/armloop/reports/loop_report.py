@@ -15,7 +15,8 @@ from armloop.log import MotionLog
 from armloop.motion import Samples
 from armloop.reconstruction import Reconstruction
 from armloop.reports import paper as published
-from armloop.reports.diagnosis_report import diagnosis_sections, headline, strongest_joint
+from armloop.reports.diagnosis_report import diagnosis_sections, strongest_joint
+from armloop.reports.findings import headline
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import Stage, eta_figure, ring_figure, tracking_figure
 from armloop.reports.plots.ring import bars, lines
@@ -137,13 +138,15 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
     time = samples.motion.time[part]
     predicted = smooth(samples, model.predict(samples.motion))[part, loaded]
     errors, j = diagnosis.errors(), strongest_joint(diagnosis)
-    before, after = held_out_residuals(diagnosis)
-    again = _piece(diagnosis.samples)
+    left, again = held_out_residuals(diagnosis), _piece(diagnosis.samples)
+    shown = (left.rows >= again.start) & (left.rows < again.stop)
+    before, after = left.before[shown, j], left.after[shown, j]
+    instants = diagnosis.samples.motion.time[left.rows[shown]]
     clock = diagnosis.samples.motion.time[again]
     measured = diagnosis.samples.tau[again, j]
     expected = measured - diagnosis.outcome.residual[again, j]
     floor, u = errors["noise_floor"][j], unit(errors["unit"][j])
-    limit = 1.05 * max(float(np.nanmax(np.abs(before[again, j]))), 3 * floor)
+    limit = 1.05 * max(float(np.nanmax(np.abs(before))), 3 * floor)
     count = sum(log.samples for log in result.logs.values())
     duration = sum(
         float(np.ptp(diagnosis.samples.motion.time[run])) for run in diagnosis.samples.motion.runs()
@@ -189,15 +192,15 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
             "Residual",
             f"{number(errors['before'][j] / floor, 2)} × baseline",
             f"joint {j + 1}: {number(errors['before'][j])} {u} RMSE",
-            lines(clock, [before[again, j]], [BEFORE], floor * 2, limit),
+            lines(instants, [before], [BEFORE], floor * 2, limit),
             ORANGE,
         ),
         Stage(
             "Effect",
             *_effect_words(diagnosis),
             lines(
-                clock,
-                [before[again, j], (before - after)[again, j]],
+                instants,
+                [before, before - after],
                 [GREY, ORANGE],
                 None,
                 limit,
@@ -209,7 +212,7 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
             "Augmented model",
             f"{number(errors['after'][j] / floor, 2)} × baseline",
             f"joint {j + 1}: {number(errors['after'][j])} {u} RMSE, not fitted",
-            lines(clock, [after[again, j]], [AFTER], floor * 2, limit),
+            lines(instants, [after], [AFTER], floor * 2, limit),
             GREEN,
         ),
         Stage(

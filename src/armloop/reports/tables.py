@@ -13,16 +13,13 @@ from armloop.reports import paper as published
 from armloop.reports.words import (
     MISSING,
     controller,
-    effect_label,
     number,
     percent,
     unit,
-    with_error,
 )
 
 if TYPE_CHECKING:  # what makes the results need not be loaded to print them
     from armloop.arm import Arm
-    from armloop.diagnosis import Diagnosis
     from armloop.drake_systems.tracking import TrackingResult
     from armloop.model import ReconstructedModel
     from armloop.reconstruction import StepReport
@@ -143,57 +140,6 @@ def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") 
         )
     headers = ["joint", "unit", "RMS measured", "RMSE moving", "nRMSE moving", "RMSE at rest"]
     return make_table(headers, rows, title, left=(0, 1))
-
-
-def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
-    """Each effect found with its parameters ± standard error and its share of the explainable residual."""
-    rows: list[list[object]] = []
-    for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True):
-        for k, (key, e) in enumerate(added.parameters.items()):
-            rows.append(
-                [
-                    effect_label(found.effect) if k == 0 else "",
-                    key.replace("_", " "),
-                    with_error(e.value, e.std_error),
-                    unit(e.unit),
-                    percent(found.share) if k == 0 else "",
-                ]
-            )
-    for contact in diagnosis.contacts:
-        for k, (key, e) in enumerate(contact.added.parameters.items()):
-            label, share = effect_label(contact.added.effect), percent(contact.share)
-            value = with_error(e.value, e.std_error)
-            rows.append([label if k == 0 else "", key, value, unit(e.unit), share if k == 0 else ""])
-    if diagnosis.unlisted is not None:
-        rows.append(
-            [f"unlisted, joint {diagnosis.unlisted.joint}", "law", diagnosis.unlisted.form or MISSING, "", ""]
-        )
-    return make_table(["effect", "parameter", "value", "unit", "share"], rows, title, left=(0, 1, 3))
-
-
-def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not fitted, RMSE") -> Table:
-    """RMSE per joint before and after the effects were added, and the model's own on its baseline data."""
-    errors = diagnosis.errors()
-    relative = errors["nrmse"]
-    rows = [
-        [
-            f"{j + 1}  {joint.name}",
-            unit(errors["unit"][j]),
-            *(errors[key][j] for key in ("before", "after", "noise_floor")),
-            *(percent(relative[key][j]) for key in ("before", "after")),
-        ]
-        for j, joint in enumerate(diagnosis.model.arm.joints)
-    ]
-    headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]
-    return make_table(headers, rows, title, left=(0, 1))
-
-
-def diagnosis_table(diagnosis: Diagnosis) -> str:
-    """The verdict, the effects found and the errors per joint, for a terminal."""
-    parts = [f"Verdict: {diagnosis.verdict}"]
-    if diagnosis.outcome.found or diagnosis.contacts or diagnosis.unlisted is not None:
-        parts.append(str(effects_table(diagnosis)))
-    return "\n\n".join([*parts, str(errors_table(diagnosis))])
 
 
 def seconds_table(seconds: Mapping[str, float], title: str | None = "Time taken") -> Table:

@@ -47,7 +47,9 @@ def percent(x: float | None) -> str:
 
 
 def unit(text: str) -> str:
-    """``N*m`` as N·m, ``kg*m^2`` as kg·m²."""
+    """``N*m`` as N·m, ``kg*m^2`` as kg·m², ``1`` as nothing."""
+    if text == "1":
+        return ""
     for plain, sign in _UNITS.items():
         text = text.replace(plain, sign)
     return text

@@ -1,6 +1,7 @@
 """Figures of the reports: each function takes results and returns a matplotlib figure."""
 
 from armloop.reports.plots.conditions import clusters_figure
+from armloop.reports.plots.feedforward import feedforward_figure
 from armloop.reports.plots.orders import has_trials, orders_figure
 from armloop.reports.plots.residual import residual_shape_figure, residual_time_figure
 from armloop.reports.plots.ring import Stage, ring_figure
@@ -12,6 +13,7 @@ __all__ = [
     "Stage",
     "clusters_figure",
     "eta_figure",
+    "feedforward_figure",
     "has_trials",
     "orders_figure",
     "residual_shape_figure",

@@ -1,11 +1,11 @@
-"""A residual before and after the effects found: against time, position, velocity, and its spectrum."""
+"""A residual before and after the effects found: against time, position, velocity, load, and its spectrum."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.signal import welch
 
@@ -16,6 +16,7 @@ from armloop.reports.plots.style import (
     BEFORE,
     BLUE,
     GREY,
+    MUTED,
     every,
     figure,
     legend,
@@ -24,84 +25,105 @@ from armloop.reports.plots.style import (
     thin,
     with_gaps,
 )
-from armloop.reports.residuals import held_out_residuals
+from armloop.reports.residuals import held_out_residuals, joint_load, moving_joints, time_axis
 from armloop.reports.words import unit
 
 Array = NDArray[np.float64]
+Series = list[tuple[Array, str, str]]
 
-_MOST_DOTS = 1200
+_MOST_DOTS = 900
 _BINS = 30
+#: Length of the pieces whose spectra are averaged, s: joints move a tenth of a time per second and faster.
+_SPECTRUM_SECONDS = 10.0
 
 
-def residual_time_figure(diagnosis: Diagnosis, most_seconds: float = 60.0) -> Figure:
+def residual_time_figure(diagnosis: Diagnosis) -> Figure:
     """One row per joint: the held-out residual before and after, with the baseline's level as a band."""
-    before, after = held_out_residuals(diagnosis)
     samples, scale, joints = diagnosis.samples, diagnosis.evidence.scale, diagnosis.model.arm.joints
-    origin = samples.motion.time[0]
-    time, whole = samples.motion.time - origin, diagnosis.evidence.residual([])
-    shown = time <= most_seconds
+    whole = diagnosis.evidence.residual([])
+    rows, series = _series(diagnosis)
+    time, clock = time_axis(samples.motion)
     n = len(joints)
-    made = figure(10, (1.5 if n < 5 else 1.2) * n + 0.7)
+    made = figure(10.5, (1.5 if n < 5 else 1.25) * n + 0.7)
     column = panels(made, n, 1, sharex=True)[:, 0]
     for j, (axes, joint) in enumerate(zip(column, joints, strict=True)):
         _band(axes, float(scale[j]))
         if diagnosis.contacts:
             # Contacts happen at rest, too: there the residual is no measure of the model, but it shows the push.
-            line = thin(*with_gaps(time[shown], whole[shown, j]))
+            line = thin(*with_gaps(time, whole[:, j]))
             axes.plot(*line, color=GREY, linewidth=0.9, label="all samples, at rest too", rasterized=True)
         for contact in diagnosis.contacts:
             start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
-            axes.axvspan(start - origin, end - origin, color=BLUE, alpha=0.15, linewidth=0)
-        for values, color, label in _series(diagnosis, before, after):
-            line = thin(*with_gaps(time[shown], values[shown, j]))
+            inside = time[contact.rows & (samples.motion.time >= start) & (samples.motion.time <= end)]
+            axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="external contact")
+        for values, color, label in series:
+            line = thin(*with_gaps(time[rows], values[:, j]))
             axes.plot(*line, color=color, linewidth=0.9, label=label, rasterized=True)
         axes.margins(x=0.01)
-        polish(
-            axes, "time [s]" if j == n - 1 else "", f"residual [{unit(joint.torque_unit)}]", f"Joint {j + 1}"
-        )
-    legend(made, 4)
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+        u = unit(joint.torque_unit)
+        polish(axes, clock if j == n - 1 else "", f"residual [{u}]", _title(diagnosis, series, j))
+    legend(made, 5)
     return made
 
 
-def residual_shape_figure(diagnosis: Diagnosis) -> Figure:
-    """One row per joint: the residual against position and velocity (dots, bins' means), and its spectrum."""
-    before, after = held_out_residuals(diagnosis)
-    motion, scale, arm = diagnosis.samples.motion, diagnosis.evidence.scale, diagnosis.model.arm
-    made = figure(10.5, (2.0 if arm.n < 5 else 1.55) * arm.n + 0.7)
-    grid = panels(made, arm.n, 3)
-    for j, joint in enumerate(arm.joints):
-        last = j == arm.n - 1
-        for k, x in enumerate((motion.q[:, j], motion.v[:, j])):
-            axes = grid[j, k]
+def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> Figure:
+    """One row per joint that moves: the residual against position, velocity, load (dots, bins' means), its spectrum.
+
+    Args:
+        what_is_left: draw only what the effects leave, so that its axes fit it.
+    """
+    motion, scale, joints = diagnosis.samples.motion, diagnosis.evidence.scale, diagnosis.model.arm.joints
+    load, (rows, series) = joint_load(diagnosis), _series(diagnosis)
+    series = series[-1:] if what_is_left else series
+    moved = moving_joints(diagnosis)
+    n, mixed = len(moved), len({joint.kind for joint in joints}) > 1
+    made = figure(10.5, (2.0 if n < 5 else 1.7) * n + 0.8)
+    grid = panels(made, n, 4, gap=0.5, rows_gap=0.72 if mixed else 0.5)
+    for line, j in zip(grid, moved, strict=True):
+        joint, last = joints[j], j == moved[-1]
+        u, at = unit(joint.torque_unit), joint.position_unit
+        names = (f"position [{at}]", f"velocity [{at}/s]", f"load [{u}]")
+        for k, x in enumerate((motion.q[:, j], motion.v[:, j], load[:, j])):
+            axes = line[k]
             _band(axes, float(scale[j]))
-            for values, color, label in _series(diagnosis, before, after):
-                _cloud(axes, x, values[:, j], color, label)
-            name = ("position", "velocity")[k]
-            u = joint.position_unit + ("" if k == 0 else "/s")
-            ylabel = f"residual [{unit(joint.torque_unit)}]" if k == 0 else ""
-            polish(axes, f"{name} [{u}]" if last else "", ylabel, f"Joint {j + 1}" if k == 0 else "")
-            if k == 1:
-                axes.sharey(grid[j, 0])
-        axes = grid[j, 2]
-        for values, color, label in _series(diagnosis, before, after):
-            _spectrum(axes, diagnosis, values[:, j], color, label)
-        if diagnosis.samples.cutoff_hz > 0:
-            # what the baseline's residual would show, were it spread evenly below the filter's corner
-            level = float(scale[j]) / np.sqrt(diagnosis.samples.cutoff_hz)
-            axes.axhspan(level / 2, 2 * level, color=BASELINE, alpha=0.22, linewidth=0)
-        polish(axes, "frequency [Hz]" if last else "", f"[{unit(joint.torque_unit)}/√Hz]")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=6))
-            axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-            axis.set_minor_formatter(NullFormatter())
+            for values, color, label in series:
+                _cloud(axes, x[rows], values[:, j], color, label)
+            title = _title(diagnosis, series, j) if k == 0 else ""
+            polish(axes, names[k] if mixed or last else "", f"residual [{u}]" if k == 0 else "", title)
+            if k:
+                axes.sharey(line[0])
+                axes.tick_params(labelleft=False)
+            axes.xaxis.set_major_locator(MaxNLocator(5))
+            axes.yaxis.set_major_locator(MaxNLocator(5))
+            if j == moved[0] and k:
+                _head(axes, f"against {names[k].split(' [')[0]}")
+        _spectra(line[3], diagnosis, rows, series, j)
+        polish(line[3], "frequency [Hz]" if mixed or last else "")
+        _head(line[3], f"spectrum [{u}/√Hz]")
     legend(made, 4)
     return made
 
 
-def _series(diagnosis: Diagnosis, before: Array, after: Array) -> list[tuple[Array, str, str]]:
+def _series(diagnosis: Diagnosis) -> tuple[NDArray[np.intp], Series]:
+    """Samples shown, and residuals there with colour and label; one residual where no effect was found."""
+    shown = held_out_residuals(diagnosis)
     if not diagnosis.outcome.found:
-        return [(before, AFTER, "residual")]
-    return [(before, BEFORE, "before"), (after, AFTER, "after")]
+        return shown.rows, [(shown.before, AFTER, "residual")]
+    both = [(shown.before, BEFORE, "before"), (shown.after, AFTER, "after, on blocks not fitted")]
+    return shown.rows, both
+
+
+def _title(diagnosis: Diagnosis, series: Series, j: int) -> str:
+    """The joint's number; where it is so, that it does not move, or that the effects leave it as it was."""
+    if not np.isfinite(series[0][0][:, j]).any():
+        return f"Joint {j + 1}: at rest"
+    same = len(series) == 2 and np.allclose(series[0][0][:, j], series[1][0][:, j], equal_nan=True)
+    return f"Joint {j + 1}: unchanged" if same else f"Joint {j + 1}"
+
+
+def _head(axes: Axes, text: str) -> None:
+    axes.set_title(text, color=MUTED, fontsize=9.5, loc="left")
 
 
 def _band(axes: Axes, level: float) -> None:
@@ -125,12 +147,27 @@ def _cloud(axes: Axes, x: Array, y: Array, color: str, label: str) -> None:
     axes.plot(0.5 * (edges[1:] + edges[:-1])[enough], mean[enough], color=color, linewidth=2, label=label)
 
 
-def _spectrum(axes: Axes, diagnosis: Diagnosis, y: Array, color: str, label: str) -> None:
-    """Amplitude density of the longest run; the few samples at standstill count as zero."""
-    samples = diagnosis.samples
+def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: Series, j: int) -> None:
+    """Amplitude density of the longest run; the samples at standstill count as zero."""
+    samples, scale = diagnosis.samples, float(diagnosis.evidence.scale[j])
     run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
-    piece = np.nan_to_num(y[run])
-    length = min(len(piece), 512)
-    f, power = welch(piece, fs=1 / samples.period, nperseg=length)
-    inside = (f > 0) & (f <= (1.1 * samples.cutoff_hz or np.inf))
-    axes.loglog(f[inside], np.sqrt(power[inside]), color=color, linewidth=1.4, label=label)
+    inside = (rows >= run.start) & (rows < run.stop)
+    period = samples.period * float(np.median(np.diff(rows[inside]))) if inside.sum() > 1 else samples.period
+    length = min(int(inside.sum()), max(64, round(_SPECTRUM_SECONDS / period)))
+    if not np.isfinite(series[0][0][inside, j]).any():
+        return
+    for values, color, label in series:
+        y = values[inside, j]
+        f, power = welch(np.nan_to_num(y), fs=1 / period, nperseg=length)
+        shown = (f > 0) & (f <= (1.1 * samples.cutoff_hz or np.inf)) & (power > 0)
+        axes.loglog(f[shown], np.sqrt(power[shown]), color=color, linewidth=1.3, label=label)
+    if samples.cutoff_hz > 0:
+        # what the baseline's residual would show, were it spread evenly below the filter's corner
+        level = scale / np.sqrt(samples.cutoff_hz)
+        axes.axhspan(level / 2, 2 * level, color=BASELINE, alpha=0.22, linewidth=0)
+    for axis in (axes.xaxis, axes.yaxis):
+        low, high = axis.get_view_interval()
+        # over less than two decades, powers of ten alone would label next to nothing
+        axis.set_major_locator(LogLocator(subs=(1.0,) if high > 100 * low else (1.0, 2.0, 5.0), numticks=5))
+        axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axis.set_minor_formatter(NullFormatter())

@@ -56,17 +56,19 @@ def panels(
     left: float = 0.78,
     gap: float = 0.8,
     legend_row: bool = True,
+    rows_gap: float = 0.5,
     **options: Any,
 ) -> NDArray[np.object_]:
     """Divide a figure into (rows, columns) axes with margins in inches.
 
     Matplotlib's own layouts draw everything twice to measure the labels, which doubles the time of a report;
     here all labels have known sizes. ``left`` has room for the labels of the first column, ``gap`` for those
-    of the others; ``legend_row`` keeps the top free for a legend. Further options go to ``Figure.subplots``.
+    of the others, ``rows_gap`` for those between rows; ``legend_row`` keeps the top free for a legend. Further
+    options go to ``Figure.subplots``.
     """
     width, height = target.get_size_inches()
     top, bottom = (0.62 if legend_row else 0.32), 0.52
-    between = 0.36 if options.get("sharex") else 0.5
+    between = 0.36 if options.get("sharex") else rows_gap
     target.subplots_adjust(
         left=left / width,
         right=1 - 0.16 / width,

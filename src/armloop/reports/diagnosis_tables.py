@@ -1,0 +1,151 @@
+"""Tables of a diagnosis: effects and events, errors, and what a controller changes."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armloop.reports.findings import blame, findings, nothing_to_supply, rivals
+from armloop.reports.tables import Table, make_table
+from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
+
+if TYPE_CHECKING:
+    from armloop.arm import Arm
+    from armloop.diagnosis import Closing, Diagnosis
+
+_WIDTH = 110
+
+
+def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
+    """Each effect found with its parameters ± standard error, its share of the explainable residual, and where it is."""
+    rows: list[list[object]] = []
+    for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True):
+        for k, (key, e) in enumerate(added.parameters.items()):
+            first = [effect_label(found.effect), "sensor" if found.effect.sensor else "arm"]
+            label, where = first if k == 0 else ["", ""]
+            share = percent(found.share) if k == 0 else ""
+            rows.append(
+                [label, key.replace("_", " "), with_error(e.value, e.std_error), unit(e.unit), share, where]
+            )
+    if diagnosis.unlisted is not None:
+        law = diagnosis.unlisted.form or MISSING
+        rows.append([f"unlisted, joint {diagnosis.unlisted.joint}", "law", law, "", "", ""])
+    headers = ["effect", "parameter", "value ± std. error", "unit", "share", "where"]
+    return make_table(headers, rows, title, left=(0, 1, 3, 5))
+
+
+def events_table(diagnosis: Diagnosis, title: str | None = "Contacts") -> Table:
+    """Each contact's interval and mean force on the tool, in the base frame."""
+    rows = []
+    for k, contact in enumerate(diagnosis.contacts):
+        p = contact.added.parameters
+        force = np.asarray(p["force"].value, dtype=float)
+        rows.append(
+            [
+                k + 1,
+                *(
+                    f"{float(np.asarray(p[key].value)):.2f} ± {float(np.asarray(p[key].std_error)):.2f}"
+                    for key in ("start", "end")
+                ),
+                float(np.linalg.norm(force)),
+                vector(force.tolist()),
+                vector(np.asarray(p["force"].std_error, dtype=float).tolist(), 2),
+                percent(contact.share),
+            ]
+        )
+    headers = ["contact", "from [s]", "to [s]", "force [N]", "(x, y, z) [N]", "std. error [N]", "explains"]
+    return make_table(headers, rows, title)
+
+
+def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not fitted, RMSE") -> Table:
+    """RMSE per joint before and after the effects were added, and the model's own on its baseline data."""
+    errors = diagnosis.errors()
+    relative = errors["nrmse"]
+    rows = [
+        [
+            f"{j + 1}  {joint.name}",
+            unit(errors["unit"][j]),
+            *(errors[key][j] for key in ("before", "after", "noise_floor")),
+            *(percent(relative[key][j]) for key in ("before", "after")),
+        ]
+        for j, joint in enumerate(diagnosis.model.arm.joints)
+    ]
+    headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]
+    return make_table(headers, rows, title, left=(0, 1))
+
+
+def feedforward_table(
+    diagnosis: Diagnosis, closing: Closing, title: str | None = "Torque that the controller now adds"
+) -> Table:
+    """RMS and largest change of the feedforward along the run, beside the RMS torque measured."""
+    change = closing.feedforward
+    measured = np.sqrt(np.mean(diagnosis.samples.tau**2, axis=0))
+    rows = [
+        [
+            f"{j + 1}  {joint.name}",
+            unit(joint.torque_unit),
+            change.rms[j],
+            change.largest[j],
+            measured[j],
+            percent(change.rms[j] / measured[j]) if measured[j] else None,
+        ]
+        for j, joint in enumerate(diagnosis.model.arm.joints)
+    ]
+    headers = ["joint", "unit", "RMS", "largest", "RMS measured", "of it"]
+    return make_table(headers, rows, title, left=(0, 1))
+
+
+def held_out_table(
+    closing: Closing, arm: Arm, title: str | None = "Whole runs that were not fitted, RMSE"
+) -> Table:
+    """RMSE and nRMSE per run and joint, of the model before and the augmented one."""
+    rows: list[list[object]] = []
+    for run in closing.held_out:
+        old, new = run.before.moving, run.after.moving
+        for j, joint in enumerate(arm.joints):
+            rows.append(
+                [
+                    run.name if j == 0 else "",
+                    f"{j + 1}  {joint.name}",
+                    unit(joint.torque_unit),
+                    old["rmse"][j],
+                    new["rmse"][j],
+                    percent(old["nrmse"][j]),
+                    percent(new["nrmse"][j]),
+                ]
+            )
+    headers = ["run", "joint", "unit", "before", "after", "nRMSE before", "nRMSE after"]
+    return make_table(headers, rows, title, left=(0, 1, 2))
+
+
+def diagnosis_table(diagnosis: Diagnosis, closing: Closing | None = None) -> str:
+    """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
+    sentences = [*findings(diagnosis), *blame(diagnosis)]
+    parts = [f"Verdict: {diagnosis.verdict}", "\n".join(map(_wrapped, sentences))]
+    if diagnosis.outcome.found or diagnosis.unlisted is not None:
+        parts.append(str(effects_table(diagnosis)))
+    if diagnosis.contacts:
+        parts.append(str(events_table(diagnosis)))
+    parts.append(str(errors_table(diagnosis)))
+    for found, alike in rivals(diagnosis):
+        lines = [_wrapped(f"- {rival}: {why}") for rival, why in alike]
+        parts.append("\n".join([f"This motion cannot tell {found} from", *lines]))
+    if closing is not None:
+        parts += _closing_parts(diagnosis, closing)
+    return "\n\n".join(parts)
+
+
+def _closing_parts(diagnosis: Diagnosis, closing: Closing) -> list[str]:
+    if closing.feedforward.largest.any():
+        parts = [str(feedforward_table(diagnosis, closing))]
+    else:
+        parts = [nothing_to_supply([*diagnosis.outcome.added(), *(c.added for c in diagnosis.contacts)])]
+    if closing.held_out:
+        parts.append(str(held_out_table(closing, diagnosis.model.arm)))
+    return parts
+
+
+def _wrapped(sentence: str) -> str:
+    return textwrap.fill(sentence, _WIDTH, subsequent_indent="  ")
