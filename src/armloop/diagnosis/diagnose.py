@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
@@ -230,9 +230,9 @@ def _too_still(evidence: Evidence) -> str:
     moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
     still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 50]
     blocks = len(np.unique(evidence.blocks))
-    if len(still) < evidence.rows.shape[1] and blocks >= 8:
+    if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
     return (
-        f"too little motion to judge ({blocks} blocks of 1.5 s, joints at rest: {still}); log at least 12 s in which "
-        "the joints move"
+        f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
+        f"{FEWEST_BLOCKS + 1} s in which the joints move"
     )

@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 from armloop.blocks import block_numbers
 from armloop.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Samples
+from armloop.motion import Motion, Samples
 from armloop.regression.moments import Moments
 from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 
-#: Length of a block, s, and number of folds: residuals stay correlated for a good second.
-BLOCK_SECONDS = 1.5
+#: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
+BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
+#: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
+FEWEST_BLOCKS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +61,7 @@ class Evidence:
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
-        blocks = block_numbers(samples.motion, BLOCK_SECONDS)
+        blocks = block_numbers(samples.motion, _block_seconds(samples.motion))
         context = model.context(samples.motion, effects)
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
@@ -114,6 +116,12 @@ class Evidence:
             joints,
             residual.shape[1],
         )
+
+
+def _block_seconds(motion: Motion) -> float:
+    """Length of a block that leaves enough of them in all runs together, within the bounds."""
+    seconds = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
+    return float(np.clip(seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
 
 
 @dataclass(frozen=True, eq=False)

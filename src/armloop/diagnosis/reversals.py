@@ -18,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
+from scipy.stats import t
 
 from armloop.arm import Arm
 from armloop.blocks import block_sums
@@ -31,10 +32,13 @@ from armloop.progress import Progress
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: An effect must remove this part of a joint's squared error at reversals, by this many standard errors over blocks …
-HALF, SIGNIFICANCE = 0.5, 3.0
-#: … which must be at least this part of the joint's torque, both root mean square.
+#: An effect must remove this part of a joint's squared error at reversals …
+HALF = 0.5
+#: … which must be at least this part of the joint's torque, both root mean square …
 NOTICEABLE = 0.03
+#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors):
+#: in ratios, so that no fast reversal outweighs the others; by Student's t, for they may be few.
+_CHANCE = 0.00135
 #: A simpler effect that leaves no more of the squared error than this part of it is as good.
 ALIKE = 0.1
 #: Effects that explain this much of what the chosen one explains are its alternatives.
@@ -97,21 +101,21 @@ def judge_reversals(
     start = current = fit(own, outcome.residual, known.effects, known.shapes)
     view = _View.of(own, start, judged)
     found: list[Found] = []
-    shares: dict[Effect, dict[int, float]] = {}
+    gains = _Gains({}, {})
     changed = set(view.suspects(start))
     while changed and len(found) < 2 * samples.motion.joints:
         for effect in _concerned(evidence.model.arm, changed, current):
-            shares[effect] = view.shares(current, try_effect(own, outcome.residual, current, effect))
-        best = _best(shares)
+            gains.take(effect, view.gains(current, try_effect(own, outcome.residual, current, effect)))
+        best = gains.best()
         if best is None:
             break
         trial = try_effect(own, outcome.residual, current, best.effect)
         assert trial is not None
         found.append(replace(best, shape=trial.shapes[-1]))
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of the error at its reversals")
-        changed = set(view.suspects(current)) if best.effect.joint is None else _joints(best.effect)
+        changed = _joints(best.effect) or set(view.suspects(current))
         current = trial
-        shares = {e: own for e, own in shares.items() if _joints(e) and not _joints(e) & changed}
+        gains.forget(best.effect, changed)
     if not found:
         return None
     after = refit(own, current)
@@ -165,32 +169,76 @@ class _View:
             if len(np.unique(self.block[self.rows & (self.joint == j)])) >= _FEWEST
         ]
 
-    def shares(self, current: Fit, trial: Fit | None) -> dict[int, float]:
-        """Per suspect joint the part of its squared error at reversals that a trial removes, where worth naming."""
+    def gains(self, current: Fit, trial: Fit | None) -> dict[int, _Gain]:
+        """Per suspect joint what a trial gains at its reversals; nothing if the run as a whole does not gain."""
         if trial is None or (trial.held_out**2).sum() >= (current.held_out**2).sum():
             return {}
-        found = {j: self._share(current, trial, j) for j in self.suspects(current)}
-        return {j: share for j, share in found.items() if share >= HALF}
+        return {j: self._gain(current, trial, j) for j in self.suspects(current)}
 
-    def _share(self, current: Fit, trial: Fit, j: int) -> float:
-        """Part of the squared error at a joint's reversals that a trial removes; zero if by chance, or hardly any."""
+    def _gain(self, current: Fit, trial: Fit, j: int) -> _Gain:
         mine = self.rows & (self.joint == j)
         before, after = current.held_out[mine] ** 2, trial.held_out[mine] ** 2
-        gains = block_sums(before - after, self.block[mine])
-        sure = gains.sum() > SIGNIFICANCE * np.sqrt(len(gains)) * gains.std(ddof=1)
-        noticed = gains.sum() >= self.noticeable[j] * mine.sum()
-        return float(gains.sum() / before.sum()) if sure and noticed else 0.0
+        gain = float(before.sum() - after.sum())
+        sums = [np.maximum(block_sums(x, self.block[mine]), 1e-300) for x in (before, after)]
+        noticed = gain >= self.noticeable[j] * mine.sum()
+        return _Gain(gain / float(before.sum()) if noticed else 0.0, np.log(sums[0] / sums[1]))
 
 
-def _best(shares: dict[Effect, dict[int, float]]) -> Found | None:
-    """The effect that removes most of some joint's error at reversals, the simplest of equals; None without any."""
-    most = [(share, j) for own in shares.values() for j, share in own.items()]
-    if not most:
-        return None
-    largest, joint = max(most)
-    there = {effect: own[joint] for effect, own in shares.items() if joint in own}
-    equals = [effect for effect, share in there.items() if share >= largest - ALIKE]
-    best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
-    enough = RIVAL_SHARE * there[best]
-    rivals = [(effect, share) for effect, share in there.items() if effect is not best and share >= enough]
-    return Found(best, Shape.fixed(0.0), there[best], rivals)
+@dataclass(frozen=True, eq=False)
+class _Gain:
+    """Part of a joint's squared error at reversals that is removed, zero if hardly anything; log ratio per block."""
+
+    share: float
+    ratios: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Gains:
+    """What every effect gains at the suspects, and what each kind of effect gains at its own joints."""
+
+    by_effect: dict[Effect, dict[int, _Gain]]
+    by_kind: dict[str, dict[int, _Gain]]
+
+    def take(self, effect: Effect, gains: dict[int, _Gain]) -> None:
+        """Note what an effect gains."""
+        self.by_effect[effect] = gains
+        if effect.joint is not None and not effect.pair_wise and effect.joint - 1 in gains:
+            self.by_kind.setdefault(effect.name, {})[effect.joint - 1] = gains[effect.joint - 1]
+
+    def forget(self, found: Effect, joints: set[int]) -> None:
+        """Drop the effect that was found, and what depends on joints (0-based) where something was found."""
+        for effect in list(self.by_effect):
+            if effect.place == found.place or not _joints(effect) or _joints(effect) & joints:
+                del self.by_effect[effect]
+
+    def _sure(self, effect: Effect, j: int) -> bool:
+        """Whether it is no chance: at this joint alone, or at all suspects if each has an effect of this kind.
+
+        Drives of an arm are alike; few reversals of one joint tell little.
+        """
+        alone = self.by_effect[effect][j].ratios
+        alike = [gain.ratios for gain in self.by_kind.get(effect.name, {}).values()]
+        return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
+
+    def best(self) -> Found | None:
+        """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""
+        shares = {
+            effect: {j: g.share for j, g in own.items() if g.share >= HALF and self._sure(effect, j)}
+            for effect, own in self.by_effect.items()
+        }
+        most = [(share, j) for own in shares.values() for j, share in own.items()]
+        if not most:
+            return None
+        largest, joint = max(most)
+        there = {effect: own[joint] for effect, own in shares.items() if joint in own}
+        equals = [effect for effect, share in there.items() if share >= largest - ALIKE]
+        best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
+        enough = RIVAL_SHARE * there[best]
+        rivals = [(e, share) for e, share in there.items() if e is not best and share >= enough]
+        return Found(best, Shape.fixed(0.0), there[best], rivals)
+
+
+def _positive(ratios: Array) -> bool:
+    """Whether the mean of few values is positive by more than chance."""
+    error = float(ratios.std(ddof=1)) / np.sqrt(len(ratios))
+    return bool(ratios.mean() > t.isf(_CHANCE, len(ratios) - 1) * error)
