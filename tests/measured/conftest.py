@@ -1,0 +1,27 @@
+"""The UR10e's logs, and a model of the arm without load that several tests look at."""
+
+from pathlib import Path
+
+import pytest
+
+from armloop.cli import main
+
+GAINS = "11.75,11.98,9.83,10.75,10.55,10.9"
+LEFT_OUT = "noload_20_02_12-50sec_12harm.csv"
+
+
+@pytest.fixture(scope="session")
+def ur10e(measured: Path) -> Path:
+    """The folder of the UR10e's logs."""
+    return measured / "ur10e"
+
+
+@pytest.fixture(scope="session")
+def model(ur10e: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model of the arm without load, from all no-load logs but one."""
+    path = tmp_path_factory.mktemp("ur10e") / "model.json"
+    logs = sorted(str(log) for log in ur10e.glob("noload_*.csv") if log.name != LEFT_OUT)
+    assert len(logs) == 8
+    arm = ["--arm", str(ur10e / "ur10e.urdf"), "--library", "rigid-body"]
+    assert main(["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]) == 0
+    return path
