@@ -222,7 +222,8 @@ class Empty(LeafSystem):
 def evaluation(system: LeafSystem) -> Callable[[], float]:
     """A function that measures one evaluation of the output port, us."""
     context = system.CreateDefaultContext()
-    ports = [system.get_input_port(i).FixValue(context, np.full(N, 0.3)) for i in range(N)]
+    inputs = [system.get_input_port(i) for i in range(system.num_input_ports())]
+    ports = [port.FixValue(context, np.full(port.size(), 0.3)) for port in inputs]
     output = system.get_output_port(0)
 
     def measure() -> float:
@@ -230,6 +231,18 @@ def evaluation(system: LeafSystem) -> Callable[[], float]:
         for _ in range(CALLS):
             ports[0].GetMutableData()  # the input counts as changed
             output.Eval(context)
+        return 1e6 * (time.process_time() - began) / CALLS
+
+    return measure
+
+
+def calls(function: Callable[[], object]) -> Callable[[], float]:
+    """A function that measures one call, us."""
+
+    def measure() -> float:
+        began = time.process_time()
+        for _ in range(CALLS):
+            function()
         return 1e6 * (time.process_time() - began) / CALLS
 
     return measure
@@ -314,8 +327,11 @@ def main() -> None:
         "empty system that reads its inputs": Empty(True),
         "Feedforward of 50 terms": Feedforward(models[50], N),
         "Feedforward of 300 terms": Feedforward(models[300], N),
+        "Feedforward of 300 terms, one port": Feedforward(models[300], N, stacked=True),
     }
     measures = {name: evaluation(system) for name, system in systems.items()}
+    x, drive = np.full(3 * N, 0.3), models[300].stacked_drive()
+    measures["300 terms without a system"] = calls(lambda: drive(x))
     measures |= {f"ReferenceSource of {name} terms": ahead(m) for name, m in (("no", None), *models.items())}
     costs = best(measures, 2 * options.rounds)
     empty, reading = (costs[name] for name in ("empty system", "empty system that reads its inputs"))

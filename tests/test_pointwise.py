@@ -54,6 +54,34 @@ def test_pointwise_is_the_vectorised_prediction(name, step, tmp_path):
         np.testing.assert_allclose(again.predict(motion, step)[0], expected, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("step", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["terms", "steps", "offsets", "effects", "bodies"])
+def test_one_array_for_a_sample_gives_the_same(kind, step):
+    whole = model_with("payload")
+    terms = tuple(
+        SparseTerms(s, np.array([[0, 2], [4, 6 + s]]), np.array([[0.5, 0.0, 1.0], [0.0, 2.0, 0.3]]))
+        for s in (1, 2, 3)
+    )
+    law = (
+        FrictionTerm("sign", 0.7),
+        FrictionTerm("stribeck", -0.2, 0.1),
+        FrictionTerm("viscous", 2.0),
+    )
+    offset = (FrictionTerm("offset", 0.1),)
+    model = {
+        "terms": ReconstructedModel(whole.arm, terms[1:2], FrictionLaw((law, (), law))),
+        "steps": ReconstructedModel(whole.arm, terms, FrictionLaw((law, offset, law[:1]))),
+        "offsets": ReconstructedModel(
+            whole.arm, terms, FrictionLaw((law, offset, (FrictionTerm("root", 0.3),)))
+        ),
+        "effects": ReconstructedModel(whole.arm, terms, FrictionLaw((law,) * 3), effects=whole.effects),
+        "bodies": whole,
+    }[kind]
+    drive = model.stacked_drive(step)
+    for x in [*np.random.default_rng(3).uniform(-1, 1, (5, 9)), np.zeros(9)]:
+        np.testing.assert_allclose(drive(x), model.feedforward(*np.split(x, 3), step), rtol=1e-12, atol=1e-12)
+
+
 def test_every_kind_of_friction_has_its_law_for_one_sample():
     v = np.array([-0.7, -0.02, 0.3])
     motion = Motion(np.arange(3.0), np.cumsum(v)[:, None], v[:, None], v[:, None], np.array([0, 1, 2]))

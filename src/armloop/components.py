@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.errors import ModelError
+from armloop.functions import NUMPY
 from armloop.library.double_feature_set import Factors, product_name, products
 from armloop.library.lagrangian import EnergyTerms
-from armloop.library.rigid_body import full_columns
 from armloop.motion import Motion
+from armloop.newton_euler import inverse_dynamics
 
 Array = NDArray[np.float64]
 Term = tuple[int, float, str]
@@ -154,8 +155,13 @@ class RigidBody:
     def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
         v = motion.v if step >= 2 else np.zeros_like(motion.v)
         vdot = motion.vdot if step >= 3 else np.zeros_like(motion.vdot)
-        part = Motion(motion.time, motion.q, v, vdot, motion.starts)
-        return full_columns(arm, part, len(self.parameters) == 11 * arm.n) @ self.parameters
+        n = arm.n
+        links = inverse_dynamics(arm, self.parameters[: 10 * n], functions=NUMPY)
+        # A torque that no sample changes comes as a plain number.
+        tau = np.empty_like(motion.q)
+        for j, column in enumerate(links(*([x[:, j] for j in range(n)] for x in (motion.q, v, vdot)))):
+            tau[:, j] = column
+        return tau + self.parameters[10 * n :] * vdot if len(self.parameters) > 10 * n else tau
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         """The base parameters that act on the joint, each times its column of the regressor.

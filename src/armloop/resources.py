@@ -8,6 +8,7 @@ from pathlib import Path
 
 from armloop.errors import ArmError, InputError, ScenarioError
 
+_PARTS = ("plants", "collection")  # YAML files that scenarios and collections draw on
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -25,6 +26,23 @@ def scenario_path(name: str) -> Path:
     Raises `ScenarioError` when there is no such scenario; the message lists those there are.
     """
     return _find("scenarios", ".yaml", name, "scenario", ScenarioError)
+
+
+def find_scenario(spec: str | Path) -> tuple[Path, str | None]:
+    """Return the file of a scenario, and its name in the file where FILE:NAME says one.
+
+    spec : a built-in name, FILE, or either with a colon and a name behind it
+
+    Raises `ScenarioError` when there is no such file.
+    """
+    file, colon, name = str(spec).rpartition(":")
+    if not colon or Path(spec).is_file():
+        file, name = str(spec), ""
+    path = scenario_path(file) if file in scenario_names() else Path(file)
+    if not path.is_file():
+        known = ", ".join(each for each in scenario_names() if each not in _PARTS)
+        raise ScenarioError(f"{path}: no such scenario; give the path of a YAML file or one of: {known}")
+    return path, name or None
 
 
 def urdf_names() -> list[str]:

@@ -13,9 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import binary_dilation
-from scipy.signal import butter, sosfiltfilt
 
 from armloop.errors import LogError
 from armloop.log import MotionLog
@@ -75,12 +72,17 @@ class LowPass:
             return x
         sos = _sections(self.cutoff_hz, self.period)
         pad = min(len(x) - 1, int(np.ceil(1.5 / (self.cutoff_hz * self.period))))
+        # Here, for scipy's signals take longer to import than a fault of the input to be told.
+        from scipy.signal import sosfiltfilt
+
         return sosfiltfilt(sos, x, axis=0, padlen=pad)
 
 
 @lru_cache(maxsize=16)
 def _sections(cutoff_hz: float, period: float) -> Array:
     """The filter's second-order sections: their design takes longer than filtering a short run."""
+    from scipy.signal import butter
+
     return np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
 
 
@@ -175,6 +177,9 @@ def independent_rows(samples: Samples) -> NDArray[np.bool_]:
 
 
 def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple[Array, ...] | None:
+    from scipy.interpolate import CubicSpline
+    from scipy.ndimage import binary_dilation
+
     period = uniform_period(log.time)
     trim = int(np.ceil(0.5 / (how.cutoff_hz * period)))
     if len(log.time) < 6 * trim:

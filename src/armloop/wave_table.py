@@ -49,7 +49,8 @@ class WaveTable:
         # Column by column: products with a short vector are then a third faster.
         self._flat, self._gather = np.asfortranarray(C.reshape(-1, m)), np.asfortranarray(gather)
         # Calls of numpy are what costs: work space that stays, and few of them.
-        self._one, self._state = np.ones(1), np.empty(1 + 3 * n)
+        self._state = np.ones(1 + 3 * n)
+        self._motion = self._state[1:]
         self._gathered, self._inner = np.empty(len(gather)), np.empty(n * w)
         self._phases, self._rates = self._gathered[:w], self._gathered[w : w + m]
         self._others = list(self._gathered[w + m :].reshape(-1, m))
@@ -57,7 +58,15 @@ class WaveTable:
 
     def torque(self, q: Array, v: Array, vdot: Array) -> Array:
         """(n,) torques of one sample."""
-        np.concatenate((self._one, q, v, vdot), out=self._state)
+        np.concatenate((q, v, vdot), out=self._motion)
+        return self._sum()
+
+    def stacked(self, motion: Array) -> Array:
+        """(n,) torques of one sample whose q, v and vdot stand behind each other in one array (3n,)."""
+        self._motion[:] = motion
+        return self._sum()
+
+    def _sum(self) -> Array:
         np.dot(self._gather, self._state, self._gathered)
         rates, phases = self._rates, self._phases
         for factor in self._others:

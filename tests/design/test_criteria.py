@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from armloop.design import CRITERIA, Criterion, condition_number, told_apart
+from armloop.design import CRITERIA, Criterion, condition_number, told_apart, unexplained
 
 
 def matrix(seed: int = 0, p: int = 6) -> np.ndarray:
@@ -12,7 +12,9 @@ def matrix(seed: int = 0, p: int = 6) -> np.ndarray:
     return rows.T @ rows / 40
 
 
-@pytest.mark.parametrize("criterion", [*CRITERIA.values(), told_apart(1, 2)])
+@pytest.mark.parametrize(
+    "criterion", [*CRITERIA.values(), told_apart(1, 2), unexplained([(0, [1, 2]), (3, [4, 5, 1])], 0.5)]
+)
 def test_gradients(criterion: Criterion) -> None:
     F, rng = matrix(), np.random.default_rng(1)
     _, gradient = criterion(F)
@@ -51,3 +53,18 @@ def test_competing_columns_that_are_one_are_not_told_apart() -> None:
     # what the third explains of both does not count
     rows = np.column_stack([x, y, x + y])
     assert criterion(rows.T @ rows / 500)[0] < -10
+
+
+def test_what_rivals_leave_of_a_torque_is_the_sine_of_an_angle() -> None:
+    rng = np.random.default_rng(3)
+    x, y, other = np.linalg.qr(rng.normal(size=(500, 3)))[0].T
+    for angle in (0.05, 0.4, 1.2):
+        rows = np.column_stack([100 * (np.cos(angle) * x + np.sin(angle) * y), x, other])
+        value = unexplained([(0, [1, 2])], 0.0)(rows.T @ rows)[0]
+        assert_allclose(value, 2 * np.log(np.sin(angle)), atol=1e-3)
+    # of two torques the one that the rivals explain best decides
+    rows = np.column_stack([3 * y, x + 1e-2 * y, x])
+    both = unexplained([(0, [2]), (1, [2])], 0.0)(rows.T @ rows)[0]
+    assert_allclose(both, 2 * np.log(1e-2), atol=0.05)
+    # one that is small beside the noise is no evidence
+    assert unexplained([(0, [2])], 900.0)(rows.T @ rows)[0] < -4

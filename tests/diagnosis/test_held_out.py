@@ -9,7 +9,7 @@ from armloop.components import RigidBody
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.search import _best_shape
+from armloop.diagnosis.trials import Known
 from armloop.effects import effect, hypotheses
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw, FrictionTerm
@@ -32,7 +32,6 @@ def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
     samples = condition([measured(motion, tau, 3)], model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     ripple = effect("torque_ripple", 2)
-    shapes = list(ripple.shapes(evidence.context))
 
     def chosen(order_in_fold: tuple[int, int]) -> tuple[float, ...]:
         # another order in each fold: only what was fitted outside a fold may decide for it
@@ -41,7 +40,9 @@ def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
             mine = evidence.fold == k
             residual[mine, 1] = 0.2 * np.sin(order * samples.motion.q[mine, 1])
         current = fit(evidence, residual, [], [])
-        return _best_shape(evidence, residual, current, ripple, shapes).without
+        trial = Known(evidence, residual, current).trial(ripple)
+        assert trial is not None
+        return trial.shapes[-1].without
 
     assert FOLDS == 2
     assert chosen((6, 11)) == (11.0, 6.0)

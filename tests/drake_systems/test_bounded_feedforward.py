@@ -1,4 +1,4 @@
-"""Motions within torque limits, judged by Drake's inverse dynamics."""
+"""Motions and torques within limits, judged by Drake's inverse dynamics."""
 
 import dataclasses
 
@@ -8,6 +8,7 @@ from exact_model import ExactModel
 from numpy.testing import assert_allclose
 
 from armloop.drake_systems.bounded_feedforward import bounded_reference
+from armloop.drake_systems.bounded_program import TOLERANCE
 from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.scenarios import load_plant, load_tracking
 from armloop.drake_systems.tracking import run_tracking
@@ -50,9 +51,34 @@ def test_torques_keep_the_limits(scara, hurry, effort):
     assert np.all(np.abs(kept) < 1.01 * effort + doubt)
     assert (np.abs(kept) > 1.02 * effort).mean() < 0.02
     t = np.linspace(0, hurry.duration, 20_001)
+    assert np.all(np.abs(bounded.torque(t)) <= (1 + TOLERANCE) * effort)
     # positions, velocities and accelerations belong together
     q, v, _ = bounded.evaluate(t)
     assert_allclose(np.gradient(q, t, axis=0)[2:-2], v[2:-2], atol=5e-3)
+
+
+def test_torques_keep_their_rates_too(scara):
+    scenario = load_tracking("torque_limits:weak_and_slow")
+    hurry, rate = scenario.reference, scenario.rate
+    effort = np.array([joint.effort for joint in scenario.plant.arm.joints])
+    model = exact_model(scara.arm, scara.config.friction)
+    bounded = bounded_reference(hurry, model, effort, rate)
+    t = np.arange(0.0, hurry.duration, 1e-3)
+    tau = bounded.torque(t)
+    change = np.abs(np.diff(tau, axis=0)) / 1e-3
+    turning = [0, 1, 3]
+    # a part of an effort per knot of 10 ms is what the solver knows a rate by
+    assert np.all(change <= rate + TOLERANCE * effort / 0.01)
+    assert np.all(np.abs(tau) <= (1 + TOLERANCE) * effort)
+    assert np.all(change.max(axis=0)[turning] > 0.99 * rate[turning])
+    free = bounded_reference(hurry, model, effort)
+    assert np.all((np.abs(np.diff(free.torque(t), axis=0)) / 1e-3).max(axis=0)[turning] > 1.5 * rate[turning])
+    # where a joint slides, the torques are those of the motion
+    exact = ExactModel(scara.arm, scara.config.friction)
+    state = bounded.evaluate(bounded.deviation.time)
+    sliding = (np.abs(hurry.evaluate(bounded.deviation.time)[1]) > 0.1) & (np.abs(state[1]) > 0.1)
+    expected = np.array([exact.feedforward(*x, 3) for x in zip(*state, strict=True)])
+    assert_allclose(bounded.torques[sliding], expected[sliding], atol=0.02 * effort.max())
 
 
 def test_limits_that_do_not_bind_change_nothing(scara, hurry, effort):
@@ -83,14 +109,28 @@ def test_within_limits_the_arm_follows_better_than_clipped(hurry, effort):
         plant=dataclasses.replace(plant, arm=dataclasses.replace(plant.arm, joints=joints)),
         reference=hurry,
         score=(0.0, hurry.duration),
-        controllers=("pid_step3", "bounded"),
-        limits=0.95 * effort,
     )
-    results = run_tracking(scenario, {"model": exact_model(plant.arm, plant.config.friction)})
+    compared(scenario)
+
+
+def test_within_its_rates_the_arm_follows_better_than_clipped():
+    scenario = load_tracking("torque_limits:slow_drives")
+    for result in compared(scenario).values():
+        assert np.all(np.abs(np.diff(result.tau, axis=0)) <= 1e-3 * scenario.rate * (1 + 1e-9))
+
+
+def compared(scenario):
+    model = exact_model(scenario.plant.arm, scenario.plant.config.friction)
+    results = run_tracking(
+        dataclasses.replace(scenario, controllers=("pid_step3", "bounded")), {"model": model}
+    )
     clipped, bounded = results["pid_step3"], results["bounded"]
     turning = [0, 1, 3]
+    assert np.all(clipped.metrics.clipped[turning] > 0.01)
+    assert np.all(bounded.metrics.clipped[turning] < clipped.metrics.clipped[turning])
     assert np.all(bounded.largest[turning] < clipped.largest[turning])
     assert np.all(bounded.eta[turning] < clipped.eta[turning])
+    return results
 
 
 def test_what_is_wrong_with_limits_is_told(tmp_path):
@@ -99,6 +139,8 @@ def test_what_is_wrong_with_limits_is_told(tmp_path):
         ("effort: [1.0, 2.0]", "limits.effort has 2 numbers"),
         ("effort: [0.0]", "limits.effort must be above 0"),
         ("effort: [9.0], used: 2.0", "limits.used is 2.0"),
+        ("rate: [9.0, -1.0, 9.0]", "limits.rate must be above 0"),
+        ("used: 0.9", "limits needs an effort or a rate"),
     ):
         path.write_text(f"plant: three_axis\nlimits: {{{fields}}}\n")
         with pytest.raises(ScenarioError, match=rf"mine.yaml: {message}"):

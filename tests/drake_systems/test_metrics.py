@@ -21,8 +21,12 @@ def test_metrics_of_a_made_up_run():
     error[350:] = 0.3  # never settles after the turn at 3 s
     v = v_ref.copy()
     v[100:125] = 1e-6
-    found = measure(period, error, v, v_ref, np.full((400, 1), -3.0))
+    tau = np.full((400, 1), -3.0)
+    asked = tau.copy()
+    asked[20:60] = -5.0
+    found = measure(period, error, v, v_ref, tau, asked)
     assert_allclose(found.effort, 3.0)
+    assert_allclose(found.clipped, 0.1)
     assert_allclose(found.stick, 0.25)
     assert_allclose(found.settling, (0.7 + 0.0 + 1.0) / 3, atol=2 * period)
     assert_allclose(found.unsettled, 1 / 3)
@@ -30,6 +34,6 @@ def test_metrics_of_a_made_up_run():
 
 def test_a_reference_without_reversals_has_no_settling_and_rest_is_no_stick():
     rest = np.zeros((50, 2))
-    found = measure(0.01, rest, rest, rest, rest)
+    found = measure(0.01, rest, rest, rest, rest, rest)
     assert np.isnan(found.settling).all() and np.isnan(found.unsettled).all()
     assert_allclose(found.stick, 0.0)

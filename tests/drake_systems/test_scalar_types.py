@@ -22,6 +22,7 @@ from armloop.drake_systems import (
     PidController,
     PidGains,
     PreslidingFriction,
+    RateLimiter,
     Stop,
     model_equations,
 )
@@ -67,6 +68,7 @@ def effect_torque(name):
 
 SYSTEMS = {
     **{f"feedforward of {k}": lambda m=m: Feedforward(m(), m().arm.n) for k, m in STILL_MODELS.items()},
+    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), 4, stacked=True),
     "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 3, 2),
     **{
         f"computed torque of {k}": lambda m=m: ComputedTorque(m(), AccelerationGains.critical(m().arm.n))
@@ -84,6 +86,7 @@ SYSTEMS = {
     },
     "friction": lambda: JointFrictionSystem(FRICTION, 0.2),
     "presliding": lambda: PreslidingFriction(3, ELEMENTS, 0.01),
+    "rate limiter": lambda: RateLimiter([0.5, 2.0, 2.0], [0.1, 900.0, 20.0], 0.01),
     "pid": lambda: PidController(PidGains.paper(3), 0.01),
     **{f"effect {name}": lambda name=name: effect_torque(name) for name in PARAMETERS},
 }

@@ -20,23 +20,6 @@ LOADED = "load_20_01_31-load.csv"
 PUSHED = "collision_pose_1.csv"
 
 
-@pytest.fixture(scope="module")
-def ur10e(measured: Path) -> Path:
-    """The folder of the UR10e's logs."""
-    return measured / "ur10e"
-
-
-@pytest.fixture(scope="module")
-def model(ur10e: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model of the arm without load, from all no-load logs but one."""
-    path = tmp_path_factory.mktemp("ur10e") / "model.json"
-    logs = sorted(str(log) for log in ur10e.glob("noload_*.csv") if log.name != LEFT_OUT)
-    assert len(logs) == 8
-    arm = ["--arm", str(ur10e / "ur10e.urdf"), "--library", "rigid-body"]
-    assert main(["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]) == 0
-    return path
-
-
 def answer(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> dict:
     """What a command prints with --json; nothing else may stand on standard output."""
     capsys.readouterr()

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from armloop.diagnosis import Diagnosis
+from armloop.diagnosis import Diagnosis, close
+from armloop.motion import Motion
 from armloop.reports import plots
 from armloop.reports.plots.style import thin, with_gaps
-from armloop.reports.residuals import held_out_residuals
+from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
 
 
 def drawn(figure: Figure) -> Figure:
@@ -53,6 +54,56 @@ def test_diagnosis_figures(loop: SimpleNamespace, clean: Diagnosis) -> None:
     assert labels(plots.residual_time_figure(clean)) == {"residual", "baseline level (±2 RMS)"}
     ticks = drawn(plots.shares_figure(loop.diagnosis)).axes[0].get_yticklabels()
     assert ticks[0].get_text() == "joint spring, joint 2"
+
+
+def test_a_residual_is_drawn_against_position_velocity_load_and_its_spectrum(loop: SimpleNamespace) -> None:
+    figure = drawn(plots.residual_shape_figure(loop.diagnosis))
+    last = [axes.get_xlabel() for axes in figure.axes[-4:]]
+    assert last == ["position [rad]", "velocity [rad/s]", "load [N·m]", "frequency [Hz]"]
+    assert labels(figure) == {"baseline level (±2 RMS)", "before", "after, on blocks not fitted"}
+    titles = [axes.get_title("left") for axes in figure.axes[::4]]
+    assert titles == ["Joint 1: unchanged", "Joint 2", "Joint 3: unchanged"]
+    load = joint_load(loop.diagnosis)
+    low, high = figure.axes[6].get_xlim()
+    assert low <= load[:, 1].min() and load[:, 1].max() <= high
+    left = drawn(plots.residual_shape_figure(loop.diagnosis, what_is_left=True))
+    assert labels(left) == {"baseline level (±2 RMS)", "after, on blocks not fitted"}
+    # the spring is gone: what is left needs a much finer scale
+    assert np.ptp(left.axes[4].get_ylim()) < 0.3 * np.ptp(figure.axes[4].get_ylim())
+
+
+def test_a_joint_at_rest_has_a_residual_in_time_alone(loop: SimpleNamespace) -> None:
+    evidence = loop.diagnosis.evidence
+    rows = evidence.rows.copy()
+    rows[:, 0] = False
+    keep = np.ones(evidence.rows.sum(), dtype=bool)
+    keep[loop.diagnosis.outcome.before.stacked.joint == 0] = False
+    before, after = (
+        replace(fit, held_out=fit.held_out[keep])
+        for fit in (loop.diagnosis.outcome.before, loop.diagnosis.outcome.after)
+    )
+    outcome = replace(loop.diagnosis.outcome, before=before, after=after)
+    still = replace(loop.diagnosis, evidence=replace(evidence, rows=rows), outcome=outcome)
+    figure = drawn(plots.residual_time_figure(still))
+    assert figure.axes[0].get_title("left") == "Joint 1: at rest"
+    assert len(drawn(plots.residual_shape_figure(still)).axes) == 8
+
+
+def test_what_the_controller_adds_is_drawn_where_it_adds_something(loop: SimpleNamespace) -> None:
+    model = loop.reconstruction.model
+    closing = close(model, loop.diagnosis.model, loop.diagnosis.samples)
+    (axes,) = drawn(plots.feedforward_figure(loop.diagnosis, closing)).axes
+    assert axes.get_title("left").startswith("Joint 2: ")
+
+
+def test_runs_of_several_logs_are_laid_end_to_end() -> None:
+    once = np.arange(0, 10, 0.1)
+    zeros = np.zeros((100, 1))
+    one = Motion(once, zeros, zeros, zeros, np.array([0]))
+    assert time_axis(one)[0] is one.time
+    two = Motion(np.tile(once, 2), *[np.zeros((200, 1))] * 3, np.array([0, 100]))
+    shown, words = time_axis(two)
+    assert (np.diff(shown) > 0).all() and shown[-1] < 21 and "end to end" in words
 
 
 def test_residuals_are_those_behind_the_errors(loop: SimpleNamespace) -> None:

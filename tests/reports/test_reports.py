@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from armloop.diagnosis import Diagnosis
+from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.reports.diagnosis_report import diagnosis_report
-from armloop.reports.html import Card, Report, Section, render
+from armloop.reports.html import Card, Report, Section, render, tied
 from armloop.reports.loop_report import loop_figure, loop_report
 from armloop.reports.words import number
 
@@ -105,6 +105,22 @@ def test_an_unlisted_law_is_shown(loop: SimpleNamespace, clean: Diagnosis) -> No
         replace(clean, verdict="unlisted_effect", unlisted=law), loop.reconstruction.model, ["odd"]
     )
     assert "Diagnosis: unlisted effect, joint 2" in text and "it follows 0.48*cos(q2)^2*v2" in text
+
+
+def test_every_joint_has_its_residual_and_what_the_controller_adds(loop: SimpleNamespace) -> None:
+    model = loop.reconstruction.model
+    closing = close(model, loop.diagnosis.model, loop.diagnosis.samples)
+    text = diagnosis_report(loop.diagnosis, model, ["again"], closing)
+    assert "What is left, on its own scale" in text and "What it changes" in text
+    rms = number(float(closing.feedforward.rms[1]))
+    assert f"<td>{rms}</td>" in text
+    assert len(text) < 3e6
+    assert not [a for a in Page(text).addresses if a.startswith("http")]
+
+
+def test_a_number_keeps_its_error_and_unit() -> None:
+    assert tied("joint 2: 0.71 ± 0.01 N·m, 99 %") == "joint\u00a02: 0.71 ±\u00a00.01\u00a0N·m, 99\u00a0%"
+    assert tied("2 numbers and 3 more") == "2 numbers and 3 more"
 
 
 def test_text_cannot_become_markup() -> None:

@@ -2,11 +2,16 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
+from armloop.diagnosis import Diagnosis, close
+from armloop.effects import effect
+from armloop.model import AddedEffect
 from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.reports.findings import nothing_to_supply
 from armloop.reports.tables import (
     eta_table,
     formulas,
@@ -47,6 +52,32 @@ def test_a_diagnosis_names_effect_and_errors(loop: SimpleNamespace, clean: objec
     text = diagnosis_table(loop.diagnosis)
     assert "effects_found" in text and "joint spring, joint 2" in text and "stiffness" in text
     assert "no_effect" in diagnosis_table(clean)
+
+
+def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) -> None:
+    model = loop.reconstruction.model
+    text = diagnosis_table(clean, close(model, clean.model, clean.samples))
+    assert "The controller adds nothing: the model is what it was." in text
+    found = [
+        AddedEffect(effect(name, joint), {}) for name, joint in (("torque_gain", 1), ("torque_offset", 2))
+    ]
+    event = AddedEffect(effect("external_contact", None), {})
+    assert nothing_to_supply([*found, event]) == (
+        "The controller adds nothing: a sensor's fault is no torque that the arm needs; what pushed the arm was an "
+        "event of this run."
+    )
+
+
+def test_what_cannot_be_told_apart_comes_with_the_motion_that_could(loop: SimpleNamespace) -> None:
+    (found,) = loop.diagnosis.outcome.found
+    rival = (effect("torque_offset", 2), 0.97)
+    outcome = replace(loop.diagnosis.outcome, found=[replace(found, rivals=[rival])])
+    text = " ".join(diagnosis_table(replace(loop.diagnosis, outcome=outcome)).split())
+    assert (
+        "This motion cannot tell joint spring, joint 2 from - torque offset, joint 2 (97 %): over a small"
+        in text
+    )
+    assert "a run over a larger range of the joint would tell them apart" in text
 
 
 def test_long_formulas_say_that_they_are_cut(loop: SimpleNamespace) -> None:

@@ -6,6 +6,7 @@ import argparse
 import json
 
 from armloop.commands.arguments import add_json, add_logs, add_recorded
+from armloop.commands.next_run import add_next_run
 
 HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
 EXAMPLE = "armloop diagnose model.json run.csv --out out/diagnosis"
@@ -28,11 +29,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
     add_recorded(p, "as the model's training logs")
+    add_next_run(p)
     add_json(p)
 
 
 def run(options: argparse.Namespace) -> None:
     """Trace what a model lacks on a run."""
+    from armloop.commands.next_run import plan, wish
     from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
     from armloop.diagnosis import close
     from armloop.diagnosis import diagnose as run
@@ -43,15 +46,23 @@ def run(options: argparse.Namespace) -> None:
     folder = out_folder(options.out)
     model, logs = model_and_logs(options)
     apart = held_out_logs(options, model)
+    wanted = wish(options, model)
     result = run(model, logs, progress(options))
     closing = close(model, result.model, result.samples, apart)
     answer = {**result.to_dict(), **closing.to_dict()}
+    planned = None if wanted is None else plan(options.next_run, result, wanted, progress(options))
+    if planned is not None:
+        answer["next_run"] = planned.to_dict()
     page = diagnosis_report(result, model, [log.name for log in logs], closing)
     write_text(folder / "diagnosis.json", json.dumps(answer, indent=1) + "\n")
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)
+    if planned is not None:
+        planned.write()
     if options.json:
         print_json(answer)
         return
     print(diagnosis_table(result, closing))
+    if planned is not None:
+        print("\n" + planned.words())
     print(f"\nwritten: {folder}/diagnosis.json, model.json (augmented), report.html")

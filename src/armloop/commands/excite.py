@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from armloop.commands.arguments import ARM_HELP, add_json, seed
-
-if TYPE_CHECKING:
-    from armloop.arm import Arm
-    from armloop.excitation import MotionRanges
+from armloop.commands.ranges import add_ranges, numbers, read_ranges
 
 HELP = "design an exciting reference within an arm's limits, optimised for the library that will be regressed"
 EXAMPLE = "armloop excite three_axis --out reference.csv --compare --report reference.html"
@@ -54,32 +50,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--order", type=int, default=1, help="N1 of the double feature set's candidates (%(default)s)"
     )
-    p.add_argument(
-        "--ranges",
-        default=None,
-        metavar="PLANT",
-        help="take the ranges of motion from this plant of scenarios/plants.yaml, or `urdf`: nine tenths of the travel and "
-        "half the speed of the URDF's limits (default: the plant of a built-in arm, else urdf)",
-    )
-    for name, unit in (("lower", "rad or m"), ("upper", "rad or m"), ("velocity", "rad/s or m/s")):
-        p.add_argument(
-            f"--{name}",
-            default=None,
-            metavar="X1,..,XN",
-            help=f"{unit} per joint; write --{name}=-1,2 if negative",
-        )
-    p.add_argument(
-        "--acceleration",
-        default=None,
-        metavar="X1,..,XN",
-        help="rad/s² or m/s² per joint (without a plant: twice the velocity)",
-    )
-    p.add_argument(
-        "--reserve",
-        type=float,
-        default=0.2,
-        help="part of the URDF's effort limits that is kept free (%(default)s)",
-    )
+    add_ranges(p, "the plant of a built-in arm, else urdf", "without a plant: twice the velocity")
     p.add_argument(
         "--model",
         default=None,
@@ -117,6 +88,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.files import write_text
     from armloop.model import load_model
     from armloop.reconstruction.reconstruct import default_conditioning, default_library
+    from armloop.resources import urdf_names
     from armloop.tables import CSV, PARQUET
 
     for name in ("out", "report"):
@@ -130,7 +102,7 @@ def run(options: argparse.Namespace) -> None:
     arm = load_arm(options.arm)
     library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None
-    noise = _numbers(options.noise, "--noise", arm)
+    noise = numbers(options.noise, "--noise", arm)
     if noise is None and model is not None:
         noise = _baseline_noise(model.baseline.get("rmse"))
     settings = Settings(
@@ -148,7 +120,7 @@ def run(options: argparse.Namespace) -> None:
         random=options.random,
     )
     settings.timing(arm.n)  # faults of the options before anything is computed
-    ranges = _ranges(options, arm)
+    ranges = read_ranges(options, arm, options.arm if options.arm in urdf_names() else "urdf")
     tell = progress(options)
     result = excite(arm, ranges, settings, model.predict if model else None, tell)
     ratio = None
@@ -174,44 +146,6 @@ def run(options: argparse.Namespace) -> None:
     for note in result.notes:
         print(f"note: {note}")
     print(f"reference written to {options.out}, {rows} rows")
-
-
-def _ranges(options: argparse.Namespace, arm: Arm) -> MotionRanges:
-    """The ranges of a plant or of the URDF, with what the options say instead."""
-    from armloop.errors import InputError
-    from armloop.excitation import ranges_with
-    from armloop.resources import urdf_names
-
-    name = options.ranges or (options.arm if options.arm in urdf_names() else "urdf")
-    stated = {
-        key: _numbers(getattr(options, key), f"--{key}", arm)
-        for key in ("lower", "upper", "velocity", "acceleration")
-    }
-    if name == "urdf":
-        return ranges_with(arm, None, **stated)
-    from armloop.drake_systems.scenarios import load_plant
-
-    plant = load_plant(name)
-    if plant.arm.n != arm.n:
-        raise InputError(f"--ranges {name}: of an arm with {plant.arm.n} joints; {arm.name} has {arm.n}")
-    return ranges_with(arm, plant.config.ranges, **stated)
-
-
-def _numbers(text: str | None, option: str, arm: Arm) -> tuple[float, ...] | None:
-    """One finite number per joint."""
-    from math import isfinite
-
-    from armloop.errors import InputError
-
-    if text is None:
-        return None
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError as error:
-        raise InputError(f"{option} {text!r}: give one number per joint, separated by commas") from error
-    if len(values) != arm.n or not all(map(isfinite, values)):
-        raise InputError(f"{option} {text!r}: give {arm.n} numbers, one per joint of {arm.name}")
-    return values
 
 
 def _baseline_noise(rmse: list[float | None] | None) -> tuple[float, ...] | None:

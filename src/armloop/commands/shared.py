@@ -16,6 +16,7 @@ from armloop.errors import InputError, ModelError
 from armloop.log import MotionLog, read_log
 from armloop.model import ReconstructedModel, load_model
 from armloop.progress import Progress, silent
+from armloop.signals import condition
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -103,9 +104,12 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
 
 
 def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> list[MotionLog]:
-    """The logs of ``--held-out``; raises ``InputError`` for one that is also to be fitted."""
+    """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
     fitted = {Path(path).resolve() for path in options.logs}
     for path in options.held_out:
         if Path(path).resolve() in fitted:
             raise InputError(f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted")
-    return read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    for log in logs:
+        condition([log], model.conditioning)  # what is wrong with a log is said before the long work
+    return logs

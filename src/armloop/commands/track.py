@@ -62,28 +62,26 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Compare controllers in closed loop."""
+    # Whatever can be wrong is told before Drake is imported, which takes a second.
     from armloop.commands.shared import out_folder, print_json, progress
-    from armloop.drake_systems.scenarios import load_tracking
     from armloop.errors import InputError
+    from armloop.model import load_model
+    from armloop.resources import find_scenario
+
+    folder = out_folder(options.out) if options.out else None
+    find_scenario(options.scenario)
+    if options.rate is not None and not options.meshcat:
+        raise InputError("--rate is the pace of --meshcat; give both, or leave it out")
+    paths = _paths(options.model)
+    models = {name: load_model(path) for name, path in paths.items()}
+    from armloop.drake_systems.scenarios import load_tracking
     from armloop.loop import run_pickup_scenario, run_scenario, run_wear_scenario
-    from armloop.model import ReconstructedModel, load_model
     from armloop.reports.tables import eta_table
     from armloop.reports.tracking_tables import metrics_table, phases_table, spread_table
 
-    folder = out_folder(options.out) if options.out else None
     scenario = load_tracking(options.scenario, options.arm)
-    models: dict[str, ReconstructedModel] = {}
-    for item in options.model:
-        name, equals, path = item.partition("=")
-        if not equals or not name.replace("_", "").isalnum() or not path:
-            raise InputError(f"--model {item!r}: write NAME=MODEL.json, such as step3=model.json")
-        if name == "exact":
-            raise InputError(f"--model {item!r}: exact is the simulated arm's own model; choose another name")
-        if name in models:
-            raise InputError(f"--model {item!r}: {name!r} is given twice")
-        models[name] = load_model(path, scenario.plant.arm)
-    if options.rate is not None and not options.meshcat:
-        raise InputError("--rate is the pace of --meshcat; give both, or leave it out")
+    for name, model in models.items():
+        model.arm.require_same(scenario.plant.arm, paths[name])
     view = _view(options, scenario) if options.meshcat else None
     if scenario.pickup is not None:
         answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options), view)
@@ -109,6 +107,23 @@ def run(options: argparse.Namespace) -> None:
         print(f"\nverdict from the log since the grasp: {answer['diagnosis']['verdict']}; {'; '.join(found)}")
     if folder is not None:
         print(f"\nwritten: {folder}/{files}")
+
+
+def _paths(items: list[str]) -> dict[str, str]:
+    """The files of ``--model`` by their names."""
+    from armloop.errors import InputError
+
+    paths: dict[str, str] = {}
+    for item in items:
+        name, equals, path = item.partition("=")
+        if not equals or not name.replace("_", "").isalnum() or not path:
+            raise InputError(f"--model {item!r}: write NAME=MODEL.json, such as step3=model.json")
+        if name == "exact":
+            raise InputError(f"--model {item!r}: exact is the simulated arm's own model; choose another name")
+        if name in paths:
+            raise InputError(f"--model {item!r}: {name!r} is given twice")
+        paths[name] = path
+    return paths
 
 
 def _view(options: argparse.Namespace, scenario: TrackingScenario) -> LiveView:

@@ -1,14 +1,14 @@
 """Experiment design: references that determine the coefficients of a later regression as well as the arm allows.
 
 The columns whose information is made large are handed in as a function of the motion, so that a library, or two
-competing effects that a run should tell apart (`criteria.told_apart`), are designed for alike.
+competing effects that a run should tell apart (`criteria.told_apart`, `criteria.unexplained`), are designed for alike.
 """
 
-from armloop.design.criteria import CRITERIA, Criterion, condition_number, told_apart
+from armloop.design.criteria import CRITERIA, Criterion, condition_number, told_apart, unexplained
 from armloop.design.data_ratio import DataRatio, amount_needed, data_ratio
 from armloop.design.excite import Excitation, Measure, excite, measured
 from armloop.design.information import Columns, Regression
-from armloop.design.limits import Limits, TorqueLaw, nominal_torque
+from armloop.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
 from armloop.design.optimise import Design, Problem
 from armloop.design.random import random_references
 from armloop.design.series import Series, sampled
@@ -30,6 +30,7 @@ __all__ = [
     "Timing",
     "TorqueLaw",
     "amount_needed",
+    "check_rest",
     "condition_number",
     "data_ratio",
     "excite",
@@ -38,4 +39,5 @@ __all__ = [
     "random_references",
     "sampled",
     "told_apart",
+    "unexplained",
 ]

@@ -6,7 +6,7 @@ the coefficients that a regression finds is its inverse. All measures are to be 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,11 @@ _FLOOR = 1e-13
 ROUND_OFF = 1e-14
 #: Exponent of the smooth stand-in for the extreme eigenvalues.
 _SHARPNESS = 6.0
+#: Of several torques that are to be left unexplained, how much the worst one counts above the others: mildly,
+#: since one that no motion shows better must not decide over the rest.
+_WORST = 1.0
+#: Part of a column's typical information below which nothing is regressed on it.
+_RIDGE = 1e-6
 
 
 def log_determinant(F: Array) -> tuple[float, Array]:
@@ -65,6 +70,41 @@ def told_apart(first: int, second: int) -> Criterion:
         gradient = whole[1].copy()
         gradient[both:, both:] -= rest[1]
         return (whole[0] - rest[0]) / both, gradient / both
+
+    return measure
+
+
+def unexplained(rivalries: Sequence[tuple[int, Sequence[int]]], enough: float) -> Criterion:
+    """How much of a torque its rivals cannot stand for, the worst of several torques first.
+
+    T-optimality (Atkinson and Fedorov, "The design of experiments for discriminating between two rival models",
+    Biometrika 62, 1975): if the law of a column is true with its present parameters, how badly must others fit? The
+    measure is the log of the part of the column's information that regression on the others leaves, the column
+    counting for `enough` more than it has: a torque that drowns in noise is no evidence, however odd its shape.
+
+    Args:
+        rivalries: a column and the columns that may stand for it, each.
+        enough: information beyond which only the part that is left counts; the columns are in noise levels.
+    """
+
+    def measure(F: Array) -> tuple[float, Array]:
+        values, slopes = [], []
+        for column, others in rivalries:
+            by = list(others)
+            x = np.linalg.solve(F[np.ix_(by, by)] + _RIDGE * np.eye(len(by)), F[by, column])
+            way = np.zeros(len(F))
+            way[column] = 1.0
+            way[by] -= x
+            whole = float(F[column, column]) + enough
+            left = max(float(F[column, column] - F[by, column] @ x), _FLOOR * whole)
+            slope = np.outer(way, way) / left
+            slope[column, column] -= 1 / whole
+            values.append(np.log(left / whole))
+            slopes.append(slope)
+        weights = _softmax(-_WORST * np.array(values))
+        # the soft minimum, whose slope has just these weights
+        least = -(np.log(np.exp(-_WORST * (np.array(values) - min(values))).sum()) / _WORST) + min(values)
+        return float(least), np.asarray(np.tensordot(weights, np.array(slopes), axes=1))
 
     return measure
 

@@ -11,7 +11,7 @@ push.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,4 +239,4 @@ def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:
     rows = evidence.rows & ~known_contacts(evidence)[:, None]
     for contact in contacts:
         rows &= ~contact.rows[:, None]
-    return replace(evidence, rows=rows)
+    return evidence.only(rows)

@@ -15,7 +15,7 @@ from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome, search, without_forced
+from armloop.diagnosis.search import Found, Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.effects import hypotheses
 from armloop.errors import InputError
@@ -205,11 +205,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     if (without(whole, again).rows != evidence.rows).any():
         contacts, evidence = again, without(whole, again)
         outcome = search(evidence, progress)
-    unlisted = find_law(evidence, outcome.before, outcome.after, progress)
-    if unlisted is not None:
-        outcome, forced = without_forced(evidence, outcome, unlisted.joint - 1)
-        if forced:
-            unlisted = find_law(evidence, outcome.before, outcome.after, progress)
+    unlisted, outcome = find_law(evidence, outcome, progress)
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
     if unlisted is not None:
         kept[:, unlisted.joint - 1] = False
@@ -228,7 +224,7 @@ def _too_still(evidence: Evidence) -> str:
     ranges = evidence.model.history.get("range")
     slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
     moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
-    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 50]
+    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 20]
     blocks = len(np.unique(evidence.blocks))
     if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""

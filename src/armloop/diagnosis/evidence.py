@@ -8,6 +8,7 @@ judged on folds that were not fitted.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from armloop.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.regression.moments import Moments
-from armloop.signals import smooth
+from armloop.signals import independent_rows, smooth
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,8 @@ BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
+
+_Columns = dict[tuple[tuple[str, int | None, int | None], float], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +39,10 @@ class Evidence:
         samples: the run, conditioned like the model's training logs.
         scale: (n,) the model's residual on its own held-out baseline data, N·m (N).
         variation: (n,) how much more than that, as energy, it leaves on the worst tenth of those data.
-        rows: (N, n) samples that count: the joint slides.
+        rows: (N, n) samples that count: the joint slides. Of samples that lie closer than the filter can
+            tell apart, only some.
         blocks: (N,) block of each sample.
+        asked: effects that may be asked about.
     """
 
     model: ReconstructedModel
@@ -47,9 +52,9 @@ class Evidence:
     rows: NDArray[np.bool_]
     blocks: NDArray[np.intp]
     context: Context
-    _columns: dict[tuple[tuple[str, int | None, int | None], float], Array] = field(
-        default_factory=dict, repr=False
-    )
+    asked: tuple[Effect, ...] = ()
+    _of_motion: _Columns = field(default_factory=dict, repr=False)
+    _of_model: _Columns = field(default_factory=dict, repr=False)
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -66,13 +71,15 @@ class Evidence:
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
-        return Evidence(model, samples, scale, variation, samples.moving, blocks, context)
+        rows = samples.moving & independent_rows(samples)[:, None]
+        return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
         """The same run with columns as a model sees them that has ``known`` effects."""
         model = self.model.with_effects(known)
-        context = model.context(self.samples.motion, [added.effect for added in known])
-        return replace(self, context=replace(context, period=self.context.period), _columns={})
+        every = [*(added.effect for added in known), *self.asked]
+        context = model.context(self.samples.motion, every)
+        return replace(self, context=replace(context, period=self.context.period), _of_model={})
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -91,25 +98,32 @@ class Evidence:
             predicted = predicted - sum(added.torque(context) for added in known)
         return self.samples.tau - smooth(self.samples, predicted)
 
+    @cached_property
+    def kept(self) -> NDArray[np.intp]:
+        """(K,) samples that count for some joint."""
+        return np.flatnonzero(self.rows.any(axis=1))
+
     def columns(self, effect: Effect, shape: float) -> Array:
-        """(N, n, p) columns of an effect through the run's filter, computed once."""
+        """(K, n, p) columns of an effect through the run's filter, at the samples kept; computed once."""
         key = (effect.place, shape)
-        if key not in self._columns:
-            self._columns[key] = smooth(self.samples, effect.full_columns(self.context, shape))
-        return self._columns[key]
+        cache = self._of_model if effect.needs_model else self._of_motion
+        if key not in cache:
+            columns = smooth(self.samples, effect.columns(self.context, shape))[self.kept]
+            cache[key] = effect.on_all_joints(columns, self.rows.shape[1])
+        return cache[key]
 
     def only(self, rows: NDArray[np.bool_]) -> Evidence:
         """The same run where only rows (N, n) count."""
-        return replace(self, rows=rows)
+        return replace(self, rows=rows, _of_motion={}, _of_model={})
 
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
         """The weighted regression problem of all joints, one row per joint and counted sample."""
-        X = np.concatenate(columns, axis=2) if columns else np.zeros((*residual.shape, 0))
-        order = np.argwhere(self.rows)
-        samples, joints = order[:, 0], order[:, 1]
+        X = np.concatenate(columns, axis=2) if columns else np.zeros((len(self.kept), residual.shape[1], 0))
+        places, joints = np.nonzero(self.rows[self.kept])
+        samples = self.kept[places]
         weight = 1 / self.scale[joints]
         return Stacked(
-            X[samples, joints] * weight[:, None],
+            X[places, joints] * weight[:, None],
             residual[samples, joints] * weight,
             self.blocks[samples],
             self.fold[samples],

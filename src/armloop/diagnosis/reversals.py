@@ -6,8 +6,8 @@ speed, and so its reversals are kept out, too. There alone does friction with me
 direction: among samples that slide it can hardly be seen, and no model's baseline says anything of it.
 
 So they are judged after the search, as a condition of their own. As there is no baseline to compare with, what is
-named must be plain: it at least halves the joint's squared error there, on blocks that were not fitted, and what it
-removes is a noticeable torque.
+named must be plain: it at least halves the joint's error there, on blocks that were not fitted, and what it removes is
+a noticeable torque. The drives of an arm are alike: what is plain at one joint needs less at the others.
 """
 
 from __future__ import annotations
@@ -23,17 +23,20 @@ from scipy.stats import t
 from armloop.arm import Arm
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit, Shape, fit
-from armloop.diagnosis.search import Found, Outcome, refit, try_effect
+from armloop.diagnosis.fit import Fit, Shape
+from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.trials import Known
 from armloop.effects import Effect, hypotheses
 from armloop.motion import Motion
 from armloop.progress import Progress
+from armloop.signals import independent_rows
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: An effect must remove this part of a joint's squared error at reversals …
-HALF = 0.5
+#: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
+#: found at another joint, this part …
+PLAIN, LIKELY = 0.75, 0.5
 #: … which must be at least this part of the joint's torque, both root mean square …
 NOTICEABLE = 0.03
 #: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors):
@@ -93,35 +96,33 @@ def judge_reversals(
         kept: (N, n) samples that may count: not those of contacts, nor of joints that nothing may be named on.
     """
     samples = evidence.samples
-    turns = turning(samples.motion, samples.moving) & kept
+    turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
     own = evidence.only(evidence.rows | turns)
     reach = round(AROUND / samples.period)
     judged = binary_dilation(turns, np.ones((2 * reach + 1, 1))) & own.rows & kept
-    known = outcome.after
-    start = current = fit(own, outcome.residual, known.effects, known.shapes)
-    view = _View.of(own, start, judged)
+    start = known = Known.of(own, outcome.after.effects, outcome.after.shapes)
+    view = _View.of(own, start.fit, judged)
     found: list[Found] = []
-    gains = _Gains({}, {})
-    changed = set(view.suspects(start))
+    gains = _Gains({}, {}, set())
+    changed = set(view.suspects(start.fit))
     while changed and len(found) < 2 * samples.motion.joints:
-        for effect in _concerned(evidence.model.arm, changed, current):
-            gains.take(effect, view.gains(current, try_effect(own, outcome.residual, current, effect)))
+        for effect in _concerned(evidence.model.arm, changed, known.fit):
+            gains.take(effect, view.gains(known.fit, known.trial(effect)))
         best = gains.best()
         if best is None:
             break
-        trial = try_effect(own, outcome.residual, current, best.effect)
+        trial = known.trial(best.effect)
         assert trial is not None
         found.append(replace(best, shape=trial.shapes[-1]))
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of the error at its reversals")
-        changed = _joints(best.effect) or set(view.suspects(current))
-        current = trial
+        changed = _joints(best.effect) or set(view.suspects(known.fit))
+        known = replace(known, fit=trial)
         gains.forget(best.effect, changed)
     if not found:
         return None
-    after = refit(own, current)
-    nothing = fit(own, outcome.residual, [], [])
-    whole = Outcome([*outcome.found, *found], nothing, after, outcome.residual)
-    before, left = (np.sqrt(view.mean_squares(f)) * own.scale for f in (start, after))
+    after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
+    whole = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
+    before, left = (np.sqrt(view.mean_squares(k.fit)) * own.scale for k in (start, after))
     return AtReversals(found, whole, own, before, left)
 
 
@@ -194,10 +195,11 @@ class _Gain:
 
 @dataclass(frozen=True, eq=False)
 class _Gains:
-    """What every effect gains at the suspects, and what each kind of effect gains at its own joints."""
+    """What every effect gains at the suspects, what each kind gains at its own joints, and the kinds found."""
 
     by_effect: dict[Effect, dict[int, _Gain]]
     by_kind: dict[str, dict[int, _Gain]]
+    found: set[str]
 
     def take(self, effect: Effect, gains: dict[int, _Gain]) -> None:
         """Note what an effect gains."""
@@ -207,6 +209,7 @@ class _Gains:
 
     def forget(self, found: Effect, joints: set[int]) -> None:
         """Drop the effect that was found, and what depends on joints (0-based) where something was found."""
+        self.found.add(found.name)
         for effect in list(self.by_effect):
             if effect.place == found.place or not _joints(effect) or _joints(effect) & joints:
                 del self.by_effect[effect]
@@ -220,10 +223,15 @@ class _Gains:
         alike = [gain.ratios for gain in self.by_kind.get(effect.name, {}).values()]
         return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
 
+    def _least(self, effect: Effect) -> float:
+        return LIKELY if effect.name in self.found else PLAIN
+
     def best(self) -> Found | None:
         """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""
         shares = {
-            effect: {j: g.share for j, g in own.items() if g.share >= HALF and self._sure(effect, j)}
+            effect: {
+                j: g.share for j, g in own.items() if g.share >= self._least(effect) and self._sure(effect, j)
+            }
             for effect, own in self.by_effect.items()
         }
         most = [(share, j) for own in shares.values() for j, share in own.items()]

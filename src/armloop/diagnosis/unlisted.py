@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.search import Outcome, without_effects_at
 from armloop.library.angle_sums import AngleSums
 from armloop.motion import Motion
 from armloop.progress import Progress
@@ -23,12 +24,17 @@ from armloop.regression.sparse import Sparse
 
 Array = NDArray[np.float64]
 
-#: A residual is real if it is this many times what the model leaves on the worst tenth of its baseline, and exceeds
-#: that by three standard errors.
-EXCESS = 2.0
+#: A residual is real if it is this many times what the model leaves on the worst tenth of its baseline, even without
+#: the blocks that show most of it: one or two are an event of the run, no law.
+EXCESS, EVENTS = 2.0, 2
 #: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
 #: exactly, and no further effect.
 REMAINDER = 0.03
+#: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
+FORCED = 0.3
+#: Nor are those that leave a real residual of which a law of no more parameters, in their place, leaves but this part.
+FAR_LESS = 0.5
+_FEWEST = 50
 _MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
 
@@ -55,34 +61,70 @@ class Unlisted:
         }
 
 
-def find_law(evidence: Evidence, before: Fit, after: Fit, progress: Progress) -> Unlisted | None:
+def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[Unlisted | None, Outcome]:
     """The largest residual left, if it is real, and its law; None if the run looks like the baseline.
 
+    Effects that were only the nearest names for a law that is not listed are struck off: those that leave most of
+    what they were to explain, and those for which a law of no more parameters explains far more.
+
     Args:
-        before, after: fits without and with the effects found.
+        outcome: what the search found.
+
+    Returns:
+        The residual, and the outcome without the effects struck off.
     """
+    j = _left_over(evidence, outcome)
+    if j is None:
+        return None, outcome
+    progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
+    bare = without_effects_at(evidence, outcome, j)
+    law = _law(evidence, outcome.after, j)
+    if len(bare.found) < len(outcome.found):
+        parameters = outcome.after.complexity - bare.after.complexity
+        simpler = _law(evidence, bare.after, j)
+        left = _energy(outcome.after, j)
+        if 0 < len(simpler.terms) <= parameters and simpler.energy <= FAR_LESS * left:
+            law, outcome = simpler, bare
+        elif left > FORCED * _energy(bare.after, j):
+            return find_law(evidence, bare, progress)
+    scale, rows = float(evidence.scale[j]), int((outcome.after.stacked.joint == j).sum())
+    rmse, with_form = (float(np.sqrt(e / rows)) * scale for e in (_energy(outcome.after, j), law.energy))
+    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form), outcome
+
+
+def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
+    """The joint (0-based) with the largest residual that is real."""
+    before, after = outcome.before, outcome.after
     n = evidence.samples.motion.joints
     ratios = np.zeros(n)
     for j in range(n):
         mine = after.stacked.joint == j
-        if mine.sum() < 50:
+        if mine.sum() < _FEWEST or _energy(after, j) < REMAINDER * _energy(before, j):
             continue
         error = after.held_out[mine] ** 2
-        if error.sum() < REMAINDER * float((before.held_out[mine] ** 2).sum()):
-            continue
         sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
-        if sums.sum() > 3 * np.sqrt(len(sums)) * sums.std(ddof=1):
+        if np.sort(sums)[:-EVENTS].sum() > 0:
             ratios[j] = np.sqrt(error.mean())
-    if not ratios.any():
-        return None
-    j = int(np.argmax(ratios))
-    progress(f"joint {j + 1}: a residual of {ratios[j]:.1f} times the baseline is left; searching its law")
-    scale = float(evidence.scale[j])
-    form, left = _law(evidence, after, j)
-    return Unlisted(j + 1, float(ratios[j]) * scale, scale, form, left * scale)
+    return int(np.argmax(ratios)) if ratios.any() else None
 
 
-def _law(evidence: Evidence, after: Fit, j: int) -> tuple[str, float]:
+def _energy(fit: Fit, j: int) -> float:
+    return float((fit.held_out[fit.stacked.joint == j] ** 2).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Law:
+    """Terms with coefficients (weighted), and the held-out squared error that they leave; none if none is stable."""
+
+    terms: list[tuple[float, str]]
+    energy: float
+
+    def form(self, scale: float) -> str:
+        """The law in N·m (N)."""
+        return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
+
+
+def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
     y = after.held_out[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
@@ -106,14 +148,14 @@ def _law(evidence: Evidence, after: Fit, j: int) -> tuple[str, float]:
     supports = [set(sparse.support(whole - part, none).tolist()) for part in parts]
     stable = sorted(set.intersection(*supports))
     if not stable:
-        return "", float(np.sqrt(np.mean(y**2)))
+        return _Law([], _energy(after, j))
     support = np.array(stable, dtype=np.intp)
     error = np.array(y)
     for k, part in enumerate(parts):
         rest = whole - part
         error[fold == k] -= X[np.ix_(fold == k, support)] @ rest.solve(support)
-    if (error**2).sum() > 0.5 * (y**2).sum():
-        return "", float(np.sqrt(np.mean(y**2)))
-    beta = whole.solve(support) * float(evidence.scale[j])
-    form = " ".join(f"{b:+.3g}*{names[t]}" for b, t in zip(beta, support, strict=True)).removeprefix("+")
-    return form, float(np.sqrt(np.mean(error**2)))
+    left = float((error**2).sum())
+    if left > 0.5 * _energy(after, j):
+        return _Law([], _energy(after, j))
+    beta = whole.solve(support)
+    return _Law([(float(b), names[t]) for b, t in zip(beta, support, strict=True)], left)

@@ -21,6 +21,7 @@ from armloop.drake_systems.friction_system import (
 from armloop.drake_systems.model_expressions import model_equations
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
+from armloop.drake_systems.rate_limiter import RateLimiter, RateLimiter_
 from armloop.drake_systems.reference import ReferenceSource
 from armloop.drake_systems.sticking import StickingForwardDynamics
 
@@ -45,6 +46,8 @@ __all__ = [
     "PidGains",
     "PreslidingFriction",
     "PreslidingFriction_",
+    "RateLimiter",
+    "RateLimiter_",
     "ReferenceSource",
     "StickingForwardDynamics",
     "Stop",

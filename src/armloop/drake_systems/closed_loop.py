@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque
@@ -14,9 +16,12 @@ from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
+from armloop.drake_systems.rate_limiter import RateLimiter
 from armloop.drake_systems.reference import ReferenceSource
 from armloop.drake_systems.scenarios import Plant, plant_for
 from armloop.excitation import Reference
+
+Array = NDArray[np.float64]
 
 CONTROLLERS = ("pid", "computed_torque")
 """The controllers that `add_arm_with_controller` knows."""
@@ -30,16 +35,28 @@ class ControlledArm:
     reference : `q_ref`, `v_ref`, `vdot_ref`, `tau_ff` (n,); `tau_ff` is zero without a model or where the
         controller holds the model itself
     controller : `tau` (n,)
+    drives : where torques can change at a limited rate only, between the controller and the plant: `tau` (n,)
     """
 
     plant: ArmPlant
     reference: ReferenceSource
     controller: PidController | LeafSystem
+    drives: RateLimiter | None = None
 
     def start_on_reference(self, root_context: Context) -> None:
         """Put the arm where the reference begins, at its velocity, inside the diagram's context."""
         q_ref, v_ref, _ = self.reference.tables
         self.plant.set_state(root_context, q_ref[0], v_ref[0])
+        if self.drives is not None:
+            # it was held there
+            held = self.drives.GetMyMutableContextFromRoot(root_context)
+            law = self.controller
+            asked = law.GetOutputPort("tau").Eval(law.GetMyContextFromRoot(root_context))
+            self.drives.set_torque(held, np.clip(asked, *self._efforts()))
+
+    def _efforts(self) -> tuple[Array, Array]:
+        effort = np.array([joint.effort for joint in self.plant.arm.joints])
+        return -effort, effort
 
     def set_model(self, model: Any, step: int = 3) -> None:
         """Exchange the model in a running simulation, between two calls of `Simulator.AdvanceTo`.
@@ -62,6 +79,7 @@ def add_arm_with_controller(
     *,
     controller: str = "pid",
     effects: Sequence[UndeclaredEffect] = (),
+    torque_rate: ArrayLike | None = None,
 ) -> ControlledArm:
     """Add an arm that follows a reference: a plant with sticking friction under the controller of your choice.
 
@@ -77,6 +95,7 @@ def add_arm_with_controller(
     gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
     model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
+    torque_rate : (n,) N*m/s (N/s), how fast the drives can change their torques (`RateLimiter`); any by default
 
     Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains, reference, model and controller do
     not fit each other.
@@ -102,8 +121,13 @@ def add_arm_with_controller(
     for port in needed:
         builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
     builder.Connect(plant.GetOutputPort("state"), law.GetInputPort("state"))
-    builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    return ControlledArm(plant, source, law)
+    drives = law
+    if torque_rate is not None:
+        effort = [joint.effort for joint in spec.arm.joints]
+        drives = builder.AddNamedSystem("drives", RateLimiter(effort, torque_rate, period))
+        builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
+    builder.Connect(drives.GetOutputPort("tau"), plant.GetInputPort("tau"))
+    return ControlledArm(plant, source, law, drives if drives is not law else None)
 
 
 def _check_controller(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any, Protocol
 
@@ -35,7 +35,9 @@ def Feedforward_(T: type) -> Any:
         tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with
         velocity terms, 3 with acceleration terms.
 
-        Input ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each. Output port: `tau_ff` (n,), N*m (N).
+        Input ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, or with `stacked` one, `motion_ref` (3n,), all three
+        behind each other: reading one port instead of three saves a sixth of the time of 300 terms. Output port:
+        `tau_ff` (n,), N*m (N). A reference that is known ahead is cheaper still: `ReferenceSource`.
 
         Stateless, direct feedthrough. Scalar types float, AutoDiffXd and Expression; for the last two the model
         must be a `ReconstructedModel`, and dry friction has the derivative 0, which is wrong at rest. Friction
@@ -44,44 +46,59 @@ def Feedforward_(T: type) -> Any:
         """
 
         def _construct(
-            self, model: FeedforwardModel, n: int, step: int = 3, *, converter: Any = None
+            self,
+            model: FeedforwardModel,
+            n: int,
+            step: int = 3,
+            *,
+            stacked: bool = False,
+            converter: Any = None,
         ) -> None:
-            """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3."""
+            """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3; stacked : one input port."""
             if not isinstance(model, ReconstructedModel):
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = model, n, step
+            self._arguments, self._n, self._stacked = (model, n, step), n, stacked
             if T is float:
-                self._drive = _drive(model, step)
+                self._drive = (_stacked_drive if stacked else _drive)(model, step)
             else:
                 assert isinstance(model, ReconstructedModel)
                 self._equations = ModelEquations(model, functions_of(T), step=step)
-            self._inputs = [self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")]
-            calc = self._calc_tau_ff if T is float else self._calc_symbolic_tau_ff
+            names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
+            self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
+            calc = self._calc_symbolic_tau_ff
+            if T is float:
+                calc = self._calc_stacked_tau_ff if stacked else self._calc_tau_ff
             # Named, or Drake would find out by writing all the formulas out.
             self.DeclareVectorOutputPort("tau_ff", n, calc, {self.all_input_ports_ticket()})
 
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
             self._arguments = model, *self._arguments[1:]
-            self._drive = _drive(model, self._arguments[2])
+            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[2])
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
+            Impl._construct(self, *other._arguments, stacked=other._stacked, converter=converter)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
             q, v, vdot = self._inputs
-            tau = self._drive(q.Eval(context), v.Eval(context), vdot.Eval(context))
+            self._give(context, output, self._drive(q.Eval(context), v.Eval(context), vdot.Eval(context)))
+
+        def _calc_stacked_tau_ff(self, context: Any, output: Any) -> None:
+            self._give(context, output, self._drive(self._inputs[0].Eval(context)))
+
+        def _give(self, context: Any, output: Any, tau: Sequence[float]) -> None:
             # A NaN or an infinity shows in the sum; several times faster than numpy's test.
-            if not isfinite(sum(tau.tolist())):
+            if not isfinite(sum(tau)):
                 raise RuntimeError(
                     f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}"
                 )
             output.SetFromVector(tau)
 
         def _calc_symbolic_tau_ff(self, context: Any, output: Any) -> None:
-            q, v, vdot = (port.Eval(context).tolist() for port in self._inputs)
+            x = [y for port in self._inputs for y in port.Eval(context).tolist()]
+            q, v, vdot = (x[k * self._n : (k + 1) * self._n] for k in range(3))
             output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
 
     return Impl
@@ -90,7 +107,19 @@ def Feedforward_(T: type) -> Any:
 Feedforward = Feedforward_[None]
 
 
-def _drive(model: FeedforwardModel, step: int) -> Callable[[Array, Array, Array], Array]:
+def _drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
     if isinstance(model, ReconstructedModel):
-        return model.drive(step)
-    return lambda q, v, vdot: model.feedforward(q, v, vdot, step)
+        drive = model.drive(step)
+        return lambda q, v, vdot: drive(q, v, vdot).tolist()
+    return lambda q, v, vdot: np.asarray(model.feedforward(q, v, vdot, step)).tolist()
+
+
+def _stacked_drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
+    if isinstance(model, ReconstructedModel):
+        return model.stacked_drive(step)
+
+    def drive(x: Array) -> Sequence[float]:
+        n = len(x) // 3
+        return np.asarray(model.feedforward(x[:n], x[n : 2 * n], x[2 * n :], step)).tolist()
+
+    return drive

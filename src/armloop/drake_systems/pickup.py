@@ -64,18 +64,18 @@ def run_pickup(
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)
-    log = _log(scenario, *loaded.recorded())
+    log = _log(scenario, *loaded.recorded()[:3])
     loaded.systems.set_model(learn(log))
     loaded.set_integral(free.integral())
     loaded.advance(scenario.reference.duration)
     first, second = free.recorded(), loaded.recorded()
     # both recorded the moment of the grasp
-    time, state, tau = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
+    time, state, tau, asked = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
     ends = (0.0, pickup.at, pickup.diagnose_at, scenario.reference.duration)
     phases = {}
     for k, name in enumerate(PHASES):
         part = replace(scenario, score=(ends[k], ends[k + 1]))
-        phases[name] = score(part, CONTROLLER, time, free.systems.reference.tables, state, tau)
+        phases[name] = score(part, CONTROLLER, time, free.systems.reference.tables, state, tau, asked)
     return PickupResult(phases, log)
 
 
@@ -121,8 +121,8 @@ class _Run:
         assert isinstance(controller, PidController)
         return controller.GetSubsystemByName("integral").GetMyMutableContextFromRoot(self.context)
 
-    def recorded(self) -> tuple[Array, Array, Array]:
-        """Return time (N,), state (N, 2n) and the drives' torques (N, n)."""
+    def recorded(self) -> tuple[Array, Array, Array, Array]:
+        """Return time (N,), state (N, 2n), the drives' torques (N, n) and those that the controller asked for."""
         return self._arm.recorded(self.context)
 
 

@@ -74,6 +74,10 @@ class ReferenceSource(Diagram):
         """Take another model from the next period on; between two calls of `Simulator.AdvanceTo`."""
         self._table.set_model(model, step)
 
+    def set_torques(self, tau: Array) -> None:
+        """Take torques (K, n) in place of a model's, one row per period, K as in `tables`."""
+        self._table.set_torques(tau)
+
 
 class _ReferenceTable(TableSource):
     """A table whose last n columns are filled in, chunk by chunk, when they are needed."""
@@ -93,6 +97,10 @@ class _ReferenceTable(TableSource):
                 self._equations = ModelEquations(model, NUMPY, step=step)
         self._rows[:, 3 * self._n :] = 0.0
         self._filled = [model is None] * (len(self._rows) // _CHUNK + 1)
+
+    def set_torques(self, tau: Array) -> None:
+        self._rows[:, 3 * self._n :] = tau
+        self._filled = [True] * len(self._filled)
 
     def _calc_row(self, context: Context, output: BasicVector) -> None:
         row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)

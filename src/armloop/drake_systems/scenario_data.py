@@ -9,7 +9,7 @@ from typing import Optional
 
 CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "bounded", "exact")
 """PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with Step III
-on the motion nearest to the reference that keeps the torque limits; PID with the simulated arm's own inverse dynamics,
+on the motion nearest to the reference that keeps the limits; PID with the simulated arm's own inverse dynamics,
 which no reconstruction can reach."""
 PAPER = ("pid", "pid_step1", "pid_step3")
 """The controllers of Fig. 15."""
@@ -108,8 +108,11 @@ class WearData:
 class LimitsData:
     """What the drives can do, where it is less than the URDF says."""
 
-    effort: list[float] = field(default_factory=list)  # N*m (N), one per joint
-    used: float = 0.95  # share of the effort that `bounded` plans with; the rest is left to the feedback
+    effort: list[float] = field(default_factory=list)  # N*m (N), one per joint; the URDF's when empty
+    rate: list[float] = field(
+        default_factory=list
+    )  # N*m/s (N/s), how fast a torque may change; any when empty
+    used: float = 0.95  # share of effort and rate that `bounded` plans with; the rest is left to the feedback
 
 
 @dataclass

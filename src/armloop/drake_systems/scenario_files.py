@@ -11,10 +11,9 @@ import numpy as np
 from pydrake.common.yaml import yaml_load_file, yaml_load_typed
 
 from armloop.errors import ScenarioError
-from armloop.resources import scenario_names, scenario_path
+from armloop.resources import find_scenario
 
 T = TypeVar("T")
-_PARTS = ("plants", "collection")  # YAML files that scenarios and collections draw on
 
 
 def per_joint(values: list[float], n: int, where: str, *, spread: bool = True) -> Any:
@@ -30,17 +29,14 @@ def per_joint(values: list[float], n: int, where: str, *, spread: bool = True) -
     return array
 
 
-def read(path: Path, kind: str = "scenario") -> Mapping[str, Any]:
+def read(path: Path) -> Mapping[str, Any]:
     """Return the file as a mapping."""
-    if not path.is_file():
-        known = ", ".join(name for name in scenario_names() if name not in _PARTS)
-        raise ScenarioError(f"{path}: no such {kind}; give the path of a YAML file or one of: {known}")
     try:
         raw = yaml_load_file(str(path))
     except Exception as error:  # the reader passes the YAML parser's own errors through
         raise ScenarioError(f"{path}: unreadable YAML: {error}") from error
     if not isinstance(raw, Mapping):
-        raise ScenarioError(f"{path}: a {kind} must be a mapping of fields")
+        raise ScenarioError(f"{path}: a scenario must be a mapping of fields")
     return raw
 
 
@@ -58,8 +54,7 @@ def scenario_entry(spec: str | Path, schema: type[T]) -> tuple[Path, str, str, T
     spec : a built-in name or the path of a file; a file may hold several scenarios, a mapping by name:
         then FILE:NAME, or FILE alone for the one that is named as the file, else the first
     """
-    file, wanted = _split(str(spec))
-    path = scenario_path(file) if file in scenario_names() else Path(file)
+    path, wanted = find_scenario(spec)
     raw = read(path)
     fields = get_type_hints(schema)
     several = raw and all(key not in fields and isinstance(value, Mapping) for key, value in raw.items())
@@ -72,11 +67,6 @@ def scenario_entry(spec: str | Path, schema: type[T]) -> tuple[Path, str, str, T
         raise ScenarioError(f"{path}: there is no scenario {chosen!r}; there are: {', '.join(raw)}")
     name = path.stem if chosen == path.stem else f"{path.stem}:{chosen}"
     return path, name, f"{path}: {chosen}", typed(path, raw[chosen], schema, chosen)
-
-
-def _split(spec: str) -> tuple[str, str | None]:
-    file, colon, name = spec.rpartition(":")
-    return (file, name) if colon and not Path(spec).is_file() else (spec, None)
 
 
 def typed(path: Path, raw: Any, schema: type[T], name: str | None) -> T:

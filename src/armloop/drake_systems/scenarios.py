@@ -71,7 +71,8 @@ class TrackingScenario:
 
     score : (start, end) s, the interval that is scored; controllers : names among `CONTROLLERS`
     bandwidth : rad/s, of computed torque
-    limits : (n,) N*m (N), the torques that `bounded` plans with
+    rate : (n,) N*m/s (N/s), how fast the drives can change their torques; None for any
+    used : share of the drives' limits that `bounded` plans with
     """
 
     name: str
@@ -84,7 +85,8 @@ class TrackingScenario:
     bandwidth: float = 20.0
     pickup: Pickup | None = None
     wear: Wear | None = None
-    limits: np.ndarray | None = None
+    rate: np.ndarray | None = None
+    used: float = 1.0
 
 
 def plant_names() -> list[str]:
@@ -145,7 +147,7 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
     Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
     """
     path, name, where, data = scenario_entry(spec, TrackingData)
-    plant, limits = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
+    plant, rate, used = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
     n, period = plant.arm.n, plant.config.time_step
     reference = reference_of(data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where)
     gains = [per_joint(getattr(data, key), n, f"{where}: {key}") for key in ("kp", "ki", "kd")]
@@ -175,25 +177,35 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         data.bandwidth,
         _pickup(data.pickup, plant.arm, reference, where),
         _wear(data.wear, where),
-        limits,
+        rate,
+        used,
     )
 
 
-def _limited(data: LimitsData | None, plant: Plant, where: str) -> tuple[Plant, np.ndarray]:
-    """Return the plant with the drives' limits, and (n,) what of them may be planned with."""
+def _limited(data: LimitsData | None, plant: Plant, where: str) -> tuple[Plant, np.ndarray | None, float]:
+    """Return the plant with the drives' limits of torque, those of its rate, and what of both may be planned with."""
     arm = plant.arm
-    effort, used = np.array([joint.effort for joint in arm.joints]), LimitsData().used
-    if data is not None:
-        effort, used = per_joint(data.effort, arm.n, f"{where}: limits.effort"), data.used
-        if np.any(effort <= 0):
-            raise ScenarioError(f"{where}: limits.effort must be above 0")
-        if not 0.1 <= used <= 1:
-            raise ScenarioError(f"{where}: limits.used is {used}; it must be 0.1 to 1")
+    if data is None:
+        return plant, None, LimitsData().used
+    if not 0.1 <= data.used <= 1:
+        raise ScenarioError(f"{where}: limits.used is {data.used}; it must be 0.1 to 1")
+    if not data.effort and not data.rate:
+        raise ScenarioError(f"{where}: limits needs an effort or a rate")
+    if data.effort:
+        effort = _above_zero(data.effort, arm.n, f"{where}: limits.effort")
         joints = tuple(
             dataclasses.replace(joint, effort=float(e)) for joint, e in zip(arm.joints, effort, strict=True)
         )
         plant = dataclasses.replace(plant, arm=dataclasses.replace(arm, joints=joints))
-    return plant, used * effort
+    rate = _above_zero(data.rate, arm.n, f"{where}: limits.rate") if data.rate else None
+    return plant, rate, data.used
+
+
+def _above_zero(values: list[float], n: int, where: str) -> np.ndarray:
+    numbers = np.asarray(per_joint(values, n, where))
+    if np.any(numbers <= 0):
+        raise ScenarioError(f"{where} must be above 0")
+    return numbers
 
 
 def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:

@@ -181,25 +181,25 @@ class RecordedArm:
         builder, period = DiagramBuilder(), scenario.plant.config.time_step
         self.systems = add_controlled_arm(builder, scenario, controller, models, effects)
         plant, reference = self.systems.plant, self.systems.reference
-        self._logs = [
-            LogVectorOutput(plant.GetOutputPort(name), builder, period) for name in ("state", "tau_drive")
-        ]
+        controller_torque = self.systems.controller.GetOutputPort("tau")
+        ports = (plant.GetOutputPort("state"), plant.GetOutputPort("tau_drive"), controller_torque)
+        self._logs = [LogVectorOutput(port, builder, period) for port in ports]
         builder.ExportOutput(plant.GetOutputPort("state"), "state")
         builder.ExportOutput(reference.GetOutputPort("q_ref"), "q_ref")
         self.diagram = builder.Build()
 
-    def recorded(self, root_context: Context) -> tuple[Array, Array, Array]:
-        """Return time (N,), state (N, 2n) and the drives' torques (N, n)."""
-        state, tau = (log.FindLog(root_context) for log in self._logs)
-        return state.sample_times().copy(), state.data().T.copy(), tau.data().T.copy()
+    def recorded(self, root_context: Context) -> tuple[Array, Array, Array, Array]:
+        """Return time (N,), state (N, 2n), the drives' torques (N, n) and those that the controller asked for."""
+        state, tau, asked = (log.FindLog(root_context) for log in self._logs)
+        return state.sample_times().copy(), *(x.data().T.copy() for x in (state, tau, asked))
 
     def result(self, root_context: Context) -> TrackingResult:
         """Return what the run came to so far."""
-        time, state, tau = self.recorded(root_context)
+        time, state, tau, asked = self.recorded(root_context)
         # what is bounded follows another motion, and is judged by what was asked for
         reference = self._scenario.reference
         tables = reference.evaluate(time) if self._controller == BOUNDED else self.systems.reference.tables
-        return score(self._scenario, self._controller, time, tables, state, tau)
+        return score(self._scenario, self._controller, time, tables, state, tau, asked)
 
 
 def add_controlled_arm(
@@ -222,14 +222,33 @@ def add_controlled_arm(
     if controller == COMPUTED_TORQUE:
         gains = AccelerationGains.critical(n, scenario.bandwidth)
         return add_arm_with_controller(
-            builder, plant, gains, scenario.reference, model, controller=controller, effects=effects
+            builder,
+            plant,
+            gains,
+            scenario.reference,
+            model,
+            controller=controller,
+            effects=effects,
+            torque_rate=scenario.rate,
         )
-    reference = scenario.reference
+    reference, bounded = scenario.reference, None
     if controller == BOUNDED:
-        if not isinstance(model, ReconstructedModel) or scenario.limits is None:
-            raise ValueError("bounded needs a reconstructed model and the scenario's limits")
-        reference = bounded_reference(reference, model, scenario.limits)
-    return add_arm_with_controller(builder, plant, scenario.gains, reference, model, step, effects=effects)
+        if not isinstance(model, ReconstructedModel):
+            raise ValueError("bounded needs a reconstructed model")
+        reference = bounded = bounded_reference(reference, model, *_planned(scenario))
+    arm = add_arm_with_controller(
+        builder, plant, scenario.gains, reference, model, step, effects=effects, torque_rate=scenario.rate
+    )
+    if bounded is not None:
+        period = plant.config.time_step
+        arm.reference.set_torques(bounded.torque(period * np.arange(len(arm.reference.tables[0]))))
+    return arm
+
+
+def _planned(scenario: TrackingScenario) -> tuple[Array, Array | None]:
+    """Return what of the drives' limits may be planned with: torques and their rates."""
+    effort = np.array([joint.effort for joint in scenario.plant.arm.joints])
+    return scenario.used * effort, None if scenario.rate is None else scenario.used * scenario.rate
 
 
 def _feedforward(
@@ -253,10 +272,12 @@ def score(
     tables: tuple[Array, Array, Array],
     state: Array,
     tau: Array,
+    asked: Array,
 ) -> TrackingResult:
     """Return what a run came to over the scenario's interval.
 
-    time : (N,) s; tables : q, v, vdot (K, n) of the reference, K >= N; state : (N, 2n); tau : (N, n)
+    time : (N,) s; tables : q, v, vdot (K, n) of the reference, K >= N; state : (N, 2n)
+    tau, asked : (N, n) N*m (N), the drives' torques and those that the controller asked for
     """
     arm, steps = scenario.plant.arm, len(time)
     q, v = state[:, : arm.n], state[:, arm.n :]
@@ -276,5 +297,7 @@ def score(
         rms=np.sqrt((error**2).mean(axis=0)),
         largest=error.max(axis=0),
         unit=tuple("deg" if turns else "mm" for turns in arm.revolute),
-        metrics=measure(scenario.plant.config.time_step, error, v[scored], v_ref[scored], tau[scored]),
+        metrics=measure(
+            scenario.plant.config.time_step, error, v[scored], v_ref[scored], tau[scored], asked[scored]
+        ),
     )

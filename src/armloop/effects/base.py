@@ -68,6 +68,7 @@ class Effect(ABC):
         sensor: whether it falsifies what is recorded instead of acting on the arm.
         complexity: number of free parameters, for preferring the simplest of equals.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
+        needs_model: whether its columns depend on anything the known model says, not on the motion alone.
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
         searched: whether it is one of the hypotheses of a diagnosis; an event of one run is found otherwise.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
@@ -79,6 +80,7 @@ class Effect(ABC):
     sensor: ClassVar[bool] = False
     complexity: ClassVar[int] = 1
     needs_inertial: ClassVar[bool] = False
+    needs_model: ClassVar[bool] = True
     load: ClassVar[bool] = False
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
@@ -159,12 +161,14 @@ class Effect(ABC):
 
     def full_columns(self, context: Context, shape: float) -> Array:
         """(N, n, p) columns on all joints."""
-        columns = self.columns(context, shape)
+        return self.on_all_joints(self.columns(context, shape), context.arm.n)
+
+    def on_all_joints(self, columns: Array, joints: int) -> Array:
+        """(N, n, p) of columns on the effect's own joint (N, p); others as they are."""
         if columns.ndim == 3:
             return columns
         assert self.joint is not None
-        N, p = columns.shape
-        full = np.zeros((N, context.arm.n, p))
+        full = np.zeros((len(columns), joints, columns.shape[1]))
         full[:, self.joint - 1] = columns
         return full
 
@@ -186,6 +190,7 @@ def fill(arm: Arm, text: str, joint: int | None) -> str:
 class LinearJointEffect(Effect):
     """An effect of one joint with one linear coefficient: torque = coefficient · column."""
 
+    needs_model = False
     parameter: ClassVar[str]
     unit: ClassVar[str]
     law: ClassVar[str]
@@ -230,6 +235,7 @@ class ProfiledJointEffect(Effect):
     """
 
     complexity = 2
+    needs_model = False
     parameter: ClassVar[str]
     shape_name: ClassVar[str]
     unit: ClassVar[str]

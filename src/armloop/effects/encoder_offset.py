@@ -15,6 +15,7 @@ class EncoderOffset(LinearJointEffect):
     """recorded q_j = true q_j + d: the arm's torque belongs to another posture than the record says."""
 
     name = "encoder_offset"
+    needs_model = True
     sensor = True
     parameter = "offset"
     unit = "POS"

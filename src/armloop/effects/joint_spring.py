@@ -12,6 +12,7 @@ class JointSpring(Effect):
     """tau_j += k (q_j − q_0)."""
 
     name = "joint_spring"
+    needs_model = False
     complexity = 2
     load = True
 

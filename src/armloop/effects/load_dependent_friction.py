@@ -13,6 +13,7 @@ class LoadDependentFriction(LinearJointEffect):
     """tau_j += mu |load_j| sign(v_j), the load being the rigid-body torque of the known model."""
 
     name = "load_dependent_friction"
+    needs_model = True
     parameter = "coefficient"
     unit = "1"
     law = "mu |load| sign(v)"

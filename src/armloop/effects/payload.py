@@ -22,6 +22,7 @@ class Payload(Effect):
     """
 
     name = "payload"
+    needs_model = False
     joint_wise = False
     complexity = 5
     load = True

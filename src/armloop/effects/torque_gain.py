@@ -11,6 +11,7 @@ class TorqueGain(LinearJointEffect):
     """recorded tau_j = g true tau_j: a fault of the sensor (or of the drive gain that turned a current into it)."""
 
     name = "torque_gain"
+    needs_model = True
     sensor = True
     parameter = "gain"
     unit = "1"

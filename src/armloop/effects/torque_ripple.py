@@ -14,6 +14,7 @@ class TorqueRipple(Effect):
     """tau_j += A sin(N q_j + φ), N a whole number of cycles per revolution."""
 
     name = "torque_ripple"
+    needs_model = False
     complexity = 3
 
     #: Low orders belong to gravity, whose harmonics of the angle are 1 to 3.

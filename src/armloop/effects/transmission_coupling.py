@@ -17,6 +17,7 @@ class TransmissionCoupling(Effect):
     """
 
     name = "transmission_coupling"
+    needs_model = False
     pair_wise = True
     complexity = 4
 

@@ -117,6 +117,7 @@ def result_answer(result: TrackingResult) -> dict[str, Any]:
         m = result.metrics
         answer |= {
             "effort": m.effort.tolist(),
+            "clipped": m.clipped.tolist(),
             "stick_s": m.stick.tolist(),
             "settling_s": [None if np.isnan(x) else x for x in m.settling.tolist()],
             "unsettled": [None if np.isnan(x) else x for x in m.unsettled.tolist()],

@@ -97,13 +97,18 @@ def alternatives(diagnosis: Diagnosis) -> list[str]:
 
 def nothing_to_supply(added: list[AddedEffect]) -> str:
     """Why a controller with the augmented model does what it did before."""
-    if not added:
-        return "The controller adds nothing: the model is what it was."
-    if all(a.effect.sensor for a in added):
-        return "The controller adds nothing: a sensor's fault is no torque that the arm needs."
-    return (
-        "The controller adds nothing: what was found was an event, or fades, and is no property of the arm."
-    )
+    reasons = list(dict.fromkeys(_why_not(a) for a in added)) or ["the model is what it was"]
+    return f"The controller adds nothing: {'; '.join(reasons)}."
+
+
+def _why_not(added: AddedEffect) -> str:
+    if added.effect.sensor:
+        return "a sensor's fault is no torque that the arm needs"
+    if not added.effect.searched:
+        return "what pushed the arm was an event of this run"
+    if added.effect.name == "friction_drift":
+        return "friction that fades is gone once the joint is warm"
+    return f"{effect_label(added.effect)} asks for none along this motion"
 
 
 def _label(effect: dict[str, object]) -> str:

@@ -46,19 +46,19 @@ def spread_table(result: WearResult, title: str | None = "Tracking error η over
 def metrics_table(
     results: Mapping[str, TrackingResult], title: str | None = "How the joints followed"
 ) -> Table:
-    """RMS and largest error, RMS torque, time in stick and settling after reversals, per controller and joint."""
+    """RMS and largest error, RMS torque, share clipped, time in stick, settling after reversals per controller and joint."""
     rows: list[list[object]] = []
     for name, result in results.items():
         m = result.metrics
         for j, unit in enumerate(result.unit):
             row: list[object] = [controller(name), j + 1, unit, result.rms[j], result.largest[j]]
             row += (
-                [None] * 4
+                [None] * 5
                 if m is None
-                else [_there(x[j]) for x in (m.effort, m.stick, m.settling, m.unsettled)]
+                else [_there(x[j]) for x in (m.effort, 100 * m.clipped, m.stick, m.settling, m.unsettled)]
             )
             rows.append(row)
-    headers = ["RMS", "max", "effort [N·m, N]", "stick [s]", "settling [s]", "unsettled"]
+    headers = ["RMS", "max", "effort [N·m, N]", "clipped [%]", "stick [s]", "settling [s]", "unsettled"]
     return make_table(["controller", "joint", "unit", *headers], rows, title)
 
 

@@ -1,0 +1,145 @@
+"""The option of a diagnosis to write the motion to make next."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from armloop.commands.ranges import add_ranges, ranges_stated, read_ranges
+
+if TYPE_CHECKING:
+    from armloop.diagnosis import Diagnosis
+    from armloop.diagnosis.next_run import NextRun, Wish
+    from armloop.model import ReconstructedModel
+    from armloop.progress import Progress
+
+#: Rows per second of the reference.
+_RATE = 500.0
+
+
+def add_next_run(p: argparse.ArgumentParser) -> None:
+    """``--next-run`` and what it may do."""
+    group = p.add_argument_group("the motion to make next")
+    group.add_argument(
+        "--next-run",
+        default=None,
+        metavar="REF.csv",
+        help="write a reference that tells what was found from its alternatives, as far as a motion can; without any, "
+        "one that measures it better, or, for an unlisted effect, one that shows its joint at all postures and speeds",
+    )
+    group.add_argument(
+        "--next-run-duration",
+        type=float,
+        default=None,
+        metavar="S",
+        help="s, rounded up to whole periods of 20 s (default: 60)",
+    )
+    add_ranges(group, "those of the model's training data", "default: as in the model's training data")
+
+
+def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
+    """What the options say of the motion; None if none is wanted. Faults are found before any work is done."""
+    from armloop.commands.shared import out_file
+    from armloop.diagnosis.next_run import Wish, training_ranges
+    from armloop.errors import InputError
+    from armloop.tables import CSV, PARQUET
+
+    if options.next_run is None:
+        if ranges_stated(options) or options.next_run_duration is not None:
+            raise InputError("ranges and durations are those of --next-run REF.csv: give it, too")
+        return None
+    out_file(options.next_run, "--next-run")
+    if not options.next_run.endswith((CSV, PARQUET)):
+        raise InputError(f"--next-run {options.next_run}: a reference ends in {CSV} or {PARQUET}")
+    known = training_ranges(model)
+    ranges = read_ranges(options, model.arm, "urdf", known) if ranges_stated(options) else known
+    duration = 60.0 if options.next_run_duration is None else options.next_run_duration
+    return Wish(ranges, options.reserve, duration)
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """The answer of ``--next-run``: the motion, or why there is none."""
+
+    path: str
+    run: NextRun | None
+    fault: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        if self.run is None:
+            return {"reference": None, "why": self.fault or _NOTHING}
+        return {"reference": self.path, **self.run.to_dict()}
+
+    def write(self) -> None:
+        """Write the reference, if there is one; raise ``InputError`` if none was possible."""
+        from armloop.errors import InputError
+        from armloop.excitation import write_reference
+
+        if self.fault:
+            raise InputError(f"--next-run {self.path}: {self.fault}")
+        if self.run is not None:
+            write_reference(self.path, self.run.reference, _RATE)
+
+    def words(self) -> str:
+        """What the motion is for, for a terminal."""
+        return _NOTHING if self.run is None else _words(self.path, self.run)
+
+
+_NOTHING = (
+    "No motion to make next: the run shows no effect of the arm that one could tell more about; `armloop excite` designs "
+    "an exciting one."
+)
+
+
+def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Planned:
+    """Design the motion. A diagnosis is not lost where the limits exclude any."""
+    from armloop.diagnosis.next_run import next_run
+    from armloop.errors import InputError
+
+    try:
+        return Planned(path, next_run(diagnosis, wanted, tell))
+    except InputError as error:
+        return Planned(path, None, str(error))
+
+
+def _words(path: str, run: NextRun) -> str:
+    from armloop.diagnosis.next_run import FAR_ENOUGH
+    from armloop.reports.tables import make_table
+    from armloop.reports.words import number, percent
+
+    lines = []
+    told = [each for each in run.told if each.then is not None]
+    if told:
+        title = "The motion to make next: how much of the one's torque the other cannot stand for"
+        rows = [
+            [each.found.label(), each.rival.label(), percent(each.now), percent(each.then)] for each in told
+        ]
+        lines.append(str(make_table(["found", "alternative", "this run", "next run"], rows, title, (0, 1))))
+    if run.purpose == "precision":
+        for effect, factor in run.sharper:
+            result = (
+                f"measures {effect.label()} with {number(factor, 2)} times the standard error of this run"
+                if factor < 0.95
+                else f"measures {effect.label()} no better than this run did: within the limits there is little to gain"
+            )
+            lines.append(f"The motion to make next {result}.")
+    if run.purpose == "unlisted":
+        lines.append(
+            f"The motion to make next takes joint {run.joint}, where no listed law explains the residual, through all its "
+            "postures and speeds, the others moving apart from it."
+        )
+    for each in run.told:
+        names = f"{each.found.label()} from {each.rival.label()}"
+        if each.then is None:
+            lines.append(f"No motion within the limits tells {names}.")
+        elif each.then < FAR_ENOUGH:
+            lines.append(
+                f"Even this motion hardly tells {names}: wider limits or a longer --next-run-duration may."
+            )
+    lines.append(
+        f"Reference written to {path}, {number(run.reference.duration)} s. It knows nothing of obstacles, nor of the arm "
+        "hitting itself: watch it in slow motion first."
+    )
+    return "\n".join(lines)

@@ -1,0 +1,85 @@
+"""Judging trials: is a further effect worth it, and which is the simplest of those that do equally well?"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_sums
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit
+
+Array = NDArray[np.float64]
+
+#: An effect must lower the held-out error by this many standard errors (over blocks) …
+SIGNIFICANCE = 3.0
+#: … and, on some joint, by this part of the energy the model leaves on the worst tenth of its own baseline: a run may
+#: be all of such motion, and a law that fits a model's shortcomings is easily found.
+BASELINE_SHARE = 1.0
+#: A simpler effect is as good as the best if it is behind by no more than this many standard errors …
+CHANCE = 2.0
+#: … or on every joint by no more than this part of the baseline's energy, or of what the best removes there: no law is
+#: met exactly, and a richer one soaks up both …
+ALIKE, NEARLY = 1.0, 0.003
+#: … while it removes at least this part of what the best removes.
+MOST = 0.75
+
+
+def gain(current: Fit, trial: Fit) -> float:
+    """How much held-out squared error, weighted, a trial removes."""
+    return float((current.held_out**2).sum() - (trial.held_out**2).sum())
+
+
+def is_worth(evidence: Evidence, current: Fit, trial: Fit) -> bool:
+    """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
+    if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
+        return False
+    enough = BASELINE_SHARE * evidence.variation * rows_per_joint(current)
+    return bool((by_joint(current, trial) > enough).any())
+
+
+def simplest_of_equals(current: Fit, trials: list[Fit]) -> Fit:
+    """Among trials as good as the best, the one with the fewest parameters.
+
+    As good is one that removes most of what the best removes and is behind it by no more than chance over
+    blocks, or, on every joint, by no more than the model's own shortcomings there.
+    """
+    best = max(trials, key=lambda trial: gain(current, trial))
+    equals = [trial for trial in trials if trial is best or not is_behind(current, trial, best)]
+    return min(equals, key=lambda trial: (trial.complexity, -gain(current, trial)))
+
+
+def is_behind(current: Fit, trial: Fit, best: Fit) -> bool:
+    """Whether a trial does worse than the best by more than chance and the model's own shortcomings."""
+    soaked = np.maximum(ALIKE * rows_per_joint(trial), NEARLY * by_joint(current, best))
+    alike = lead(trial, best) <= CHANCE or bool((by_joint(trial, best) <= soaked).all())
+    return not alike or gain(current, trial) < MOST * gain(current, best)
+
+
+def lead(worse: Fit, better: Fit) -> float:
+    """By how many standard errors, over blocks, one fit leaves more held-out error than another.
+
+    Of the sum over blocks, or of the sum of each block's part of its own error, whichever is more: where all the
+    difference lies in few blocks (friction that fades, a law that bites at speed) its spread over blocks says
+    nothing of chance, but how many blocks agree does.
+    """
+    a, b = worse.block_errors(), better.block_errors()
+    rows = block_sums(np.ones(len(worse.stacked.block)), worse.stacked.block)
+    parts = (a - b) / (a + b + rows)
+    return max(_standard_errors(a - b), _standard_errors(parts))
+
+
+def _standard_errors(differences: Array) -> float:
+    spread = float(np.sqrt(len(differences)) * differences.std(ddof=1))
+    return float(differences.sum()) / max(spread, 1e-12)
+
+
+def rows_per_joint(fit: Fit) -> NDArray[np.intp]:
+    """(n,) rows of each joint."""
+    return np.bincount(fit.stacked.joint, minlength=fit.stacked.joints)
+
+
+def by_joint(worse: Fit, better: Fit) -> Array:
+    """(n,) how much held-out squared error one fit leaves more than another, joint by joint."""
+    difference = worse.held_out**2 - better.held_out**2
+    return np.asarray(np.bincount(worse.stacked.joint, weights=difference, minlength=worse.stacked.joints))

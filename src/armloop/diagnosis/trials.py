@@ -1,0 +1,119 @@
+"""What is known of a run so far, and what every further effect would add to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.evidence import FOLDS, Evidence
+from armloop.diagnosis.fit import Fit, Shape, fit
+from armloop.effects import Effect
+from armloop.model import AddedEffect
+from armloop.signals import smooth
+
+Array = NDArray[np.float64]
+
+_REFITS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Effects found so far, fitted together.
+
+    Attributes:
+        evidence: the run, with columns as a model sees them that has these effects.
+        residual: (N, n) what they and further effects have to explain, N·m (N).
+        fit: the effects fitted to it.
+    """
+
+    evidence: Evidence
+    residual: Array
+    fit: Fit
+
+    @staticmethod
+    def of(evidence: Evidence, effects: Sequence[Effect] = (), shapes: Sequence[Shape] = ()) -> Known:
+        """Fit effects, then again with what they change of each other: loads raise friction, gains scale all."""
+        residual = evidence.residual([])
+        known = Known(evidence, residual, fit(evidence, residual, effects, shapes))
+        for _ in range(_REFITS if effects else 0):
+            added = known.added()
+            knowing, residual = evidence.knowing(added), evidence.residual(added)
+            again = Known(knowing, residual, fit(knowing, residual, effects, shapes))
+            if again.error >= known.error:
+                break
+            known = again
+        return known
+
+    @property
+    def error(self) -> float:
+        """Held-out squared error, weighted."""
+        return float((self.fit.held_out**2).sum())
+
+    def added(self) -> list[AddedEffect]:
+        """The effects with their parameters, ready to be composed with the model."""
+        pairs = zip(self.fit.effects, self.fit.parameters, strict=True)
+        return [AddedEffect(effect, parameters) for effect, parameters in pairs]
+
+    def without(self, place: tuple[str, int | None, int | None], whole: Evidence) -> Known:
+        """What is known if one effect is taken back."""
+        kept = [k for k, effect in enumerate(self.fit.effects) if effect.place != place]
+        return Known.of(whole, [self.fit.effects[k] for k in kept], [self.fit.shapes[k] for k in kept])
+
+    def trial(self, effect: Effect) -> Fit | None:
+        """All effects fitted with one more; None where it cannot be there or shows nothing on this run."""
+        evidence, current = self.evidence, self.fit
+        joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
+        if not all(evidence.rows[:, j].any() for j in joints):
+            return None  # a joint at rest shows nothing
+        shapes = list(effect.shapes(evidence.context))
+        if not shapes:
+            return None
+        one = len(shapes) == 1
+        shape = Shape.fixed(shapes[0]) if one else _best_shape(self, effect, shapes)
+        trial = fit(evidence, self.residual, [*current.effects, effect], [*current.shapes, shape])
+        arm = evidence.model.arm
+        if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
+            return None
+        return trial
+
+
+def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
+    """The shape whose columns explain most of what the known effects leave on the effect's joints.
+
+    Chosen on all blocks for the parameters, and without each fold in turn for judging that fold.
+    """
+    n = known.residual.shape[1]
+    joints = range(n) if effect.other_joint or effect.joint is None else [effect.joint - 1]
+    X, y, fold = _shape_problem(known, effect, shapes, joints)
+    width = X.shape[2]
+    G = [np.einsum("ksp,ksr->spr", X[fold == k], X[fold == k]) for k in range(FOLDS)]
+    b = [np.einsum("ksp,k->sp", X[fold == k], y[fold == k]) for k in range(FOLDS)]
+
+    def best(folds: list[int]) -> float:
+        A = sum((G[k] for k in folds), 1e-12 * len(X) * np.eye(width))
+        c = sum((b[k] for k in folds), np.zeros_like(b[0]))
+        explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
+        return shapes[int(np.argmax(explained))]
+
+    every = list(range(FOLDS))
+    return Shape(best(every), tuple(best([other for other in every if other != k]) for k in every))
+
+
+def _shape_problem(
+    known: Known, effect: Effect, shapes: list[float], joints: Iterable[int]
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Columns (R, S, p) of every shape, what is left (R,), and the fold of each row, of the effect's joints."""
+    evidence, current = known.evidence, known.fit
+    each = [effect.columns(evidence.context, shape) for shape in shapes]
+    width = each[0].shape[-1]
+    parts, left, fold = [], [], []
+    for j in joints:
+        rows = evidence.rows[:, j]
+        columns = smooth(evidence.samples, np.hstack([c if c.ndim == 2 else c[:, j] for c in each]))[rows]
+        parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
+        left.append(current.held_out[current.stacked.joint == j])
+        fold.append(evidence.fold[rows])
+    return np.concatenate(parts), np.concatenate(left), np.concatenate(fold)

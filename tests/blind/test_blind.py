@@ -1,0 +1,64 @@
+"""A small fixed part of the blind test; `make blind` runs a few hundred cases."""
+
+from __future__ import annotations
+
+import ast
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HERE = Path(__file__).parent
+# Scripts that import each other by name, as they do when they are run.
+sys.path.insert(0, str(HERE))
+
+from generate import generate  # noqa: E402
+from judge import LARGE, Case, is_right  # noqa: E402
+from run import judge  # noqa: E402
+
+from armloop.drake_systems.scenarios import load_plan  # noqa: E402
+
+ARMS, CASES = (1, 2), 6
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
+    """Verdicts on logs beside which no answer is left: those are read and removed before the first diagnosis."""
+    place = tmp_path_factory.mktemp("blind")
+    sealed: dict[str, dict[str, Any]] = {}
+    for seed in ARMS:
+        generate(seed, CASES, load_plan("paper"), place / "logs", place / "answers")
+    for path in (place / "answers").glob("*.json"):
+        sealed[path.stem] = json.loads(path.read_text(encoding="utf-8"))
+    shutil.rmtree(place / "answers")
+    verdicts: dict[str, dict[str, Any]] = {}
+    for seed in ARMS:
+        verdicts |= judge(place / "logs" / f"arm_{seed}", place / f"verdicts_{seed}.json")
+    assert verdicts.keys() == sealed.keys()
+    return {name: (sealed[name], verdict) for name, verdict in verdicts.items()}
+
+
+@pytest.mark.slow
+def test_verdicts_are_right_without_the_answers(cases: dict[str, Case]) -> None:
+    large = {k: c for k, c in cases.items() if min(c[0]["sizes"], default=1.0) >= LARGE}
+    wrong = {k: (c[0]["effects"], c[1]) for k, c in large.items() if not is_right(*c)}
+    assert len(large) >= 6
+    assert len(wrong) <= 1, wrong
+
+
+@pytest.mark.slow
+def test_no_false_alarms(cases: dict[str, Case]) -> None:
+    clean = [verdict for hidden, verdict in cases.values() if hidden["kind"] == "clean"]
+    assert all(verdict["verdict"] == "no_effect" for verdict in clean)
+
+
+def test_the_judging_process_imports_nothing_of_the_generator() -> None:
+    tree = ast.parse((HERE / "verdicts.py").read_text(encoding="utf-8"))
+    names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    names |= {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
+    own = {path.stem for path in HERE.glob("*.py")}
+    assert not {str(name).split(".")[0] for name in names} & own
+    assert not any("drake_systems" in str(name) for name in names)
