@@ -204,4 +204,4 @@ def test_a_model_of_numbers_alone_stays_float():
             return q
 
     assert Feedforward(Numbers(), 2).ToAutoDiffXdMaybe() is None
-    assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToAutoDiffXdMaybe() is None
+    assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToSymbolicMaybe() is None

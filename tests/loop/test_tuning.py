@@ -20,6 +20,9 @@ def test_files_tables_and_a_better_loop(tmp_path):
     answer, tuning = tune_scenario(scenario, 2 * np.pi * 5, 60.0, None, tmp_path, silent)
     assert json.loads((tmp_path / "tune.json").read_text()) == answer
     assert {"bode.png", "step.png"} <= {path.name for path in tmp_path.iterdir()}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 2 and "peak |S|" in page and "step off linear" in page
+    assert "http" not in page.split("<main", 1)[0].replace("http-equiv", "")
     assert answer["present"]["gains"]["kp"] == [80.0] * 3
     assert answer["present"]["stable"] and answer["proposed"]["stable"]
     assert max(answer["present"]["step_deviation"] + answer["proposed"]["step_deviation"]) < 0.03

@@ -28,7 +28,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="MODEL.json",
         help="a reconstructed model to design with; by default the simulated arm's own inertia",
     )
-    p.add_argument("--out", default=None, help="folder for tune.json, bode.png and step.png")
+    p.add_argument("--out", default=None, help="folder for tune.json, report.html, bode.png and step.png")
     add_json(p)
 
 
@@ -56,4 +56,4 @@ def run(options: argparse.Namespace) -> None:
         return
     print("\n\n".join(str(table(tuning)) for table in (gains_table, margins_table, verified_table)))
     if folder is not None:
-        print(f"\nwritten: {folder}/tune.json, bode.png, step.png")
+        print(f"\nwritten: {folder}/tune.json, report.html, bode.png, step.png")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -66,13 +67,20 @@ class Limits:
         fitted = _scaled(reference, size, shift)
         if not np.isfinite(self.effort).any():
             return fitted
-        factor = 1.0
-        while factor > _SMALLEST:
-            smaller = _scaled(fitted, np.full(len(size), factor), np.zeros(len(size)))
-            if np.all(np.abs(self.torque(_motion(smaller, step))) <= self.effort):
-                return smaller
-            factor *= _SHRINK
-        return None
+        # Torques grow with the motion: the least number of steps that does is found by halving.
+        tried: dict[int, FourierReference | None] = {}
+
+        def at(steps: int) -> FourierReference | None:
+            if steps not in tried:
+                smaller = _scaled(fitted, np.full(len(size), _SHRINK**steps), np.zeros(len(size)))
+                fits = np.all(np.abs(self.torque(_motion(smaller, step))) <= self.effort)
+                tried[steps] = smaller if fits else None
+            return tried[steps]
+
+        most = int(np.log(_SMALLEST) / np.log(_SHRINK))
+        if at(0) is None and at(most) is not None:
+            return at(bisect_left(range(most), True, key=lambda steps: at(steps) is not None))
+        return at(0)
 
     def _kinematic(self, reference: FourierReference, step: float) -> tuple[Array, Array]:
         """(n,) shift of the centre and factor of the amplitude that make each joint keep its range."""

@@ -48,8 +48,8 @@ _WHY: dict[frozenset[str], str] = {
         "near one speed both are one level; a run at several speeds up to the fastest would tell them apart"
     ),
     frozenset({"encoder_offset", "gravity_tilt"}): (
-        "both turn gravity against a link; a run with fast motion at different postures, or a spirit level, would tell "
-        "them apart"
+        "both turn gravity against a link; a run with fast motion at different postures would tell them apart; for the "
+        "first joint only a spirit level does"
     ),
     frozenset({"encoder_offset", "joint_spring"}): (
         "over a small range a shifted gravity torque is a spring; a run over the whole range would tell them apart"
@@ -63,15 +63,52 @@ _WHY: dict[frozenset[str], str] = {
     frozenset({"torque_offset", "payload"}): (
         "over few postures a load is a constant; a run over all postures would tell them apart"
     ),
+    frozenset({"torque_offset", "torque_gain"}): (
+        "where the torque hardly changes, a part of it is a constant; a run at postures with different loads would tell "
+        "them apart"
+    ),
+    frozenset({"torque_offset", "encoder_offset"}): (
+        "over few postures a shifted gravity torque is a constant; a run over the whole range would tell them apart"
+    ),
+    frozenset({"torque_offset", "torque_ripple"}): (
+        "over a small part of its period a ripple is a constant; a run over several periods would tell them apart"
+    ),
+    frozenset({"joint_spring", "torque_ripple"}): (
+        "over a small part of its period a ripple is a straight line; a run over several periods would tell them apart"
+    ),
+    frozenset({"joint_spring", "torque_gain"}): (
+        "over a small range the torque changes in proportion to the angle; a run over the whole range, fast and slow, "
+        "would tell them apart"
+    ),
+    frozenset({"joint_spring", "gravity_tilt"}): (
+        "over a small range turned gravity is a spring; a run over all postures would tell them apart"
+    ),
+    frozenset({"viscous_friction", "transmission_coupling"}): (
+        "while the other joint hardly moves both are drag; a run that moves both joints, with and against each other, would "
+        "tell them apart"
+    ),
+    frozenset({"coulomb_friction", "transmission_coupling"}): (
+        "while the other joint hardly moves both are dry friction; a run that moves both joints, with and against each "
+        "other, would tell them apart"
+    ),
 }
+#: While a joint slides this is a constant: what holds of a constant torque holds of it.
+_CONSTANT = "friction_asymmetry"
 
 
 def why_alike(found: Effect, rival: Effect) -> str:
     """A sentence for the ``alternatives`` of a diagnosis."""
-    listed = _WHY.get(frozenset({found.name, rival.name}))
-    if listed and (found.joint == rival.joint or found.joint is None or rival.joint is None):
+    pair = frozenset({found.name, rival.name})
+    like_a_constant = frozenset("torque_offset" if name == _CONSTANT else name for name in pair)
+    listed = _WHY.get(pair, _WHY.get(like_a_constant))
+    if listed and _meet(found, rival):
         return listed
     return (
-        f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}; a run that moves "
-        "one joint at a time, at several speeds over its whole range, would tell them apart"
+        f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}; a run over other "
+        "postures and speeds may tell them apart: armloop diagnose --next-run designs one"
     )
+
+
+def _meet(found: Effect, rival: Effect) -> bool:
+    """Whether the sentence is about one joint, or about effects of the whole arm."""
+    return found.joint is None or rival.joint is None or found.joint == rival.joint

@@ -123,10 +123,12 @@ def left(
     return least, shape
 
 
-def context_of(evidence: Evidence, motion: Motion) -> Context:
-    """What the known model of a diagnosis says of another motion."""
-    known = evidence.context
-    return replace(evidence.model.context(motion, []), inertial=known.inertial, period=known.period)
+def context_of(evidence: Evidence, motion: Motion, effects: Sequence[Effect] | None = None) -> Context:
+    """What effects may look at on another motion; the known model is asked only where one of them needs it."""
+    known, model = evidence.context, evidence.model
+    if effects is not None and not any(effect.needs_model for effect in effects):
+        return Context(model.arm, motion, known.inertial, known.period)
+    return replace(model.context(motion, []), inertial=known.inertial, period=known.period)
 
 
 def _fitted(y: Array, columns: Sequence[Array]) -> tuple[float, Array]:

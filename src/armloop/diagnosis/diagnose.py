@@ -17,6 +17,7 @@ from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import Found, Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.diagnosis.whereabouts import whereabouts
 from armloop.effects import hypotheses
 from armloop.errors import InputError
 from armloop.log import MotionLog
@@ -56,6 +57,11 @@ class Diagnosis:
     def samples(self) -> Samples:
         """The run, conditioned."""
         return self.evidence.samples
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run, contacts apart, holds enough motion to look for anything else in it."""
+        return not _too_still(self.evidence)
 
     def errors(self) -> dict[str, Any]:
         """RMSE per joint of held-out moving samples, before and after, beside the baseline's; NaN for joints at rest."""
@@ -126,7 +132,8 @@ class Diagnosis:
             for contact in self.contacts
         ]
         if self.unlisted is not None:
-            effects.append(self.unlisted.to_dict())
+            where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
+            effects.append({**self.unlisted.to_dict(), "where": where.to_dict()})
         return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": _null(self.errors())}
 
 

@@ -32,7 +32,7 @@ from armloop.design import (
 from armloop.diagnosis.apart import Stage, context_of
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.rivals import Law, Pair, Rivalry, found_laws, pairs
+from armloop.diagnosis.rivals import Law, Rivalry, found_laws, lookalikes, pairs
 from armloop.effects import Effect
 from armloop.errors import InputError
 from armloop.excitation import FourierReference, MotionRanges
@@ -52,7 +52,7 @@ _TYPICAL, _STEP = 8, 0.05
 #: Of those, motions on which it is judged whether two effects can be told apart at all.
 _STAGES = 2
 #: How often a motion is designed anew, with what its rivals turned out to be able to.
-_ROUNDS = 3
+_ROUNDS = 2
 #: A law of whose torque all those motions together leave less than this part cannot be told from its rival.
 _NEVER = 0.03
 #: An effect of this many baselines, root mean square, is beyond doubt; what counts from there on is its shape.
@@ -157,17 +157,19 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
     if not diagnosis.outcome.found and diagnosis.unlisted is None:
         return None
     planner = _Planner.of(diagnosis, wish, progress)
-    rivals = pairs(diagnosis)
-    ways = {id(pair): planner.possible(pair) for pair in rivals}
+    laws, run = found_laws(diagnosis), Stage.of_run(diagnosis.evidence)
+    rivals = pairs(diagnosis, laws, run)
+    ways = {id(pair): planner.possible(pair.rivalries()) for pair in rivals}
     if any(ways.values()):
-        made = planner.alternatives([way for pair in rivals for way in ways[id(pair)]])
+        alike = planner.possible(lookalikes(diagnosis, laws, rivals, run))
+        made = planner.alternatives([*(way for pair in rivals for way in ways[id(pair)]), *alike])
         purpose = "alternatives"
     elif diagnosis.unlisted is not None:
         made, purpose = planner.unlisted(diagnosis.unlisted.joint), "unlisted"
     else:
-        made, purpose = planner.precision(found_laws(diagnosis)), "precision"
+        made, purpose = planner.precision(laws), "precision"
     reference = planner.whole(made)
-    run, then = Stage.of_run(diagnosis.evidence), Stage.of_reference(diagnosis.evidence, reference)
+    then = Stage.of_reference(diagnosis.evidence, reference)
     told = [
         Told(
             pair.found.effect,
@@ -178,7 +180,7 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
         for pair in rivals
     ]
     told.sort(key=lambda each: (each.then is None, each.now))
-    sharper = _sharper(run, then, found_laws(diagnosis)) if purpose == "precision" else []
+    sharper = _sharper(run, then, laws) if purpose == "precision" else []
     joint = diagnosis.unlisted.joint if purpose == "unlisted" and diagnosis.unlisted is not None else None
     use = planner.limits.use(sampled(made.reference, planner.fine_step))
     return NextRun(purpose, reference, told, sharper, joint, use)
@@ -220,13 +222,15 @@ class _Planner:
         effort = (1 - wish.reserve) * np.array([joint.effort for joint in model.arm.joints])
         limits = Limits(ranges, effort, lambda motion: model.predict(motion, sensors=False))
         check_rest(model.arm, limits)
-        drawn = random_references(limits, wish.whole_duration, _TYPICAL, wish.seed)
+        drawn = random_references(limits, PERIOD, _TYPICAL, wish.seed)
         if not drawn:
             raise InputError(
                 f"{model.arm.name}: hardly any motion keeps within the effort limits; widen them"
             )
         evidence = diagnosis.evidence
-        stages = [Stage.of_reference(evidence, each) for each in drawn[:_STAGES]]
+        # in their whole length, over which friction may drift
+        whole = [replace(each, duration=wish.whole_duration) for each in drawn[:_STAGES]]
+        stages = [Stage.of_reference(evidence, each) for each in whole]
         typical = [sampled(each, _STEP) for each in drawn]
         return _Planner(evidence, limits, typical, stages, wish, progress)
 
@@ -238,9 +242,9 @@ class _Planner:
     def fine_step(self) -> float:
         return PERIOD / (40 * _HARMONICS)
 
-    def possible(self, pair: Pair) -> list[Rivalry]:
-        """The ways of a pair in which some motion within the limits shows that the rival is not the law."""
-        return [way for way in pair.rivalries() if way.left_on_all(self.stages) > _NEVER]
+    def possible(self, ways: Sequence[Rivalry]) -> list[Rivalry]:
+        """Those of which some motion within the limits shows that the rival is not the law."""
+        return [way for way in ways if way.left_on_all(self.stages) > _NEVER]
 
     def whole(self, design: Design) -> FourierReference:
         """The motion in its full length."""
@@ -321,9 +325,10 @@ class _Planner:
 
 def _columns_of(evidence: Evidence, torques: Sequence[Law], parts: Sequence[Law]) -> Columns:
     """Columns (N, n, p) of any motion: the torques of laws, then the columns of others."""
+    effects = [law.effect for law in (*torques, *parts)]
 
     def columns(motion: Motion) -> Array:
-        context = context_of(evidence, motion)
+        context = context_of(evidence, motion, effects)
         made = [law.added.torque(context)[:, :, None] for law in torques]
         made += [part.effect.full_columns(context, part.shape) for part in parts]
         return np.concatenate(made, axis=2)

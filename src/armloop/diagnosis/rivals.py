@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from armloop.diagnosis.apart import Part, Stage, left
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.fit import Shape, fit
-from armloop.effects import Effect
+from armloop.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 
 #: Where several motions are looked at, no more values of a nonlinear parameter are tried than this.
 _FEW = 20
+#: An effect that leaves less than this part of another's torque on a run looks like it there.
+_ALIKE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +87,8 @@ def found_laws(diagnosis: Diagnosis) -> list[Law]:
     return [Law(added, found.shape.final) for found, added in pairs]
 
 
-def pairs(diagnosis: Diagnosis) -> list[Pair]:
+def pairs(diagnosis: Diagnosis, laws: Sequence[Law], run: Stage) -> list[Pair]:
     """Every effect found with each of its alternatives, as each would explain the run."""
-    run = Stage.of_run(diagnosis.evidence)
-    laws = found_laws(diagnosis)
     made = []
     for k, found in enumerate(diagnosis.outcome.found):
         others = tuple(law for i, law in enumerate(laws) if i != k)
@@ -97,6 +97,41 @@ def pairs(diagnosis: Diagnosis) -> list[Pair]:
             if law is not None:
                 made.append(Pair(laws[k], law, others))
     return made
+
+
+def lookalikes(
+    diagnosis: Diagnosis, laws: Sequence[Law], listed: Sequence[Pair], run: Stage
+) -> list[Rivalry]:
+    """Effects that are not listed as alternatives, but of whose torque the run would show as little.
+
+    A diagnosis does not list an effect whose parameters would be impossible, or which is not worth its parameters; and
+    yet it may be what is there, and a run that told only the listed ones apart would not show it.
+    """
+    known = {(id(pair.found), pair.rival.effect.place) for pair in listed}
+    taken = {law.effect.place for law in laws}
+    made = []
+    for found in laws:
+        others = tuple(law for law in laws if law is not found)
+        for rival in hypotheses(diagnosis.model.arm):
+            if (
+                rival.place in taken
+                or (id(found), rival.place) in known
+                or not _share_joints(found.effect, rival)
+            ):
+                continue
+            shape = run.best_shape(found.added, rival)
+            if shape is None:
+                continue
+            rivalry = Rivalry(found, Law(AddedEffect(rival, {}), shape), others)
+            if rivalry.left_on_all([run]) < _ALIKE:
+                made.append(rivalry)
+    return made
+
+
+def _share_joints(one: Effect, other: Effect) -> bool:
+    """Whether two effects act on a joint in common; those of the whole arm act on all."""
+    joints = [{e.joint, e.other_joint} - {None} for e in (one, other)]
+    return not all(joints) or bool(joints[0] & joints[1])
 
 
 def _as_fitted(

@@ -1,6 +1,6 @@
 """How much room a PID loop has before it rings: margins of each joint's loop about a posture.
 
-The arm at rest at q0 is linearised, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the
+The arm at rest at q0 is linearised by Drake, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the
 stiffness of gravity. Dry friction is not linear and left out: it only adds damping where the joint slides.
 The controller is discrete, so the arm is sampled with a zero-order hold. The loop of joint i is cut at its
 drive while the other joints' loops stay closed, and judged from frequency-response data up to the Nyquist
@@ -16,6 +16,7 @@ import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.primitives import Linearize
 
 from armloop.arm import Arm
 from armloop.drake_systems.friction import JointFriction
@@ -48,21 +49,20 @@ class LoopMargins:
 
 
 def posture_model(arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike) -> tuple[Array, Array, Array]:
-    """Return M, F, G (n, n) of the arm linearised at rest at q0 (n,)."""
+    """Return M, F, G (n, n) of the arm linearised at rest at q0 (n,) by Drake's `Linearize`."""
     plant = MultibodyPlant(0.0)
     add_links(plant, arm)
+    for joint, f in zip(arm.joints, friction, strict=True):
+        plant.GetJointByName(joint.name).set_default_damping(f.viscous)
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    q0 = np.asarray(q0, dtype=float)
-
-    def gravity(q: Array) -> Array:
-        plant.SetPositions(context, q)
-        return np.asarray(-plant.CalcGravityGeneralizedForces(context))
-
-    h = 1e-5
-    G = np.stack([(gravity(q0 + h * e) - gravity(q0 - h * e)) / (2 * h) for e in np.eye(arm.n)], axis=1)
-    plant.SetPositions(context, q0)
-    return np.asarray(plant.CalcMassMatrix(context)), np.diag([f.viscous for f in friction]), G
+    plant.SetPositions(context, np.asarray(q0, dtype=float))
+    torque, n = plant.get_applied_generalized_force_input_port(), arm.n
+    # at rest under the torques that hold it
+    torque.FixValue(context, -plant.CalcGravityGeneralizedForces(context))
+    linear = Linearize(plant, context, torque.get_index(), plant.get_state_output_port().get_index())
+    M = np.linalg.inv(linear.B()[n:])
+    return M, -M @ linear.A()[n:, n:], -M @ linear.A()[n:, :n]
 
 
 def model_posture(model: ReconstructedModel, q0: ArrayLike) -> tuple[Array, Array, Array]:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_, SystemScalarConverter
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator
 from pydrake.systems.scalar_conversion import TemplateSystem
 
@@ -50,8 +51,11 @@ class PidController(Diagram):
     integral is the sum of e times the period (forward Euler).
 
     Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output port: `tau` (n,), held by the discrete
-    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar types float and, with
-    ideal encoders, AutoDiffXd and Expression.
+    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar types float, AutoDiffXd
+    (in which reading an encoder has the derivative 1, as if it were ideal) and, with ideal encoders, Expression.
+
+    Not supported: a bound on the integral (the plant clamps the torque; a controller that asks for more winds up), and a
+    filter on v, which is taken as it is.
     """
 
     def __init__(self, gains: PidGains, period: float, resolution: ArrayLike = 0.0) -> None:
@@ -59,7 +63,8 @@ class PidController(Diagram):
         super().__init__()
         n = len(gains.kp)
         builder = DiagramBuilder()
-        law = builder.AddNamedSystem("law", _PidLaw(gains, resolution))
+        template = _EncodedPidLaw_ if np.any(resolution) else _PidLaw_
+        law = builder.AddNamedSystem("law", template[None](gains, resolution))
         split = builder.AddNamedSystem("split", Demultiplexer([n, n]))
         integral = builder.AddNamedSystem("integral", DiscreteTimeIntegrator(n, period))
         for name in ("q_ref", "v_ref", "tau_ff", "state"):
@@ -71,8 +76,7 @@ class PidController(Diagram):
         builder.BuildInto(self)
 
 
-@TemplateSystem.define("_PidLaw_")
-def _PidLaw_(T: type) -> Any:
+def _law(T: type) -> Any:
     """Return the class for one scalar type."""
 
     class Impl(LeafSystem_[T]):
@@ -81,8 +85,6 @@ def _PidLaw_(T: type) -> Any:
         def _construct(self, gains: PidGains, resolution: ArrayLike, *, converter: Any = None) -> None:
             n = len(gains.kp)
             counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
-            if any(counts):  # what rounds can be neither differentiated nor written out
-                converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = gains, resolution
             self._joints = list(
@@ -107,7 +109,7 @@ def _PidLaw_(T: type) -> Any:
             for (kp, ki, kd, count), q, v, q_ref, v_ref, tau_ff, integral in zip(
                 self._joints, state[: self._n], state[self._n :], *signals, strict=True
             ):
-                e = q_ref - (round(q / count) * count if count else q)
+                e = q_ref - (_read(q, count) if count else q)
                 errors.append(e)
                 tau.append(kp * e + ki * integral + kd * (v_ref - v) + tau_ff)
             output.SetFromVector(tau + errors)
@@ -115,4 +117,12 @@ def _PidLaw_(T: type) -> Any:
     return Impl
 
 
-_PidLaw = _PidLaw_[None]
+def _read(q: Any, count: float) -> Any:
+    """Return the position that an encoder says, in the scalar type of q."""
+    value = q if isinstance(q, float) else q.value()
+    rounded = round(value / count) * count
+    return rounded if isinstance(q, float) else q + (rounded - value)
+
+
+_PidLaw_ = TemplateSystem.define("_PidLaw_")(_law)
+_EncodedPidLaw_ = TemplateSystem.define("_EncodedPidLaw_", T_list=[float, AutoDiffXd])(_law)

@@ -28,7 +28,8 @@ def tune_scenario(
     folder: Path | None,
     progress: Progress,
 ) -> tuple[dict[str, Any], Tuning]:
-    """Analyse a scenario's gains, propose others, try both; write tune.json, bode.png and step.png.
+    """Analyse a scenario's gains, propose others, try both; write tune.json, report.html, bode.png
+    and step.png.
 
     Args:
         bandwidth: rad/s; margin: deg.
@@ -49,8 +50,10 @@ def tune_scenario(
     answer = tuning_answer(tuning)
     if folder is not None:
         from armloop.reports.plots.loops import bode_figure, step_figure
+        from armloop.reports.tuning_report import tuning_report
 
         write_text(folder / "tune.json", json.dumps(answer, indent=1) + "\n")
+        write_text(folder / "report.html", tuning_report(tuning))
         for name, draw in (("bode.png", bode_figure), ("step.png", step_figure)):
             with replacing(folder / name) as draft:
                 draw(tuning).savefig(draft, format="png", dpi=110, facecolor="white")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from armloop.diagnosis.remedies import remedy
+from armloop.diagnosis.whereabouts import whereabouts
 from armloop.reports.words import counted, effect_label, effect_name, listed, number, percent, unit
 
 if TYPE_CHECKING:
@@ -40,9 +41,12 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             f"Found: {len(diagnosis.contacts)} pushes at the tool, listed below; their samples are kept out of "
             "everything else."
         )
+    if diagnosis.contacts and not diagnosis.judged:
+        sentences.append("Apart from that the joints hardly move: nothing else could be looked for.")
     unlisted = diagnosis.unlisted
     if unlisted is not None:
         u = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
+        where = whereabouts(diagnosis.evidence, diagnosis.outcome.after, unlisted.joint - 1)
         law = (
             f"follows {unlisted.form}, which would leave {number(unlisted.rmse_with_form)} {u}"
             if unlisted.form
@@ -50,7 +54,8 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         )
         sentences.append(
             f"Joint {unlisted.joint} keeps a residual of {number(unlisted.rmse)} {u} (baseline "
-            f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}."
+            f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}; "
+            f"{unit(where.words())}."
         )
     return sentences or [
         "The residual is that of the baseline: the model lacks nothing that this run could show."

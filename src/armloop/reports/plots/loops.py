@@ -1,4 +1,4 @@
-"""Bode and step plots of PID loops, the scenario's gains beside the proposed ones."""
+"""Bode, sensitivity and step plots of PID loops, the scenario's gains beside the proposed ones."""
 
 from __future__ import annotations
 
@@ -20,20 +20,26 @@ def _both(tuning: Tuning) -> Iterator[tuple[str, str, TunedLoop]]:
 
 
 def bode_figure(tuning: Tuning) -> Figure:
-    """Magnitude and phase of every joint's open loop, the other joints' loops closed; lines at 1 and at -180 deg."""
+    """Magnitude and phase of every joint's open loop, the other joints' loops closed, and its sensitivity |1 / (1 + L)|.
+
+    Lines at 1, at -180 deg and at a sensitivity of 2.
+    """
     n = len(tuning.present.margins)
-    made = figure(max(5.5, 3.0 * n), 5.2)
-    grid = panels(made, 2, n, sharex=True)
+    made = figure(max(5.5, 3.0 * n), 7.4)
+    grid = panels(made, 3, n, sharex=True)
     for j in range(n):
         magnitude, phase = grid[0, j], grid[1, j]
         for label, color, loop in _both(tuning):
             L, hertz = loop.loops[:, j], loop.w / (2 * np.pi)
             magnitude.loglog(hertz, np.abs(L), color=color, linewidth=1.4, label=label)
             phase.semilogx(hertz, np.rad2deg(np.unwrap(np.angle(L))), color=color, linewidth=1.4, label=label)
+            grid[2, j].loglog(hertz, np.abs(1 / (1 + L)), color=color, linewidth=1.4, label=label)
         magnitude.axhline(1, color=MUTED, linewidth=1)
         phase.axhline(-180, color=MUTED, linewidth=1)
         polish(magnitude, "", "|L|", f"Joint {j + 1}")
-        polish(phase, "frequency [Hz]", "phase [deg]")
+        grid[2, j].axhline(2, color=MUTED, linewidth=1)
+        polish(phase, "", "phase [deg]")
+        polish(grid[2, j], "frequency [Hz]", "|S|")
     legend(made, 2)
     return made
 

@@ -1,0 +1,106 @@
+"""Where a residual sits: in which stretch of time, and under which condition of the motion most of it is found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit
+
+Array = NDArray[np.float64]
+
+#: A stretch of time or a half of the motion is named where it holds this part of the energy above the baseline …
+_MOST = 0.8
+#: … and, of time, is no longer than this part of what was judged.
+_SHORT = 0.5
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """Where most of one joint's residual is.
+
+    Attributes:
+        time: start and end, s, of the shortest stretch with most of the energy; None where it is all over the run.
+        condition: the half of the motion with most of the energy, in words with its limit; empty where no half is.
+        share: the part of the energy that is found under the condition.
+    """
+
+    time: tuple[float, float] | None
+    condition: str
+    share: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        time = None if self.time is None else list(self.time)
+        return {"time": time, "condition": self.condition, "share": self.share if self.condition else None}
+
+    def words(self) -> str:
+        """A sentence without its full stop."""
+        when = "all over the run" if self.time is None else f"from {self.time[0]:.1f} to {self.time[1]:.1f} s"
+        if not self.condition:
+            return f"it is found {when}, under no condition above all"
+        return f"it is found {when}, {100 * self.share:.0f} % of it where {self.condition}"
+
+
+def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
+    """Localise what a fit leaves on held-out rows of a joint (0-based)."""
+    mine = fit.stacked.joint == joint
+    energy = np.maximum(fit.held_out[mine] ** 2 - 1.0, 0.0)
+    rows = np.flatnonzero(evidence.rows[:, joint])
+    halves = _halves(evidence, rows, joint)
+    shares = [float(energy[chosen].sum() / max(energy.sum(), 1e-300)) for _, chosen in halves]
+    best = int(np.argmax(shares))
+    named = shares[best] >= _MOST
+    return Whereabouts(
+        _stretch(evidence.samples.motion.time[rows], fit.stacked.block[mine], energy),
+        halves[best][0] if named else "",
+        shares[best],
+    )
+
+
+def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Conditions in words, each met by half of a joint's samples (or by one direction of its motion)."""
+    motion, joints = evidence.samples.motion, evidence.model.arm.joints
+    load, of = evidence.context.load, joints[joint]
+    v = motion.v[rows]
+    found = [
+        (f"joint {joint + 1} moves in the {name} direction", sign * v[:, joint] > 0)
+        for name, sign in (("positive", 1), ("negative", -1))
+    ]
+    sizes = [
+        (f"joint {k + 1} moves", "faster", "slower", np.abs(v[:, k]), f"{each.position_unit}/s")
+        for k, each in enumerate(joints)
+    ]
+    turn = np.abs(motion.vdot[rows, joint])
+    sizes.append((f"joint {joint + 1} accelerates", "by more", "by less", turn, f"{of.position_unit}/s^2"))
+    sizes.append((f"joint {joint + 1} stands", "above", "below", motion.q[rows, joint], of.position_unit))
+    if load is not None:
+        carried = np.abs(load[rows, joint])
+        sizes.append((f"joint {joint + 1} carries", "more", "less", carried, of.torque_unit))
+    for what, more, less, size, unit in sizes:
+        limit = float(np.median(size))
+        than = "" if more == "above" else " than"
+        found += [
+            (f"{what} {more}{than} {limit:.3g} {unit}", size > limit),
+            (f"{what} {less}{than} {limit:.3g} {unit}", size < limit),
+        ]
+    return found
+
+
+def _stretch(time: Array, block: NDArray[np.intp], energy: Array) -> tuple[float, float] | None:
+    """The shortest stretch of whole blocks that holds most of the energy, if it is short."""
+    names, index = np.unique(block, return_inverse=True)
+    sums = np.concatenate([[0.0], np.cumsum(np.bincount(index, weights=energy))])
+    needed = _MOST * sums[-1]
+    ends = np.searchsorted(sums, sums[:-1] + needed)
+    lengths = np.where(ends < len(sums), ends - np.arange(len(names)), len(names))
+    first = int(np.argmin(lengths))
+    if lengths[first] > _SHORT * len(names):
+        return None
+    inside = (index >= first) & (index < first + lengths[first])
+    start, end = float(time[inside][0]), float(time[inside][-1])
+    return (start, end) if end > start else None

@@ -1,0 +1,58 @@
+"""A residual is found in its stretch of time, or under its condition, and nowhere else."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, measured, rigid_torque, three_axis
+
+from armloop.components import RigidBody
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import fit
+from armloop.diagnosis.whereabouts import Whereabouts, whereabouts
+from armloop.kinematics import nominal_parameters
+from armloop.library.friction import FrictionLaw
+from armloop.model import ReconstructedModel
+from armloop.motion import Motion
+from armloop.signals import condition
+
+
+def found(law: Callable[[Motion], np.ndarray], seed: int) -> Whereabouts:
+    """Where what a law adds at joint 2 sits in a run of 60 s."""
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    model = ReconstructedModel(three_axis(), (body,), FrictionLaw(((),) * 3), baseline={"rmse": [0.01] * 3})
+    motion = fourier_motion(60.0, 100.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau[:, 1] += law(motion)
+    samples = condition([measured(motion, tau, seed, noise=0.001)], model.conditioning)
+    evidence = Evidence.of(model, samples, [])
+    return whereabouts(evidence, fit(evidence, evidence.residual([]), [], []), 1)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_residual_is_localised(seed: int) -> None:
+    late = found(lambda m: np.where(m.time > 42.0, np.sin(5 * m.time), 0.0), seed)
+    assert late.time is not None
+    assert 41.0 < late.time[0] < 47.0 < 54.0 < late.time[1] <= 60.0
+    forward = found(lambda m: np.where(m.v[:, 1] > 0, 0.5, 0.0), seed)
+    assert forward.time is None
+    assert forward.condition == "joint 2 moves in the positive direction" and forward.share > 0.9
+    beside = found(lambda m: 0.3 * m.v[:, 2] ** 3, seed)
+    assert beside.condition.startswith("joint 3 moves faster than ")
+    assert beside.condition.endswith(" rad/s")
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_is_everywhere_is_said_to_be_everywhere(seed: int) -> None:
+    everywhere = found(lambda m: 0.5 * np.sin(7 * m.time), seed)
+    assert everywhere.time is None and everywhere.condition == ""
+    assert everywhere.words() == "it is found all over the run, under no condition above all"
+    assert everywhere.to_dict() == {"time": None, "condition": "", "share": None}
+
+
+def test_the_words_name_both() -> None:
+    where = Whereabouts((3.0, 9.5), "joint 2 carries more than 5 N*m", 0.93)
+    words = "it is found from 3.0 to 9.5 s, 93 % of it where joint 2 carries more than 5 N*m"
+    assert where.words() == words
+    assert replace(where, time=None).words().startswith("it is found all over the run, 93 % of it")
