@@ -200,6 +200,14 @@ def test_a_shared_motor_is_found_at_its_two_joints(model: ReconstructedModel) ->
     check_parameters(effect["parameters"], COUPLING)
 
 
+def test_a_reading_with_its_sign_turned_is_a_fault_of_the_sensor(model: ReconstructedModel) -> None:
+    log = run(None, seed=7)
+    (effect,) = diagnose(model, [replace(log, tau=log.tau * [1, -1, 1])]).to_dict()["effects"]
+    assert (effect["effect"], effect["joint"]) == ("torque_gain", 2)
+    assert effect["parameters"]["gain"]["value"] == pytest.approx(-1, abs=0.02)
+    assert "its sign is turned" in effect["words"]
+
+
 def test_what_no_motion_tells_apart_is_an_alternative(model: ReconstructedModel) -> None:
     law = CASES["torque_offset", 3][0]  # or a joint that rubs harder one way
     (effect,) = diagnose(model, [run(law, seed=7)]).to_dict()["effects"]

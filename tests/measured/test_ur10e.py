@@ -99,3 +99,14 @@ def test_the_model_is_refused_for_another_arm(
 ) -> None:
     assert main(["evaluate", str(model), str(ur10e / LEFT_OUT), "--arm", "three_axis"]) == 2
     assert "made for ur10e with 6 joints, not for three_axis with 3" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["jointwise_joint_1.csv", "jointwise_joint_3.csv"])
+def test_joints_that_are_only_shaken_by_another_show_no_effect(
+    model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """One joint moves; the others move less than a milliradian, within their friction."""
+    found = answer(capsys, ["diagnose", str(model), str(ur10e / name), "--out", str(tmp_path)])
+    assert (found["verdict"], found["effects"]) == ("no_effect", [])
+    moving = [joint for joint, error in enumerate(found["error"]["before"], start=1) if error is not None]
+    assert moving == [int(name[-5])]

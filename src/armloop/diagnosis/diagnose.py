@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
-from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.reversals import AtReversals, judge_reversals
+from armloop.diagnosis.search import Found, Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.effects import hypotheses
@@ -44,7 +45,8 @@ class Diagnosis:
         model: the model with the effects found.
         unlisted: the law of a residual that no listed effect explains, if there is such a residual.
         contacts: events of the run, found before the search and kept out of it.
-        evidence: the run as it was judged.
+        evidence: the run as it was judged; reversals are among its rows only if something was found there.
+        reversals: what was found at reversals, if anything.
     """
 
     verdict: str
@@ -53,6 +55,7 @@ class Diagnosis:
     unlisted: Unlisted | None
     evidence: Evidence
     contacts: list[Contact]
+    reversals: AtReversals | None = None
 
     @property
     def samples(self) -> Samples:
@@ -79,7 +82,17 @@ class Diagnosis:
             "after": after.tolist(),
             "noise_floor": scale.tolist(),
             "nrmse": {"before": _ratio(before, tau).tolist(), "after": _ratio(after, tau).tolist()},
+            **self._at_reversals(),
         }
+
+    def _at_reversals(self) -> dict[str, Any]:
+        turned = self.reversals
+        if turned is None:
+            return {}
+        return {"reversals": {"before": turned.before.tolist(), "after": turned.after.tolist()}}
+
+    def _only_at_reversals(self, found: Found) -> bool:
+        return self.reversals is not None and found in self.reversals.found
 
     def _torque(self) -> Array:
         stacked = self.outcome.before.stacked
@@ -95,6 +108,7 @@ class Diagnosis:
                 {
                     **added.to_dict(),
                     "share": found.share,
+                    **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
                     **({"remedy": remedy(added)} if added.effect.sensor else {}),
@@ -204,10 +218,16 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
         contacts, evidence = again, without(whole, again)
         outcome = search(evidence, progress)
     unlisted, outcome = find_law(evidence, outcome, progress)
+    kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
+    if unlisted is not None:
+        kept[:, unlisted.joint - 1] = False
+    turned = judge_reversals(evidence, outcome, kept, progress)
+    if turned is not None:
+        outcome, evidence = turned.outcome, turned.evidence
     found = bool(outcome.found or contacts)
     verdict = "effects_found" if found else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]
-    return Diagnosis(verdict, outcome, model.with_effects(added), unlisted, evidence, contacts)
+    return Diagnosis(verdict, outcome, model.with_effects(added), unlisted, evidence, contacts, turned)
 
 
 def _too_still(evidence: Evidence) -> str:
@@ -218,9 +238,9 @@ def _too_still(evidence: Evidence) -> str:
     moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
     still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 20]
     blocks = len(np.unique(evidence.blocks))
-    if len(still) < evidence.rows.shape[1] and blocks >= 8:
+    if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
     return (
-        f"too little motion to judge ({blocks} blocks of 1.5 s, joints at rest: {still}); log at least 12 s in which "
-        "the joints move"
+        f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
+        f"{FEWEST_BLOCKS + 1} s in which the joints move"
     )

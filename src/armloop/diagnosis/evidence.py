@@ -16,15 +16,19 @@ from numpy.typing import NDArray
 from armloop.blocks import block_numbers
 from armloop.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Samples
+from armloop.motion import Motion, Samples
 from armloop.regression.moments import Moments
 from armloop.signals import independent_rows, smooth
 
 Array = NDArray[np.float64]
 
-#: Length of a block, s, and number of folds: residuals stay correlated for a good second.
-BLOCK_SECONDS = 1.5
+#: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
+BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
+#: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
+_TRAVEL = 2e-3
+#: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
+FEWEST_BLOCKS = 8
 
 _Columns = dict[tuple[tuple[str, int | None, int | None], float], Array]
 
@@ -64,12 +68,12 @@ class Evidence:
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
-        blocks = block_numbers(samples.motion, BLOCK_SECONDS)
+        blocks = block_numbers(samples.motion, _block_seconds(samples.motion))
         context = model.context(samples.motion, effects)
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
-        rows = samples.moving & independent_rows(samples)[:, None]
+        rows = _sliding(samples, model) & independent_rows(samples)[:, None]
         return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
@@ -128,6 +132,32 @@ class Evidence:
             joints,
             residual.shape[1],
         )
+
+
+def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+    """(N, n) moving samples of stretches in which a joint gets anywhere.
+
+    Other joints shake a joint at rest: it moves, but within its friction, and its torque is not determined by that.
+    """
+    motion, sliding = samples.motion, samples.moving.copy()
+    ranges = model.history.get("range")
+    least = _TRAVEL * np.asarray(ranges[0]) if ranges else np.full(motion.joints, _TRAVEL)
+    for run in motion.runs():
+        for j in range(motion.joints):
+            edges = (
+                np.flatnonzero(np.diff(samples.moving[run, j].astype(np.int8), prepend=0, append=0))
+                + run.start
+            )
+            for first, end in edges.reshape(-1, 2).tolist():
+                if np.ptp(motion.q[first:end, j]) < least[j]:
+                    sliding[first:end, j] = False
+    return sliding
+
+
+def _block_seconds(motion: Motion) -> float:
+    """Length of a block that leaves enough of them in all runs together, within the bounds."""
+    seconds = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
+    return float(np.clip(seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
 
 
 @dataclass(frozen=True, eq=False)

@@ -201,7 +201,7 @@ def _block_covariance(stacked: Stacked, beta: Array, J: Array) -> Array:
     G = X.T @ X
     scores = X * (stacked.y - stacked.X @ beta)[:, None]
     _, index = np.unique(stacked.block, return_inverse=True)
-    sums = np.zeros((index.max() + 1, X.shape[1]))
+    sums = np.zeros((index.max(initial=-1) + 1, X.shape[1]))
     np.add.at(sums, index, scores)
     scale = _scale(G)
     bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))

@@ -32,11 +32,13 @@ class TorqueGain(LinearJointEffect):
         return {"gain": Estimate(1 + number(found.value), found.std_error, "1")}
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        return number(parameters["gain"].value) > 0
+        # A turned sign is a fault like any other; a reading that is all but lost is none of a gain.
+        return abs(number(parameters["gain"].value)) > 0.01
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         e = parameters["gain"]
+        turned = ", its sign is turned" if number(e.value) < 0 else ""
         return (
             f"the torque reading of joint {self.joint} is {number(e.value):.4g} ± {number(e.std_error):.2g} times the "
-            "true torque: the sensor, not the arm"
+            f"true torque{turned}: the sensor, not the arm"
         )

@@ -1,0 +1,252 @@
+"""Reversals: what a joint does while it turns around, judged by itself.
+
+The torque of a joint at rest is not determined by its motion, so standstill is kept out of training, baseline and
+search, with as much around it as the filter smears. A joint that turns around is not at rest, but it passes zero
+speed, and so its reversals are kept out, too. There alone does friction with memory differ from a step of the
+direction: among samples that slide it can hardly be seen, and no model's baseline says anything of it.
+
+So they are judged after the search, as a condition of their own. As there is no baseline to compare with, what is
+named must be plain: it at least halves the joint's error there, on blocks that were not fitted, and what it removes is
+a noticeable torque. The drives of an arm are alike: what is plain at one joint needs less at the others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.stats import t
+
+from armloop.arm import Arm
+from armloop.blocks import block_sums
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Fit, Shape
+from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.trials import Known
+from armloop.effects import Effect, hypotheses
+from armloop.motion import Motion
+from armloop.progress import Progress
+from armloop.signals import independent_rows
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
+#: found at another joint, this part …
+PLAIN, LIKELY = 0.75, 0.5
+#: … which must be at least this part of the joint's torque, both root mean square …
+NOTICEABLE = 0.03
+#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors):
+#: in ratios, so that no fast reversal outweighs the others; by Student's t, for they may be few.
+_CHANCE = 0.00135
+#: A simpler effect that leaves no more of the squared error than this part of it is as good.
+ALIKE = 0.1
+#: Effects that explain this much of what the chosen one explains are its alternatives.
+RIVAL_SHARE = 0.94
+#: A joint that has turned around within so many seconds did not rest; so long before and after belongs to it.
+TURN, AROUND = 0.4, 0.1
+#: Fewest blocks with a reversal of a joint that tell anything of it.
+_FEWEST = 4
+
+
+@dataclass(frozen=True, eq=False)
+class AtReversals:
+    """What was found at reversals.
+
+    Attributes:
+        found: effects, in the order in which they were found; ``share`` is the part of the squared error at the
+            reversals of the joint that gains most.
+        outcome: all effects, fitted together; reversals are among its rows.
+        evidence: the run with reversals among the rows.
+        before, after: (n,) held-out RMS error at reversals without these effects and with them, N·m (N); NaN for
+            joints without reversals.
+    """
+
+    found: list[Found]
+    outcome: Outcome
+    evidence: Evidence
+    before: Array
+    after: Array
+
+
+def turning(motion: Motion, moving: Mask) -> Mask:
+    """(N, n) samples that do not count as moving although the joint only turns around, within :data:`TURN`."""
+    found = np.zeros_like(moving)
+    for run in motion.runs():
+        for j in range(motion.joints):
+            edges = np.flatnonzero(np.diff(moving[run, j].astype(np.int8))) + run.start
+            for last, end in pairwise(edges.tolist()):
+                back = motion.v[last, j] * motion.v[end + 1, j] < 0
+                if moving[last, j] and back and motion.time[end + 1] - motion.time[last] <= TURN:
+                    found[last + 1 : end + 1, j] = True
+    return found
+
+
+def judge_reversals(
+    evidence: Evidence, outcome: Outcome, kept: Mask, progress: Progress
+) -> AtReversals | None:
+    """Search for what the effects found so far leave at reversals; None if nothing plain is there.
+
+    Args:
+        evidence: the run as the search has seen it.
+        outcome: what the search has found.
+        kept: (N, n) samples that may count: not those of contacts, nor of joints that nothing may be named on.
+    """
+    samples = evidence.samples
+    turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
+    own = evidence.only(evidence.rows | turns)
+    reach = round(AROUND / samples.period)
+    judged = binary_dilation(turns, np.ones((2 * reach + 1, 1))) & own.rows & kept
+    start = known = Known.of(own, outcome.after.effects, outcome.after.shapes)
+    view = _View.of(own, start.fit, judged)
+    found: list[Found] = []
+    gains = _Gains({}, {}, set())
+    changed = set(view.suspects(start.fit))
+    while changed and len(found) < 2 * samples.motion.joints:
+        for effect in _concerned(evidence.model.arm, changed, known.fit):
+            gains.take(effect, view.gains(known.fit, known.trial(effect)))
+        best = gains.best()
+        if best is None:
+            break
+        trial = known.trial(best.effect)
+        assert trial is not None
+        found.append(replace(best, shape=trial.shapes[-1]))
+        progress(f"found {best.effect.label()}: removes {best.share:.0%} of the error at its reversals")
+        changed = _joints(best.effect) or set(view.suspects(known.fit))
+        known = replace(known, fit=trial)
+        gains.forget(best.effect, changed)
+    if not found:
+        return None
+    after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
+    whole = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
+    before, left = (np.sqrt(view.mean_squares(k.fit)) * own.scale for k in (start, after))
+    return AtReversals(found, whole, own, before, left)
+
+
+def _joints(effect: Effect) -> set[int]:
+    """Joints (0-based) that an effect sits in; none if it concerns all."""
+    return {j - 1 for j in (effect.joint, effect.other_joint) if j is not None}
+
+
+def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
+    """Effects that act on some joints and were not found yet: those of all joints are."""
+    taken = {effect.place for effect in current.effects}
+    return [e for e in hypotheses(arm) if e.place not in taken and (not _joints(e) or _joints(e) & joints)]
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The rows at reversals of stacked rows (R,), and the least mean square per joint (n,) that is noticeable."""
+
+    rows: Mask
+    joint: NDArray[np.intp]
+    block: NDArray[np.intp]
+    noticeable: Array
+
+    @staticmethod
+    def of(evidence: Evidence, fit: Fit, judged: Mask) -> _View:
+        samples, rows = evidence.samples, evidence.rows
+        torque = np.sqrt(np.sum(samples.tau**2, axis=0, where=rows) / np.maximum(rows.sum(axis=0), 1))
+        noticeable = (NOTICEABLE * torque / evidence.scale) ** 2
+        return _View(judged[rows], fit.stacked.joint, fit.stacked.block, noticeable)
+
+    def mean_squares(self, fit: Fit) -> Array:
+        """(n,) mean held-out squared error at reversals, weighted; NaN where there is none."""
+        n = fit.stacked.joints
+        joint = self.joint[self.rows]
+        counts = np.bincount(joint, minlength=n)
+        sums = np.bincount(joint, weights=fit.held_out[self.rows] ** 2, minlength=n)
+        return np.divide(sums, counts, out=np.full(n, np.nan), where=counts > 0)
+
+    def suspects(self, current: Fit) -> list[int]:
+        """Joints (0-based) with enough reversals and an error there that an effect could noticeably lower."""
+        errors = np.nan_to_num(self.mean_squares(current))
+        return [
+            j
+            for j in np.flatnonzero(errors > self.noticeable).tolist()
+            if len(np.unique(self.block[self.rows & (self.joint == j)])) >= _FEWEST
+        ]
+
+    def gains(self, current: Fit, trial: Fit | None) -> dict[int, _Gain]:
+        """Per suspect joint what a trial gains at its reversals; nothing if the run as a whole does not gain."""
+        if trial is None or (trial.held_out**2).sum() >= (current.held_out**2).sum():
+            return {}
+        return {j: self._gain(current, trial, j) for j in self.suspects(current)}
+
+    def _gain(self, current: Fit, trial: Fit, j: int) -> _Gain:
+        mine = self.rows & (self.joint == j)
+        before, after = current.held_out[mine] ** 2, trial.held_out[mine] ** 2
+        gain = float(before.sum() - after.sum())
+        sums = [np.maximum(block_sums(x, self.block[mine]), 1e-300) for x in (before, after)]
+        noticed = gain >= self.noticeable[j] * mine.sum()
+        return _Gain(gain / float(before.sum()) if noticed else 0.0, np.log(sums[0] / sums[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Gain:
+    """Part of a joint's squared error at reversals that is removed, zero if hardly anything; log ratio per block."""
+
+    share: float
+    ratios: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Gains:
+    """What every effect gains at the suspects, what each kind gains at its own joints, and the kinds found."""
+
+    by_effect: dict[Effect, dict[int, _Gain]]
+    by_kind: dict[str, dict[int, _Gain]]
+    found: set[str]
+
+    def take(self, effect: Effect, gains: dict[int, _Gain]) -> None:
+        """Note what an effect gains."""
+        self.by_effect[effect] = gains
+        if effect.joint is not None and not effect.pair_wise and effect.joint - 1 in gains:
+            self.by_kind.setdefault(effect.name, {})[effect.joint - 1] = gains[effect.joint - 1]
+
+    def forget(self, found: Effect, joints: set[int]) -> None:
+        """Drop the effect that was found, and what depends on joints (0-based) where something was found."""
+        self.found.add(found.name)
+        for effect in list(self.by_effect):
+            if effect.place == found.place or not _joints(effect) or _joints(effect) & joints:
+                del self.by_effect[effect]
+
+    def _sure(self, effect: Effect, j: int) -> bool:
+        """Whether it is no chance: at this joint alone, or at all suspects if each has an effect of this kind.
+
+        Drives of an arm are alike; few reversals of one joint tell little.
+        """
+        alone = self.by_effect[effect][j].ratios
+        alike = [gain.ratios for gain in self.by_kind.get(effect.name, {}).values()]
+        return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
+
+    def _least(self, effect: Effect) -> float:
+        return LIKELY if effect.name in self.found else PLAIN
+
+    def best(self) -> Found | None:
+        """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""
+        shares = {
+            effect: {
+                j: g.share for j, g in own.items() if g.share >= self._least(effect) and self._sure(effect, j)
+            }
+            for effect, own in self.by_effect.items()
+        }
+        most = [(share, j) for own in shares.values() for j, share in own.items()]
+        if not most:
+            return None
+        largest, joint = max(most)
+        there = {effect: own[joint] for effect, own in shares.items() if joint in own}
+        equals = [effect for effect, share in there.items() if share >= largest - ALIKE]
+        best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
+        enough = RIVAL_SHARE * there[best]
+        rivals = [(e, share) for e, share in there.items() if e is not best and share >= enough]
+        return Found(best, Shape.fixed(0.0), there[best], rivals)
+
+
+def _positive(ratios: Array) -> bool:
+    """Whether the mean of few values is positive by more than chance."""
+    error = float(ratios.std(ddof=1)) / np.sqrt(len(ratios))
+    return bool(ratios.mean() > t.isf(_CHANCE, len(ratios) - 1) * error)
