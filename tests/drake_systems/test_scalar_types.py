@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from exact_parts import energies, model_of, random_motion, rigid_body, scara_terms
 from numpy.testing import assert_allclose
 from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.symbolic import Expression, Variable
 from pydrake.systems.framework import DiagramBuilder
 
@@ -26,6 +30,7 @@ from armloop.drake_systems import (
     Stop,
     model_equations,
 )
+from armloop.drake_systems.plant import add_links
 from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import EFFECTS, Context
 from armloop.errors import ModelError
@@ -46,7 +51,10 @@ PARAMETERS = {
     "presliding_hysteresis": {"level": 0.2, "width": 0.01},
     "rotor_inertia": {"inertia": 0.05},
     "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
+    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.0, "ratio": -1.0},
+    "external_contact": {"start": 0.0, "end": 2.0, "force": [3.0, -2.0, 5.0]},
 }
+WHOLE = ("payload", "gravity_tilt", "external_contact")
 LOADED = tuple(
     (name, None if name in ("payload", "gravity_tilt") else 2, PARAMETERS[name])
     for name in ("payload", "coulomb_friction", "joint_spring", "rotor_inertia", "gravity_tilt")
@@ -61,9 +69,12 @@ ELEMENTS = [Stop(1, 0.5, 0.01), Stop(1, 0.2, 0.3), Stop(3, 0.4, 0.05)]
 
 
 def effect_torque(name):
-    joint = None if name in ("payload", "gravity_tilt") else 2
+    joint = None if name in WHOLE else 2
+    other = 3 if name == "transmission_coupling" else None
     inertial = model_of(ARM).inertial_parameters() if name == "gravity_tilt" else None
-    return EffectTorque(ARM, name, joint, PARAMETERS[name], inertial=inertial, smoothing=0.2)
+    return EffectTorque(
+        ARM, name, joint, PARAMETERS[name], other_joint=other, inertial=inertial, smoothing=0.2
+    )
 
 
 SYSTEMS = {
@@ -159,8 +170,7 @@ def test_a_diagram_with_it_can_be_cloned(name):
 
 def test_every_effect_but_the_sensors_has_a_system():
     acting = {name for name, kind in EFFECTS.items() if not kind.sensor}
-    # an event in time, and a pair of joints: laws of another form
-    assert acting - {"external_contact", "transmission_coupling"} <= set(PARAMETERS)
+    assert acting <= set(PARAMETERS)
     with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
 
@@ -170,7 +180,14 @@ def test_every_effect_but_the_sensors_has_a_system():
     "name",
     sorted(
         set(PARAMETERS)
-        & set(EFFECTS) - {"load_dependent_friction", "presliding_hysteresis", "friction_drift"}
+        & set(EFFECTS)
+        - {
+            "load_dependent_friction",
+            "presliding_hysteresis",
+            "friction_drift",
+            "external_contact",
+            "transmission_coupling",
+        }
     ),
 )
 def test_an_effect_says_what_its_columns_say(name):
@@ -186,6 +203,42 @@ def test_an_effect_says_what_its_columns_say(name):
         if law.friction is not None:
             tau[law.joint] += law.friction(v[law.joint], np.sign(v[law.joint]), 0.0, motion.time[k])
         assert_allclose(tau, expected[k], atol=1e-12)
+
+
+def test_a_contact_pushes_like_the_plants_own_while_it_lasts():
+    """-J^T F, by the plant that Drake itself pushes at the tool."""
+    plant = MultibodyPlant(0.0)
+    add_links(plant, ARM)
+    plant.Finalize()
+    context, q = plant.CreateDefaultContext(), np.array([0.3, -0.5, 0.8])
+    plant.SetPositions(context, q)
+    world, last = plant.world_frame(), plant.GetFrameByName("link_3")
+    J = plant.CalcJacobianTranslationalVelocity(
+        context, JacobianWrtVariable.kV, last, ARM.X_tool[:3, 3], world, world
+    )
+    system = EffectTorque(
+        ARM, "external_contact", None, {"start": 1.0, "end": 2.0, "force": [3.0, -2.0, 5.0]}
+    )
+    own = system.CreateDefaultContext()
+    system.GetInputPort("state").FixValue(own, np.r_[q, 0.1, 0.2, 0.3])
+    for time, factor in ((0.5, 0.0), (1.0, 1.0), (1.9, 1.0), (2.0, 0.0)):
+        own.SetTime(time)
+        expected = factor * J.T @ [3.0, -2.0, 5.0]
+        assert_allclose(system.GetOutputPort("force").Eval(own), expected, atol=1e-12)
+
+
+def test_a_shared_motor_says_what_its_columns_say():
+    p = PARAMETERS["transmission_coupling"] | {"coulomb": 0.3}
+    system = EffectTorque(ARM, "transmission_coupling", 2, p, other_joint=3)
+    motion = random_motion(3, 4, seed=9)
+    # fast enough for the smoothed sign of the motor's speed to be one
+    motion = dataclasses.replace(motion, v=50 * motion.v)
+    expected = EFFECTS["transmission_coupling"](2, 3).torque(Context(ARM, motion), p)
+    own = system.CreateDefaultContext()
+    for k in range(motion.samples):
+        system.GetInputPort("state").FixValue(own, np.r_[motion.q[k], motion.v[k]])
+        system.GetInputPort("vdot").FixValue(own, motion.vdot[k])
+        assert_allclose(system.GetOutputPort("tau").Eval(own), expected[k], atol=1e-9)
 
 
 def test_the_mass_matrix_as_formulas():

@@ -9,6 +9,7 @@ import pytest
 from armloop.drake_systems.scenarios import load_tracking
 from armloop.loop import tune_scenario
 from armloop.progress import silent
+from armloop.reports.plots.loops import bode_figure
 from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
 
 
@@ -29,5 +30,14 @@ def test_files_tables_and_a_better_loop(tmp_path):
     # stiffer gains follow better without a model
     assert np.mean(answer["proposed"]["eta_deg"]["pid"]) < np.mean(answer["present"]["eta_deg"]["pid"])
     assert min(m["phase_margin"] for m in answer["proposed"]["loop"]) == pytest.approx(60, abs=5)
+    # a phase margin is what is left to -180 deg
+    bode = bode_figure(tuning)
+    for j, margin in enumerate(tuning.present.margins):
+        phase = bode.axes[3 + j].lines[0].get_ydata()
+        gain = np.abs(tuning.present.loops[:, j])
+        last = np.flatnonzero(gain > 1)[-1]
+        assert np.interp(0, [-1, 1], phase[[last, last + 1]]) == pytest.approx(
+            margin.phase_margin - 180, abs=3
+        )
     for table in (gains_table, margins_table, verified_table):
         assert len(table(tuning).rows) == 6

@@ -12,10 +12,11 @@ from pydrake.systems.primitives import Adder
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.arm import Arm
-from armloop.drake_systems.scalars import functions_of, vector
-from armloop.dynamics import effect_law
+from armloop.drake_systems.scalars import functions_of, vector, within
+from armloop.dynamics import EffectLaw, contact_equations, effect_law
 from armloop.dynamics.own_effects import OwnEffectEquations
 from armloop.effects import Value
+from armloop.effects.base import number
 
 
 @TemplateSystem.define("EffectTorque_")
@@ -28,18 +29,18 @@ def EffectTorque_(T: type) -> Any:
         tau = law(q, v, vdot), what the drive must supply because of it (see `armloop.effects`);
         force = -tau, what it does to the arm.
 
-        Input ports: `state` (2n,) positions, then velocities; `vdot` (n,), only for `payload` and `rotor_inertia`,
-        whose torque depends on it. Output ports: `tau` (n,), to add to a feedforward; `force` (n,), to add to a
-        plant's applied generalized forces (`add_joint_forces`). N*m (N). Stateless; time enters
-        where the law knows it. Scalar types float, AutoDiffXd and Expression.
+        Input ports: `state` (2n,) positions, then velocities; `vdot` (n,), only for `payload`, `rotor_inertia` and
+        `transmission_coupling`, whose torque depends on it. Output ports: `tau` (n,), to add to a feedforward; `force`
+        (n,), to add to a plant's applied generalized forces (`add_joint_forces`). N*m (N). Stateless; time enters where
+        the law knows it. Scalar types float, AutoDiffXd and Expression.
 
         The sign of dry friction is smoothed as tanh(v / `smoothing`). Friction that grows with the load takes the load
         from the input port `load` (n,), declared for it alone.
 
         An inertia cannot be added to a plant by a force, for its acceleration would depend on itself: on a plant,
         connect `vdot` to the reference's, to a delayed measurement, or build the plant with the effect
-        (`ArmPlant`, `ForwardDynamics` of an augmented model). Not supported: the sensors' effects, and events in time
-        such as `external_contact`; `presliding_hysteresis` acts as if fully slid, `PreslidingFriction` remembers.
+        (`ArmPlant`, `ForwardDynamics` of an augmented model). Not supported: the sensors' effects, which are in
+        the record and not in the arm; `presliding_hysteresis` acts as if fully slid, `PreslidingFriction` remembers.
         """
 
         def _construct(
@@ -49,11 +50,12 @@ def EffectTorque_(T: type) -> Any:
             joint: int | None,
             parameters: Mapping[str, Value],
             *,
+            other_joint: int | None = None,
             inertial: Any = None,
             smoothing: float = 0.01,
             converter: Any = None,
         ) -> None:
-            """arm : of n joints; name, joint (from 1), parameters : as in `diagnosis.json`, SI units;
+            """arm : of n joints; name, joint, other_joint (from 1), parameters : as in `diagnosis.json`, SI units;
             inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.inertial_parameters()`).
 
             Raises `ModelError` for an effect without such a law.
@@ -62,8 +64,13 @@ def EffectTorque_(T: type) -> Any:
                 raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = arm, name, joint, dict(parameters)
-            self._options = {"inertial": inertial, "smoothing": smoothing}
-            self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial)
+            self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
+            self._interval: tuple[float, float] | None = None
+            if name == "external_contact":
+                self._law = EffectLaw(contact_equations(arm, parameters["force"], functions_of(T)))
+                self._interval = number(parameters["start"]), number(parameters["end"])
+            else:
+                self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
             n = self._n = arm.n
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             equations = self._law.equations
@@ -95,6 +102,8 @@ def EffectTorque_(T: type) -> Any:
                 sign = functions_of(T).tanh(v[j] / self._options["smoothing"])
                 load = 0.0 if self._load is None else self._load.Eval(context).tolist()[j]
                 tau[j] = tau[j] + law.friction(v[j], sign, load, context.get_time())
+            if self._interval is not None:
+                factor = factor * within(T, context.get_time(), *self._interval)
             output.SetFromVector(vector(T, [factor * x for x in tau]))
 
     return Impl

@@ -25,6 +25,13 @@ def functions_of(T: type) -> Functions:
     return _FUNCTIONS[T]
 
 
+def within(T: type, time: Any, start: float, end: float) -> Any:
+    """Return 1 from start to end, both in s and end left out, else 0, as a plain number or an Expression."""
+    if T is Expression:
+        return if_then_else(time >= start, if_then_else(time < end, 1.0, 0.0), 0.0)
+    return float(start <= time < end)
+
+
 def vector(T: type, values: Sequence[Any]) -> np.ndarray:
     """Return (n,) values of one type, plain numbers among them converted."""
     if T is float:

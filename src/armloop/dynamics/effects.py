@@ -155,6 +155,17 @@ def effect_law(
     )
 
 
+def contact_equations(arm: Arm, force: Value, functions: Functions) -> Equations:
+    """What the drives must supply against a force (3,) N in the base frame, pushing at the tool's origin: -J^T force.
+
+    It is the weight of a unit mass there whose gravity is the force.
+    """
+    links = np.concatenate(
+        [np.zeros(10 * (arm.n - 1)), link_parameters(arm, {"mass": 1.0, "com": [0.0, 0.0, 0.0]})]
+    )
+    return _PoseEquations(BodyEquations(arm, links, functions, np.asarray(force, dtype=float)))
+
+
 _FRICTION: dict[str, Callable[[dict[str, float], Functions, Any, Any, Any, Any], Any]] = {
     "viscous_friction": lambda p, f, v, sign, load, t: p["coefficient"] * v,
     "coulomb_friction": lambda p, f, v, sign, load, t: p["level"] * sign,

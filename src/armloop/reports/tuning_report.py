@@ -32,8 +32,8 @@ def tuning_report(tuning: Tuning) -> str:
         "Loops",
         [
             "The arm was linearised by Drake at rest where the reference begins, and sampled with the controller's period. "
-            "The loop of each joint is judged from frequency responses with the other joints' loops closed; the columns named "
-            "worst are the least margin and the highest peak in ten postures along the reference.",
+            "The loop of each joint is judged from frequency responses with the other joints' loops closed; the columns "
+            "named worst are the least margin and the highest peak in ten postures along the reference.",
             f"The proposed gains give each joint, the others held still, {number(wanted)} Hz of bandwidth and at least "
             f"{number(tuning.margin)} deg of phase margin. What the joints do to each other shows in the table.",
         ],
@@ -48,8 +48,9 @@ def tuning_report(tuning: Tuning) -> str:
     verified = Section(
         "On the simulated arm",
         [
-            "How far the simulated arm without dry friction is from the linear loop in a small step, as a part of it, and "
-            "the mean tracking error on the scenario's reference by PID alone and with the arm's exact model as feedforward.",
+            "How far the simulated arm without dry friction is from the linear loop in a small step, as a part of it, "
+            "and the mean tracking error on the scenario's reference by PID alone and with the arm's exact model as "
+            "feedforward.",
         ],
         [Picture(step_figure(tuning), _STEP)],
         [verified_table(tuning)],

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from armloop.reports.plots.style import BLUE, GRID, MUTED, ORANGE, figure, legend, panels, polish
 
@@ -32,7 +33,7 @@ def bode_figure(tuning: Tuning) -> Figure:
         for label, color, loop in _both(tuning):
             L, hertz = loop.loops[:, j], loop.w / (2 * np.pi)
             magnitude.loglog(hertz, np.abs(L), color=color, linewidth=1.4, label=label)
-            phase.semilogx(hertz, np.rad2deg(np.unwrap(np.angle(L))), color=color, linewidth=1.4, label=label)
+            phase.semilogx(hertz, _phase(L), color=color, linewidth=1.4, label=label)
             grid[2, j].loglog(hertz, np.abs(1 / (1 + L)), color=color, linewidth=1.4, label=label)
         magnitude.axhline(1, color=MUTED, linewidth=1)
         phase.axhline(-180, color=MUTED, linewidth=1)
@@ -42,6 +43,13 @@ def bode_figure(tuning: Tuning) -> Figure:
         polish(grid[2, j], "frequency [Hz]", "|S|")
     legend(made, 2)
     return made
+
+
+def _phase(L: NDArray[Any]) -> NDArray[np.float64]:
+    """Phase in deg without jumps, between -360 and 0 where the gain is nearest to 1."""
+    phase = np.rad2deg(np.unwrap(np.angle(L)))
+    crossover = phase[np.argmin(np.abs(np.log(np.abs(L))))]
+    return np.asarray(phase - 360 * np.ceil(crossover / 360))
 
 
 def step_figure(tuning: Tuning) -> Figure:
