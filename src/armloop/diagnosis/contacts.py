@@ -31,8 +31,9 @@ Mask = NDArray[np.bool_]
 _WINDOW, _PAUSE, _SHORTEST = 0.15, 0.3, 0.1
 #: The residual must reach this many baselines …
 _RISE = 4.0
-#: … and this many times what it reaches in the rest of the run; a contact lasts while it is above a part of its peak.
-_STANDS_OUT, _EDGE = 2.5, 0.4
+#: … and this many times the most it reaches in the rest of the run; a contact lasts while it is above a part of its
+#: peak. Thresholds that are tried.
+_STANDS_OUT, _EDGE, _STEPS = 1.5, 0.4, 60
 #: All contacts together fill at most this part of a run: what is there longer is no event.
 _LONGEST = 0.4
 #: A force at the tool must explain this part of the burst's energy.
@@ -142,32 +143,36 @@ def _level(motion: Motion, excess: Array) -> Array:
     for run in motion.runs():
         period = float(np.median(np.diff(motion.time[run]))) if run.stop - run.start > 1 else _WINDOW
         width = max(1, round(_WINDOW / period))
-        level[run] = np.sqrt(uniform_filter1d(excess[run] ** 2, width, axis=0).max(axis=1))
+        # A running mean of squares can fall below zero by rounding.
+        level[run] = np.sqrt(np.maximum(uniform_filter1d(excess[run] ** 2, width, axis=0).max(axis=1), 0.0))
     return level
 
 
 def _standing_out(motion: Motion, level: Array) -> list[slice]:
-    """Bursts above a threshold that what is left of the run keeps well below."""
-    outside = np.ones(motion.samples, dtype=bool)
-    bursts: list[slice] = []
-    threshold = max(_RISE, _STANDS_OUT * float(np.quantile(level, 0.75)))
-    for _ in range(10):
-        bursts = _bursts(motion, level, threshold)
-        outside[:] = True
-        for burst in bursts:
+    """Bursts above the lowest threshold that all that is left of the run keeps well below."""
+    highest = float(level.max(initial=0.0))
+    if highest < _RISE:
+        return []
+    for threshold in np.geomspace(_RISE, highest, _STEPS):
+        bursts, cut_off = _bursts(motion, level, float(threshold))
+        outside = np.ones(motion.samples, dtype=bool)
+        for burst in [*bursts, *cut_off]:
             outside &= ~_around(motion, motion.time[burst.start], motion.time[burst.stop - 1])
-        if not outside.any():
-            return []
-        needed = _STANDS_OUT * float(np.quantile(level[outside], 0.99))
-        if needed <= threshold:
-            break
-        threshold = needed
-    return bursts
+        if bursts and outside.any() and _STANDS_OUT * float(level[outside].max()) <= threshold:
+            return bursts
+    return []
 
 
-def _bursts(motion: Motion, level: Array, threshold: float) -> list[slice]:
-    """Stretches around every peak above the threshold, as long as the level is above a part of the peak."""
+def _bursts(motion: Motion, level: Array, threshold: float) -> tuple[list[slice], list[slice]]:
+    """Stretches around every peak above the threshold, as long as the level is above a part of the peak.
+
+    An event is seen to begin and to end; what is there from a run's start is a past that friction remembers.
+
+    Returns:
+        Stretches that may be events, and those at the ends of a run or too short.
+    """
     bursts: list[slice] = []
+    others: list[slice] = []
     for run in motion.runs():
         above = np.flatnonzero(level[run] > threshold) + run.start
         if len(above) == 0:
@@ -177,12 +182,11 @@ def _bursts(motion: Motion, level: Array, threshold: float) -> list[slice]:
             peak = float(level[group[0] : group[-1] + 1].max())
             inside = np.flatnonzero(level[group[0] : group[-1] + 1] > _EDGE * peak) + group[0]
             burst = slice(int(inside[0]), int(inside[-1]) + 1)
-            # An event is seen to begin; what is there from a run's start is a past that friction remembers.
-            if motion.time[burst.start] - motion.time[run.start] < _PAUSE:
-                continue
-            if motion.time[burst.stop - 1] - motion.time[burst.start] >= _SHORTEST:
-                bursts.append(burst)
-    return bursts
+            start, end = motion.time[burst.start], motion.time[burst.stop - 1]
+            first, last = motion.time[run.start], motion.time[run.stop - 1]
+            event = start - first >= _PAUSE and last - end >= _SHORTEST and end - start >= _SHORTEST
+            (bursts if event else others).append(burst)
+    return bursts, others
 
 
 def _around(motion: Motion, start: float, end: float) -> Mask:

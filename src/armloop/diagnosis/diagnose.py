@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,6 @@ from armloop.signals import condition, smooth
 Array = NDArray[np.float64]
 
 SCHEMA = "armloop/diagnosis/1"
-
-#: Samples kept per period of the filter's corner: effects are smooth laws of the filtered motion, or steps whose
-#: smearing a hundredth of a second shows.
-OVERSAMPLING = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +178,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
                 f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
             )
     progress("conditioning the run like the model's training logs")
-    how = model.conditioning
-    samples = condition(logs, replace(how, oversampling=min(how.oversampling, OVERSAMPLING)))
+    samples = condition(logs, model.conditioning)
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
             raise InputError(

@@ -100,11 +100,20 @@ def _solved(
         stacked, sizes = _stack(evidence, residual, effects, values)
         rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
         beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
-        better = [e.refined(free, value) for e, free, value in zip(effects, x, values, strict=True)]
+        better = [
+            _bounded(e, evidence, e.refined(free, value))
+            for e, free, value in zip(effects, x, values, strict=True)
+        ]
         if attempt == _REFINEMENTS or np.allclose(better, values, rtol=1e-3):
             break
         values = better
     return stacked, beta, x, J, values
+
+
+def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
+    """A nonlinear parameter, not refined beyond what is tried: there it would stand for another effect."""
+    tried = effect.shapes(evidence.context)
+    return float(np.clip(value, min(tried), max(tried))) if tried else value
 
 
 def _stack(
