@@ -36,6 +36,8 @@ _RISE = 4.0
 _STANDS_OUT, _EDGE, _STEPS = 1.5, 0.4, 60
 #: All contacts together fill at most this part of a run: what is there longer is no event.
 _LONGEST = 0.4
+#: The filter has smeared this much of a push's edges, s; its interval and its force are found in turn so many times.
+_SMEARED, _REFINEMENTS = 0.05, 3
 #: A force at the tool must explain this part of the burst's energy.
 _EXPLAINED = 0.5
 #: At rest, dry friction can hold this many times its sliding level.
@@ -195,10 +197,10 @@ def _around(motion: Motion, start: float, end: float) -> Mask:
 
 def _contact(evidence: Evidence, residual: Array, burst: slice) -> Contact | None:
     motion = evidence.samples.motion
-    part = Motion(motion.time[burst], motion.q[burst], motion.v[burst], motion.vdot[burst], np.array([0]))
     kind = effect("external_contact", None)
-    columns = kind.columns(Context(evidence.model.arm, part), 0.0) / evidence.scale[:, None]
-    y = residual[burst] / evidence.scale
+    for _ in range(_REFINEMENTS):
+        burst = _interval(evidence, residual, burst)
+    part, columns, y = _burst(evidence, residual, burst)
     # Every other piece of a tenth of a second is held out, in turn.
     pieces = block_numbers(part, 0.1)
     left = np.array(y)
@@ -211,7 +213,7 @@ def _contact(evidence: Evidence, residual: Array, burst: slice) -> Contact | Non
     if share < _EXPLAINED:
         return None
     force = _force(columns, y)
-    error = _force_error(columns, y - columns @ force, pieces)
+    error = _force_error(columns, force, y - columns @ force, pieces)
     period = float(np.median(np.diff(part.time)))
     start, end = float(part.time[0]), float(part.time[-1])
     edge = max(period, 0.5 * _WINDOW)
@@ -224,18 +226,55 @@ def _contact(evidence: Evidence, residual: Array, burst: slice) -> Contact | Non
     return Contact(AddedEffect(kind, parameters), _around(motion, start, end), before, after, share)
 
 
+def _burst(evidence: Evidence, residual: Array, burst: slice) -> tuple[Motion, Array, Array]:
+    """Motion, torque per unit of a force (N, n, 3) and residual (N, n) of a stretch, both weighted."""
+    motion = evidence.samples.motion
+    part = Motion(motion.time[burst], motion.q[burst], motion.v[burst], motion.vdot[burst], np.array([0]))
+    columns = effect("external_contact", None).columns(Context(evidence.model.arm, part), 0.0)
+    return part, columns / evidence.scale[:, None], residual[burst] / evidence.scale
+
+
+def _interval(evidence: Evidence, residual: Array, burst: slice) -> slice:
+    """The stretch, in and a little around a burst, in which the force that fits its middle explains most.
+
+    A burst's edges are where the level falls, and how the arm moves can make it fall within a push.
+    """
+    motion = evidence.samples.motion
+    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    rate = (burst.stop - burst.start) / max(float(motion.time[burst.stop - 1] - motion.time[burst.start]), 1e-9)
+    inner, margin = round(_SMEARED * rate), round(_PAUSE * rate)
+    middle = slice(burst.start + inner, burst.stop - inner)
+    if middle.stop - middle.start < 4:
+        return burst
+    _, columns, y = _burst(evidence, residual, middle)
+    force = _force(columns, y)
+    around = slice(max(run.start, burst.start - margin), min(run.stop, burst.stop + margin))
+    _, columns, y = _burst(evidence, residual, around)
+    removed = np.concatenate([[0.0], np.cumsum((y**2 - (y - columns @ force) ** 2).sum(axis=1))])
+    # The stretch with the largest sum: up to each end, from where the running sum was least.
+    least = np.minimum.accumulate(removed)
+    end = int(np.argmax(removed - least))
+    start = int(np.argmin(removed[: end + 1]))
+    return slice(around.start + start, around.start + end) if end - start >= 4 else burst
+
+
 def _force(columns: Array, y: Array) -> Array:
     X = columns.reshape(-1, 3)
     return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=1e-6)[0])
 
 
-def _force_error(columns: Array, left: Array, pieces: NDArray[np.intp]) -> Array:
-    """(3,) standard error of the mean force, pieces being the independent units."""
+def _force_error(columns: Array, force: Array, left: Array, pieces: NDArray[np.intp]) -> Array:
+    """(3,) standard error of the mean force, pieces being the independent units.
+
+    Along directions in which the arm does not feel a force, it may be as large as the one that is felt.
+    """
     X = columns.reshape(-1, 3)
-    bread = np.linalg.pinv(X.T @ X, rcond=1e-9)
+    G = X.T @ X
+    bread = np.linalg.pinv(G, rcond=1e-9)
     scores = np.einsum("njf,nj->nf", columns, left)
     sums = np.array([scores[pieces == piece].sum(axis=0) for piece in np.unique(pieces)])
-    return np.asarray(np.sqrt(np.diag(bread @ (sums.T @ sums) @ bread)))
+    hidden = np.clip(np.diag(np.eye(3) - bread @ G), 0.0, 1.0) * float(force @ force)
+    return np.asarray(np.sqrt(np.diag(bread @ (sums.T @ sums) @ bread) + hidden))
 
 
 def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome, search
-from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.effects import hypotheses
 from armloop.errors import InputError
@@ -24,7 +25,7 @@ from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
 from armloop.progress import Progress, silent
-from armloop.signals import condition, smooth
+from armloop.signals import condition
 
 Array = NDArray[np.float64]
 
@@ -204,15 +205,9 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
         )
     blocks = len(np.unique(evidence.blocks))
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
-    outcome = search(evidence, progress)
-    # What the effects leave shows events that they covered, and takes back those that they explain.
-    again = find_contacts(
-        whole, samples.tau - smooth(samples, model.with_effects(outcome.added()).predict(samples.motion))
-    )
-    if (without(whole, again).rows != evidence.rows).any():
-        contacts, evidence = again, without(whole, again)
-        outcome = search(evidence, progress)
-    unlisted, outcome = find_law(evidence, outcome, progress)
+    account = best_account(whole, contacts, not _too_still(whole), progress)
+    contacts, evidence = account.contacts, account.evidence
+    outcome, unlisted = account.outcome, account.unlisted
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
     if unlisted is not None:
         kept[:, unlisted.joint - 1] = False

@@ -105,6 +105,11 @@ class Evidence:
         """(K,) samples that count for some joint."""
         return np.flatnonzero(self.rows.any(axis=1))
 
+    @cached_property
+    def row_samples(self) -> NDArray[np.intp]:
+        """(R,) sample of every stacked row."""
+        return self.kept[np.nonzero(self.rows[self.kept])[0]]
+
     def columns(self, effect: Effect, shape: float) -> Array:
         """(K, n, p) columns of an effect through the run's filter, at the samples kept; computed once."""
         key = (effect.place, shape)

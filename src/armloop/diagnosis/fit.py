@@ -113,7 +113,7 @@ def _solved(
 def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
     """A nonlinear parameter, not refined beyond what is tried: there it would stand for another effect."""
     tried = effect.shapes(evidence.context)
-    return float(np.clip(value, min(tried), max(tried))) if tried else value
+    return float(np.clip(value, min(tried), max(tried))) if len(tried) > 1 else value
 
 
 def _stack(
@@ -134,14 +134,14 @@ def solve(
     if not effects:
         return np.zeros(0), [], np.zeros((0, 0))
     edges = np.cumsum([0, *sizes])
-    found = None
+    found: tuple[float, Array, list[Array], Array] | None = None
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
     for ridge in (_RIDGE, _STRONG_RIDGE):
         free = _ridge(moments.G, moments.b, ridge)
         x = [e.start(free[a:b]) for e, a, b in zip(effects, edges, edges[1:], strict=False)]
-        error, *answer = _gauss_newton(moments, effects, x)
-        if found is None or error < found[0]:
-            found = error, *answer
+        answer = _gauss_newton(moments, effects, x)
+        if found is None or answer[0] < found[0]:
+            found = answer
         if _is_linear(found[3]):
             break
     assert found is not None

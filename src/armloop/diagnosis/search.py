@@ -169,6 +169,16 @@ def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outc
     return Outcome(kept, outcome.before, _known(evidence, kept).fit, outcome.residual)
 
 
+def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
+    """The outcome without effects that are worth nothing beside the others."""
+    for k in range(len(outcome.found)):
+        others = [f for i, f in enumerate(outcome.found) if i != k]
+        known = _known(evidence, others)
+        if not is_worth(evidence, known.fit, outcome.after):
+            return pruned(evidence, Outcome(others, outcome.before, known.fit, outcome.residual))
+    return outcome
+
+
 def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:
     """Whether an effect's columns, weighted, are largest on a joint."""
     if effect.joint is not None:

@@ -6,7 +6,7 @@ and directions, and reported only if both halves of the run choose it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit
-from armloop.diagnosis.search import Outcome, without_effects_at
+from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.library.angle_sums import AngleSums
 from armloop.motion import Motion
 from armloop.progress import Progress
@@ -39,15 +39,19 @@ _MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unlisted:
-    """A real residual: its joint, how large it is, and its law (empty if none is stable over the blocks)."""
+    """A real residual: its joint, how large it is, and its law (empty if none is stable over the blocks).
+
+    ``left`` (R,) is what the law leaves of the joint's rows, weighted, on blocks it was not fitted on.
+    """
 
     joint: int
     rmse: float
     baseline: float
     form: str
     rmse_with_form: float
+    left: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``diagnosis.json``."""
@@ -89,7 +93,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
             return find_law(evidence, bare, progress)
     scale, rows = float(evidence.scale[j]), int((outcome.after.stacked.joint == j).sum())
     rmse, with_form = (float(np.sqrt(e / rows)) * scale for e in (_energy(outcome.after, j), law.energy))
-    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form), outcome
+    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, law.left), pruned(evidence, outcome)
 
 
 def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
@@ -114,10 +118,14 @@ def _energy(fit: Fit, j: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Law:
-    """Terms with coefficients (weighted), and the held-out squared error that they leave; none if none is stable."""
+    """Terms with coefficients (weighted), none if none is stable, and what they leave held out (R,), weighted."""
 
     terms: list[tuple[float, str]]
-    energy: float
+    left: Array
+
+    @property
+    def energy(self) -> float:
+        return float((self.left**2).sum())
 
     def form(self, scale: float) -> str:
         """The law in N·m (N)."""
@@ -148,14 +156,13 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     supports = [set(sparse.support(whole - part, none).tolist()) for part in parts]
     stable = sorted(set.intersection(*supports))
     if not stable:
-        return _Law([], _energy(after, j))
+        return _Law([], y)
     support = np.array(stable, dtype=np.intp)
     error = np.array(y)
     for k, part in enumerate(parts):
         rest = whole - part
         error[fold == k] -= X[np.ix_(fold == k, support)] @ rest.solve(support)
-    left = float((error**2).sum())
-    if left > 0.5 * _energy(after, j):
-        return _Law([], _energy(after, j))
+    if (error**2).sum() > 0.5 * (y**2).sum():
+        return _Law([], y)
     beta = whole.solve(support)
-    return _Law([(float(b), names[t]) for b, t in zip(beta, support, strict=True)], left)
+    return _Law([(float(b), names[t]) for b, t in zip(beta, support, strict=True)], error)

@@ -23,11 +23,20 @@ class EncoderOffset(LinearJointEffect):
 
     #: Half the step of the derivative, rad (m).
     step = 0.01
+    #: A larger shift is no small fault, rad (m).
+    farthest = 0.6
 
     def column(self, motion: Motion, joint: int) -> Array:
         raise NotImplementedError("the column needs the known model: see columns")
 
+    def refined(self, x: Array, shape: float) -> float:
+        # The torque is not linear in the shift: the column of the shift found is the exact one.
+        return float(np.clip(x[0], -self.farthest, self.farthest))
+
     def columns(self, context: Context, shape: float) -> Array:
+        """Change of torque per rad (m) up to the shift ``shape``; at zero the derivative."""
+        if abs(shape) > self.step:
+            return ((self._shifted(context, shape) - self._shifted(context, 0.0)) / shape)[:, :, None]
         change = self._shifted(context, self.step) - self._shifted(context, -self.step)
         return (change / (2 * self.step))[:, :, None]
 
@@ -41,7 +50,7 @@ class EncoderOffset(LinearJointEffect):
         return context.predict(replace(context.motion, q=q))
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        return abs(number(parameters["offset"].value)) < 0.6
+        return abs(number(parameters["offset"].value)) < self.farthest
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         e = parameters["offset"]

@@ -26,27 +26,28 @@ class GravityTilt(Effect):
     load = True
     needs_inertial = True
 
-    #: Step for the derivative with respect to roll and pitch, rad.
-    step = 0.02
-
     def _gravity_torque(self, context: Context, gravity: Array) -> Array:
         assert context.inertial is not None
         zero = np.zeros_like(context.motion.q)
         return regressor(context.arm, context.motion.q, zero, zero, gravity) @ context.inertial
 
     def columns(self, context: Context, shape: float) -> Array:
-        g, d = context.arm.gravity, self.step
-        sides = [
-            (
-                self._gravity_torque(context, tilted_gravity(g, d, 0)),
-                self._gravity_torque(context, tilted_gravity(g, -d, 0)),
-            ),
-            (
-                self._gravity_torque(context, tilted_gravity(g, 0, d)),
-                self._gravity_torque(context, tilted_gravity(g, 0, -d)),
-            ),
-        ]
-        return np.stack([(plus - minus) / (2 * d) for plus, minus in sides], axis=2)
+        # Torques are linear in gravity, and gravity in products of sines and cosines of the two angles: see embed.
+        along = np.stack([self._gravity_torque(context, axis) for axis in np.eye(3)], axis=2)
+        x, y, z = context.arm.gravity
+        parts = [(x, 0, 0), (-z, 0, 0), (0, x, 0), (0, y, 0), (0, z, 0), (0, 0, x), (0, 0, -y), (0, 0, z)]
+        return along @ np.array(parts, dtype=float).T
+
+    def start(self, beta: Array) -> Array:
+        return np.zeros(2)
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        """What (R_y R_x)ᵀ g − g is made of, and its derivative."""
+        cr, sr, cp, sp = np.cos(x[0]), np.sin(x[0]), np.cos(x[1]), np.sin(x[1])
+        beta = np.array([cp - 1, sp, sp * sr, cr - 1, cp * sr, sp * cr, sr, cp * cr - 1])
+        roll = np.array([0, 0, sp * cr, -sr, cp * cr, -sp * sr, cr, -cp * sr])
+        pitch = np.array([-sp, cp, cp * sr, 0, -sp * sr, cp * cr, 0, -sp * cr])
+        return beta, np.column_stack([roll, pitch])
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         g = context.arm.gravity

@@ -1,0 +1,81 @@
+"""One account of a run: the events in it, the effects found beside them, and what no listed effect explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.contacts import Contact, find_contacts, without
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.progress import Progress
+from armloop.signals import smooth
+
+Array = NDArray[np.float64]
+
+#: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
+EXPLAINS = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """What happened in a run.
+
+    Attributes:
+        contacts: events, kept out of the search.
+        evidence: the run without them.
+        outcome: effects found.
+        unlisted: a real residual that they leave, if there is one.
+    """
+
+    contacts: list[Contact]
+    evidence: Evidence
+    outcome: Outcome
+    unlisted: Unlisted | None
+
+    @staticmethod
+    def of(whole: Evidence, contacts: list[Contact], progress: Progress) -> Account:
+        """Search a run in which these contacts are taken for granted."""
+        evidence = without(whole, contacts)
+        outcome = search(evidence, progress)
+        unlisted, outcome = find_law(evidence, outcome, progress)
+        return Account(contacts, evidence, outcome, unlisted)
+
+    def explains(self, contacts: list[Contact], residual: Array) -> float:
+        """The part of a residual (N, n), N·m (N), in the bursts of contacts that is not left by effects and law."""
+        evidence, held_out = self.evidence, self.outcome.after.held_out.copy()
+        if self.unlisted is not None:
+            held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
+        bursts = np.logical_or.reduce([contact.rows for contact in contacts])
+        before = (residual / evidence.scale)[evidence.rows & bursts[:, None]]
+        after = held_out[bursts[evidence.row_samples]]
+        return 1 - float((after**2).sum()) / max(float((before**2).sum()), 1e-300)
+
+
+def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, progress: Progress) -> Account:
+    """The account with contacts where there are any, unless effects or a law explain those bursts as well.
+
+    Args:
+        contacts: what looks like contacts before anything else is known.
+        plain_counts: whether the run moves enough to be judged without contacts, too.
+    """
+    account = plain = Account.of(whole, contacts, progress)
+    # What the effects leave shows events that they covered, and takes back those that they explain.
+    model, samples = whole.model.with_effects(account.outcome.added()), whole.samples
+    residual = samples.tau - smooth(samples, model.predict(samples.motion))
+    again = find_contacts(whole, residual)
+    if (without(whole, again).rows != account.evidence.rows).any():
+        account = Account.of(whole, again, progress)
+    if not account.contacts or not plain_counts:
+        return account
+    if contacts:
+        plain = Account.of(whole, [], progress)
+    enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
+    same = account.unlisted and plain.unlisted and account.unlisted.joint == plain.unlisted.joint
+    if same or plain.explains(account.contacts, residual) >= enough:
+        progress("what looked like contacts is explained without them")
+        return plain
+    return account
