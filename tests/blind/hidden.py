@@ -87,7 +87,11 @@ def draw(run: Run, seed: int) -> Hidden:
 
 
 def _unlisted(run: Run, rng: np.random.Generator) -> Hidden:
-    """A product of a wave of one joint and a power of another's speed."""
+    """A product of a wave of one joint and a power of another's speed.
+
+    Its size is that of the part which no listed law of the joint can stand for: cos(q) v over a small range of q is
+    viscous friction.
+    """
     n = run.arm.n
     j, k, m = (int(x) for x in rng.integers(n, size=3))
     wave = int(rng.integers(1, 4))
@@ -97,8 +101,12 @@ def _unlisted(run: Run, rng: np.random.Generator) -> Hidden:
     rms = np.sqrt(np.mean(run.tau[:, j] ** 2))
     a = share * rms / max(float(np.sqrt(np.mean(shape**2))), 1e-9)
     law = f"{a:.4g}*cos({wave}*q{k + 1})*v{m + 1}^{power} at joint {j + 1}"
+    q, v, vdot = (x[:, j] for x in (run.motion.q, run.motion.v, run.motion.vdot))
+    listed = np.column_stack([np.ones_like(q), q, v, np.sign(v), v * np.abs(v), vdot])
+    left = shape - listed @ np.linalg.lstsq(listed, shape, rcond=None)[0]
+    size = float(a * np.sqrt(np.mean(left**2)) / rms)
     return Hidden(
-        "unlisted", [], [share], law, {"joint": j, "a": a, "wave": wave, "of": k, "speed": m, "power": power}
+        "unlisted", [], [size], law, {"joint": j, "a": a, "wave": wave, "of": k, "speed": m, "power": power}
     )
 
 

@@ -20,7 +20,7 @@ BASELINE_SHARE = 1.0
 CHANCE = 2.0
 #: … or on every joint by no more than this part of the baseline's energy, or of what the best removes there: no law is
 #: met exactly, and a richer one soaks up both …
-ALIKE, NEARLY = 1.0, 0.003
+ALIKE, NEARLY = 0.4, 0.003
 #: … while it removes at least this part of what the best removes.
 MOST = 0.75
 

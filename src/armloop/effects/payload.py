@@ -75,7 +75,9 @@ class Payload(Effect):
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # A body has a mass, and its centre lies where something bolted to the flange can reach.
         mass, com = number(parameters["mass"].value), np.asarray(parameters["com"].value)
-        reach = max(0.15, 0.5 * float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum()))
+        chain = float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum())
+        # The last link's own length is not in the chain; a link reaches twice as far as its centre, and a load beyond.
+        reach = max(0.15, 0.5 * chain, 2.5 * float(np.linalg.norm(arm.com[-1])))
         return mass > 0 and float(np.linalg.norm(com)) < reach
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
