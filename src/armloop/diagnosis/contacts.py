@@ -38,6 +38,8 @@ _STANDS_OUT, _EDGE, _STEPS = 1.5, 0.4, 60
 _LONGEST = 0.4
 #: The filter has smeared this much of a push's edges, s; its interval and its force are found in turn so many times.
 _SMEARED, _REFINEMENTS = 0.05, 3
+#: A push comes, or goes, at once: between these parts of its height within so many seconds.
+_EDGES, _AT_ONCE = (0.2, 0.8), 0.2
 #: A force at the tool must explain this part of the burst's energy.
 _EXPLAINED = 0.5
 #: At rest, dry friction can hold this many times its sliding level.
@@ -198,6 +200,8 @@ def _around(motion: Motion, start: float, end: float) -> Mask:
 def _contact(evidence: Evidence, residual: Array, burst: slice) -> Contact | None:
     motion = evidence.samples.motion
     kind = effect("external_contact", None)
+    if not _abrupt(evidence, residual, burst):
+        return None
     for _ in range(_REFINEMENTS):
         burst = _interval(evidence, residual, burst)
     part, columns, y = _burst(evidence, residual, burst)
@@ -224,6 +228,21 @@ def _contact(evidence: Evidence, residual: Array, burst: slice) -> Contact | Non
     }
     before, after = (np.sqrt(np.mean(z**2, axis=0)) * evidence.scale for z in (y, left))
     return Contact(AddedEffect(kind, parameters), _around(motion, start, end), before, after, share)
+
+
+def _abrupt(evidence: Evidence, residual: Array, burst: slice) -> bool:
+    """Whether the residual comes or goes at once: what a model gets wrong comes and goes as the arm moves."""
+    motion = evidence.samples.motion
+    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    level = np.sqrt((_excess(evidence, residual)[run] ** 2).max(axis=1))
+    time = motion.time[run]
+    first, last = burst.start - run.start, burst.stop - 1 - run.start
+    low, high = (part * float(np.quantile(level[first : last + 1], 0.9)) for part in _EDGES)
+    above = first + np.flatnonzero(level[first : last + 1] >= high)
+    before, after = np.flatnonzero(level[: above[0]] < low), np.flatnonzero(level[above[-1] :] < low)
+    rise = time[above[0]] - time[before[-1]] if len(before) else np.inf
+    fall = time[above[-1] + after[0]] - time[above[-1]] if len(after) else np.inf
+    return bool(min(rise, fall) <= _AT_ONCE)
 
 
 def _burst(evidence: Evidence, residual: Array, burst: slice) -> tuple[Motion, Array, Array]:
