@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Over this many seconds the residual is averaged; contacts this close together are one, shorter ones are none.
-_WINDOW, _PAUSE, _SHORTEST = 0.15, 0.3, 0.1
+_WINDOW, _PAUSE, _SHORTEST = 0.15, 0.3, 0.15
 #: The residual must reach this many baselines …
 _RISE = 4.0
 #: … and this many times the most it reaches in the rest of the run; a contact lasts while it is above a part of its
@@ -260,7 +260,9 @@ def _interval(evidence: Evidence, residual: Array, burst: slice) -> slice:
     """
     motion = evidence.samples.motion
     run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
-    rate = (burst.stop - burst.start) / max(float(motion.time[burst.stop - 1] - motion.time[burst.start]), 1e-9)
+    rate = (burst.stop - burst.start) / max(
+        float(motion.time[burst.stop - 1] - motion.time[burst.start]), 1e-9
+    )
     inner, margin = round(_SMEARED * rate), round(_PAUSE * rate)
     middle = slice(burst.start + inner, burst.stop - inner)
     if middle.stop - middle.start < 4:

@@ -81,9 +81,7 @@ def rows_per_joint(fit: Fit) -> NDArray[np.intp]:
 
 def energy_by_joint(fit: Fit) -> Array:
     """(n,) held-out squared error, weighted, of each joint."""
-    return np.asarray(
-        np.bincount(fit.stacked.joint, weights=fit.held_out**2, minlength=fit.stacked.joints)
-    )
+    return np.asarray(np.bincount(fit.stacked.joint, weights=fit.held_out**2, minlength=fit.stacked.joints))
 
 
 def by_joint(worse: Fit, better: Fit) -> Array:
