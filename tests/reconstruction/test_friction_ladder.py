@@ -82,3 +82,12 @@ def test_samples_that_are_no_time_series_have_no_borders():
         replace(part, motion=apart, period=1.0, cutoff_hz=0.0), np.ones(motion.samples, dtype=bool), Options()
     )
     assert judged.all()
+
+
+def test_the_ladder_reaches_down_to_the_slowest_motion() -> None:
+    arm, motion = three_axis(), fourier_motion(5.0, 100.0, 1)
+    usual = rungs(arm, motion)
+    assert rungs(arm, motion, np.full(3, 0.01)) == usual
+    elements = rungs(arm, motion, np.array([0.01, 0.002, 0.01]))[0].elements
+    sharpest = [min(term.parameter for term in own if term.parameter) for own in elements]
+    assert sharpest[1] < 0.001 and all(len(own) == len(usual[0].elements[0]) + 1 for own in elements)

@@ -11,7 +11,9 @@ from armloop.errors import ExcitationError
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.rigid_body import BaseParameters
 from armloop.log import MotionLog
+from armloop.motion import Motion
 from armloop.reconstruction import Reconstruction, reconstruct
+from armloop.reconstruction.shared import SHARED_CONDITIONING, sliding_rows
 from armloop.scoring import score
 from armloop.signals import condition
 
@@ -131,3 +133,42 @@ def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.Monke
     monkeypatch.setattr("armloop.reconstruction.physical.constrained_least_squares", fail)
     with pytest.raises(ExcitationError, match="the motion tells too little"):
         reconstruct([a_run(1)], three_axis(), library="rigid-body")
+
+
+def creeping(seed: int) -> MotionLog:
+    """Short stretches at a tenth of a degree per second in postures all over, each a run of its own."""
+    rng = np.random.default_rng(seed)
+    v = np.repeat(0.00175 * rng.choice([-1.0, 1.0], (30, 3)), 80, axis=0)
+    within = np.tile(np.arange(80) / 100, 30)
+    q = np.repeat(rng.uniform(-1.0, 1.0, (30, 3)), 80, axis=0) + within[:, None] * v
+    motion = Motion(within + np.repeat(np.arange(30.0), 80), q, v, np.zeros_like(q), np.arange(0, 2400, 80))
+    return exact(motion, seed)
+
+
+def exact(motion: Motion, seed: int) -> MotionLog:
+    """A log whose velocities are so good that creeping is told from standing."""
+    rigid = regressor(three_axis(), motion.q, motion.v, motion.vdot) @ nominal_parameters(three_axis())
+    log = measured(motion, rigid + friction(motion.v), seed, noise=0.005)
+    return replace(log, q=motion.q, v=motion.v.round(7))
+
+
+def test_friction_keeps_its_level_where_a_joint_creeps() -> None:
+    logs = [exact(fourier_motion(40.0, 100.0, seed), seed) for seed in (1, 2)]
+    for library, most in (("rigid-body", 0.01), ("lagrangian", 0.03)):
+        model = reconstruct([*logs, creeping(1)], three_axis(), library=library).model
+        slow = condition([creeping(2)], model.conditioning)
+        assert slow.moving.all()
+        error = model.predict(slow.motion) - slow.tau
+        level = np.sqrt(np.mean(slow.tau**2, axis=0))
+        assert (np.sqrt(np.mean(error**2, axis=0)) < most * level).all()
+
+
+def test_steady_creeping_counts_and_a_slow_reversal_does_not() -> None:
+    slow = condition([creeping(1)], SHARED_CONDITIONING)
+    assert sliding_rows(slow).all()
+    time = np.arange(0, 4.0, 0.01)
+    v = np.column_stack([0.05 * np.sin(np.pi * time)] * 3)
+    motion = Motion(time, np.cumsum(v, axis=0) / 100, v, np.zeros_like(v), np.array([0]))
+    swing = condition([exact(motion, 1)], SHARED_CONDITIONING)
+    rows, speed = sliding_rows(swing), np.abs(swing.motion.v)
+    assert rows[speed > 0.011].all() and not rows[speed < 0.009].any()

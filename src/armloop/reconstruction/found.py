@@ -41,8 +41,12 @@ class Found:
         """The friction found so far."""
         return FrictionLaw(tuple(map(tuple, self.friction)))
 
+    def rigid(self, motion: Motion) -> Array:
+        """(N, n) torque of everything found so far but friction."""
+        parts = [component.torque(self.arm, motion, 3) for component in self.components]
+        return np.sum(parts, axis=0) if parts else np.zeros_like(motion.q)
+
     def torque(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far."""
-        parts = [component.torque(self.arm, motion, 3) for component in self.components]
-        rigid = np.sum(parts, axis=0) if parts else np.zeros_like(motion.q)
+        rigid = self.rigid(motion)
         return rigid + self.law.torque(motion, load=rigid)

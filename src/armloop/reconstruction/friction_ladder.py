@@ -57,6 +57,8 @@ LAWS = {
     "presliding": ("hysteresis",),
     "presliding_by_load": ("load_hysteresis",),
 }
+#: The slowest motion is this quantile of the speeds; it is so much faster than the fade that reaches down to it.
+_CREEP, _SHARPER = 0.005, 4.0
 #: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
 _STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
 
@@ -101,13 +103,26 @@ class Ladder:
     notes: list[str]
 
 
-def rungs(arm: Arm, motion: Motion) -> list[Rung]:
-    """The ladder of an arm; the Stribeck speeds follow each joint's fastest speed."""
+def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
+    """The ladder of an arm; the Stribeck speeds follow each joint's fastest speed.
+
+    Where a joint creeps, slower than the speed over which the direction fades in fastest, one more speed, for every
+    joint, keeps the Coulomb level there.
+
+    Args:
+        slowest: (n,) speeds of the slowest motion that is regressed; None for none so slow.
+    """
     units = np.where(arm.revolute, 1.0, 0.1)
     fastest = np.quantile(np.abs(motion.v), 0.995, axis=0)
-    slowest = units * _SLOWEST
     stribeck = [
-        np.geomspace(low, max(_PART * v, 2 * low), _STRIBECK) for low, v in zip(slowest, fastest, strict=True)
+        np.geomspace(low, max(_PART * v, 2 * low), _STRIBECK)
+        for low, v in zip(units * _SLOWEST, fastest, strict=True)
+    ]
+    sharp = units * _FADES[0]
+    creep = sharp if slowest is None else np.minimum(sharp, slowest)
+    fades = [
+        ([c / _SHARPER] if (creep < sharp).any() else []) + [unit * size for size in _FADES]
+        for unit, c in zip(units, creep, strict=True)
     ]
 
     def same(*kinds: str) -> list[list[FrictionTerm]]:
@@ -116,7 +131,10 @@ def rungs(arm: Arm, motion: Motion) -> list[Rung]:
     def scaled(kind: str, sizes: tuple[float, ...]) -> list[list[FrictionTerm]]:
         return [[FrictionTerm(kind, parameter=float(unit * size)) for size in sizes] for unit in units]
 
-    coulomb = [[*fades, FrictionTerm("viscous")] for fades in scaled("smooth_sign", _FADES)]
+    def fading(kind: str) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind, parameter=float(f"{v:.2g}")) for v in own] for own in fades]
+
+    coulomb = [[*own, FrictionTerm("viscous")] for own in fading("smooth_sign")]
     falls = [[FrictionTerm("stribeck_peak", parameter=float(f"{v:.2g}")) for v in own] for own in stribeck]
     return [
         Rung("Coulomb and viscous", coulomb),
@@ -124,7 +142,7 @@ def rungs(arm: Arm, motion: Motion) -> list[Rung]:
         Rung("Stribeck", falls),
         Rung("nonlinear viscous", same("root", "quadratic", "cubic")),
         Rung("viscous by direction", same("viscous_forward", "viscous_backward")),
-        Rung("Coulomb by load", scaled("load_smooth_sign", _FADES)),
+        Rung("Coulomb by load", fading("load_smooth_sign")),
         Rung("presliding", scaled("hysteresis", _WIDTHS)),
         Rung("presliding by load", scaled("load_hysteresis", _WIDTHS)),
     ]
@@ -181,7 +199,8 @@ def climb(
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    ladder = restricted(rungs(arm, samples.motion), options.friction)
+    speeds = np.where(rows, np.abs(samples.motion.v), np.nan)
+    ladder = restricted(rungs(arm, samples.motion, np.nanquantile(speeds, _CREEP, axis=0)), options.friction)
     candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
     fold, judged = inner_folds(samples, np.asarray(rows.any(axis=1)), options)
     pooled = Pooled(samples, columns, candidates, rows, load, fold, judged, options.physical)

@@ -32,6 +32,7 @@ from armloop.reconstruction.shared import (
     PLAIN_FRICTION,
     check_moves,
     check_rank,
+    fast_rows,
     found_friction,
     sliding_rows,
 )
@@ -72,12 +73,13 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     check_rank(base.columns(arm, motion), rows, base)
     library = candidates(arm)
     progress(f"lagrangian: {library.count} candidates, {len(FRICTION) + 1} friction columns a joint")
-    chosen = _choose(library, samples, rows, options)
+    fast = rows & fast_rows(samples)
+    chosen = _choose(library, samples, fast, options)
     energy = library.take(chosen)
     progress(f"lagrangian: {len(chosen)} terms chosen")
     columns = energy.columns(motion)
     smoothed = smooth(samples, columns)
-    plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], rows)
+    plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], fast)
     load = columns @ plain.solve(plain.everything).theta[: energy.count]
     ladder = climb(arm, samples, smoothed, rows, load, options, {})
     mass = energy.mass(postures(motion))

@@ -42,6 +42,13 @@ class Options:
     insist: bool = False
     standard_errors: bool = True
 
+    @property
+    def of_double_feature_set(self) -> bool:
+        """Whether something is set that only the double feature set knows."""
+        own = (self.sparse, self.max_order, self.max_candidates, self.snr)
+        usual = Options()
+        return own != (usual.sparse, usual.max_order, usual.max_candidates, usual.snr)
+
 
 @dataclass
 class StepReport:

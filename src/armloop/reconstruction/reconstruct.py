@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,14 +19,15 @@ from armloop.progress import Progress, silent
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
+from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
+from armloop.reconstruction.rival import Attempt, better
 from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise_on
-from armloop.reconstruction.tally import Tally
 from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
 from armloop.workers import Workers
@@ -88,7 +88,8 @@ def reconstruct(
         logs: runs of the same arm, in memory or read when needed (:mod:`armloop.pieces`); which sample serves
             which step is found from the samples.
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
-        library: one of :data:`LIBRARIES`; by default what suits the number of joints.
+        library: one of :data:`LIBRARIES`; by default what suits the number of joints, or rigid-body where the double
+            feature set turns out to be much worse (:mod:`armloop.reconstruction.rival`) and no option speaks of it.
         conditioning: filter; by default what suits the library.
         recorded: how the logs recorded the torque, kept in the model for later logs.
         workers: who passes over logs that are not kept in memory; by default this process.
@@ -101,6 +102,7 @@ def reconstruct(
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
+    asked = library is not None or (options is not None and options.of_double_feature_set)
     library = library or default_library(arm)
     if library not in LIBRARIES:
         raise InputError(f"unknown library {library!r}; there are: {', '.join(LIBRARIES)}")
@@ -113,46 +115,67 @@ def reconstruct(
             "laws are chosen with --library rigid-body or lagrangian"
         )
     check_laws(options.friction)
-    conditioning = conditioning or default_conditioning(library)
     for log in logs:
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
-    progress(f"conditioning {len(logs)} log(s), low-pass {conditioning.cutoff_hz:g} Hz")
-    if (
-        method == "stepwise"
-        and library == "double-feature-set"
-        and (sum(log.samples for log in logs) > in_memory)
-    ):
-        data = Data.streamed(logs, conditioning, options, workers)
-    else:
-        data = Data.of(condition([log.read() for log in logs], conditioning), options)
+
+    def attempt(library: str) -> Attempt:
+        how = conditioning or default_conditioning(library)
+        progress(f"conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        large = sum(log.samples for log in logs) > in_memory
+        if large and method == "stepwise" and library == "double-feature-set":
+            data = Data.streamed(logs, how, options, workers)
+        else:
+            data = Data.of(condition([log.read() for log in logs], how), options)
+        check_recorded(arm, data.reference.samples)
+        return Attempt(library, how, data, _found(arm, data, method, library, options, progress))
+
+    tried = attempt(library)
+    if not asked and method == "stepwise" and tried.may_have_rival:
+        progress("the same with the base parameters of the URDF, for comparison")
+        tried = better(tried, attempt)
+    return _finished(tried, arm, method, logs, options, progress, recorded)
+
+
+def _found(arm: Arm, data: Data, method: str, library: str, options: Options, progress: Progress) -> Found:
     samples, held_out = data.reference.samples, data.reference.held_out
-    check_recorded(arm, samples)
     if library == "rigid-body":
-        found = rigid_body(arm, samples, held_out, options, progress)
-    elif library == "lagrangian":
-        found = lagrangian(arm, samples, held_out, options, progress)
-    elif method == "sindy":
-        found = sindy(arm, samples, held_out, options, progress)
-    else:
-        found = stepwise_on(arm, data, options, progress)
+        return rigid_body(arm, samples, held_out, options, progress)
+    if library == "lagrangian":
+        return lagrangian(arm, samples, held_out, options, progress)
+    if method == "sindy":
+        return sindy(arm, samples, held_out, options, progress)
+    return stepwise_on(arm, data, options, progress)
+
+
+def _finished(
+    tried: Attempt,
+    arm: Arm,
+    method: str,
+    logs: Sequence[LogSource],
+    options: Options,
+    progress: Progress,
+    recorded: dict[str, Any] | None,
+) -> Reconstruction:
+    """The model with its history, its baseline on held-out data and its standard errors."""
+    found, data = tried.found, tried.data
     model = ReconstructedModel(
         arm=arm,
         components=tuple(found.components),
         friction=found.law,
-        conditioning=conditioning,
+        conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
             "method": method,
-            "library": library,
+            "library": tried.library,
             "logs": list(dict.fromkeys(log.name for log in logs)),
             "steps": [report.to_dict() for report in found.reports],
             "notes": found.notes,
-            "range": _range(samples.motion),
+            "range": _range(data.reference.samples.motion),
             **found.history,
         },
     )
-    tally = data.sum(partial(Tally.of, model=model, sorter=found.sorter))
+    tally = tried.tally(found.sorter)
     model = replace(model, baseline=tally.baseline())
     if found.final is not None:
         history = {**model.history, **found.final.history}
@@ -160,8 +183,8 @@ def reconstruct(
         model = replace(model, components=components, friction=found.final.law, history=history)
     if options.standard_errors:
         progress("standard errors of the coefficients")
-        errors = uncertainty(model, data, found, shared=library in ("rigid-body", "lagrangian"))
-        model = replace(model, uncertainty=errors)
+        shared = tried.library in ("rigid-body", "lagrangian")
+        model = replace(model, uncertainty=uncertainty(model, data, found, shared))
     return Reconstruction(model, found.reports, tally.score(), found.notes)
 
 

@@ -27,6 +27,7 @@ from armloop.reconstruction.shared import (
     PLAIN_FRICTION,
     check_moves,
     check_rank,
+    fast_rows,
     found_friction,
     sliding_rows,
 )
@@ -58,7 +59,7 @@ def rigid_body(
     raw = base.columns(arm, motion)
     columns = smooth(samples, raw)
     check_rank(columns, rows, base)
-    plain = Pooled(samples, columns, [list(PLAIN_FRICTION) for _ in arm.joints], rows)
+    plain = Pooled(samples, columns, [list(PLAIN_FRICTION) for _ in arm.joints], rows & fast_rows(samples))
     load = raw @ plain.solve(plain.everything).theta[: base.count]
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
     progress(f"rigid body: {base.count} base parameters; choosing each joint's friction on held-out data")

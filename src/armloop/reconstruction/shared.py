@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from armloop.arm import Arm
 from armloop.errors import ExcitationError
@@ -33,15 +34,36 @@ FRICTION = (
 )
 #: What the load is estimated with, before any friction that depends on it is regressed.
 PLAIN_FRICTION = FRICTION[:2] + FRICTION[4:]
-#: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion.
-_SLIDING = 0.01
+#: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion, unless it creeps steadily: so much
+#: of the largest speed must the smallest one be, over a period of the filter to both sides.
+_SLIDING, _STEADY = 0.01, 0.5
 #: What a constraint has pressed to zero, N·m.
 _NOTHING = 1e-12
 
 
 def sliding_rows(samples: Samples) -> NDArray[np.bool_]:
-    """(N, n) samples in which a joint's torque is determined by its motion."""
+    """(N, n) samples in which a joint's torque is determined by its motion: it is fast, or it creeps steadily."""
+    return fast_rows(samples) | (samples.moving & _steady(samples))
+
+
+def fast_rows(samples: Samples) -> NDArray[np.bool_]:
+    """(N, n) samples so fast that a direction which fades in late (:data:`FRICTION`) is right all the same."""
     return samples.moving & (np.abs(samples.motion.v) > _SLIDING)
+
+
+def _steady(samples: Samples) -> NDArray[np.bool_]:
+    """(N, n) samples around which a joint keeps its direction and about its speed."""
+    v = samples.motion.v
+    steady = np.zeros(v.shape, dtype=bool)
+    if samples.cutoff_hz <= 0:
+        return steady
+    width = 2 * int(np.ceil(1 / (samples.cutoff_hz * samples.period))) + 1
+    for run in samples.motion.runs():
+        low = minimum_filter1d(v[run], width, axis=0, mode="nearest")
+        high = maximum_filter1d(v[run], width, axis=0, mode="nearest")
+        least, most = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
+        steady[run] = (low * high > 0) & (least >= _STEADY * most)
+    return steady
 
 
 def check_moves(arm: Arm, rows: NDArray[np.bool_]) -> None:

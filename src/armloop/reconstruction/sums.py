@@ -7,8 +7,8 @@ share them. The columns of the library never exist.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 
 from armloop.library.friction import FrictionTerm
 from armloop.library.wave_moments import WaveProducts, WaveSums
-from armloop.motion import Motion
+from armloop.motion import Motion, Samples
 from armloop.reconstruction.data import Chunk
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.sorter import Sorter
 from armloop.regression.moments import Moments
+from armloop.signals import LowPass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]
-#: Samples whose friction columns, dozens per joint, exist at a time.
-_AT_ONCE = 4096
+#: Friction columns, dozens per joint, that exist at a time on all samples of a chunk.
+_AT_ONCE = 16
 #: Which joints move (a bit each), and whether the samples choose orders.
 Cell = tuple[int, bool]
 
@@ -36,6 +37,8 @@ class Usable:
     """The samples of a chunk that a step regresses.
 
     Attributes:
+        whole: all samples of the chunk, which a filter needs.
+        places: (M,) where the usable ones stand among them.
         motion: M samples as one run; only for columns without memory.
         tau, rest: (M, n) the torque, and what earlier steps have left of it.
         moving: (M, n).
@@ -43,6 +46,8 @@ class Usable:
         blocks: (M,).
     """
 
+    whole: Samples
+    places: Index
     motion: Motion
     tau: Array
     rest: Array
@@ -53,6 +58,8 @@ class Usable:
     def take(self, rows: Mask | Index) -> Usable:
         """Some samples."""
         return Usable(
+            self.whole,
+            self.places[rows],
             _rows(self.motion, rows),
             self.tau[rows],
             self.rest[rows],
@@ -60,6 +67,26 @@ class Usable:
             self.validation[rows],
             self.blocks[rows],
         )
+
+    def smoothed(self, joint: int, terms: Sequence[FrictionTerm]) -> Array:
+        """(M, f) columns of a joint's friction, filtered like the torque: they step where the joint reverses."""
+        columns = np.empty((len(self.places), len(terms)))
+        for first in range(0, len(terms), _AT_ONCE):
+            some = terms[first : first + _AT_ONCE]
+            whole = np.column_stack([term.column(self.whole.motion, joint) for term in some])
+            columns[:, first : first + _AT_ONCE] = self.filtered(whole)
+        return columns
+
+    def filtered(self, x: Array) -> Array:
+        """(M, c) values at the usable samples of x (N, c), filtered like the torque; runs without any are left out."""
+        if self.whole.cutoff_hz <= 0:
+            return x[self.places]
+        low_pass, parts = LowPass(self.whole.cutoff_hz, self.whole.period), [x[:0]]
+        for run in self.whole.motion.runs():
+            own = self.places[slice(*np.searchsorted(self.places, (run.start, run.stop)))]
+            if len(own):
+                parts.append(low_pass(x[run])[own - run.start])
+        return np.concatenate(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +109,23 @@ class Choice:
         rows = chunk.independent & ~chunk.held_out & samples.moving.any(axis=1)
         if self.sorter is not None:
             rows &= np.isin(self.sorter(motion), self.conditions)
-        part = _rows(motion, rows)
-        tau = samples.tau[rows]
+        places = np.flatnonzero(rows).astype(np.intp)
+        part, tau = _rows(motion, places), samples.tau[places]
+        usable = Usable(
+            samples,
+            places,
+            part,
+            tau,
+            tau,
+            samples.moving[places],
+            chunk.validation[places],
+            chunk.blocks[places],
+        )
         # A chunk may have no sample of a condition, and an empty motion has no first instant.
-        rest = tau - self.inherited.torque(part) if len(tau) else tau
-        return Usable(part, tau, rest, samples.moving[rows], chunk.validation[rows], chunk.blocks[rows])
+        if len(tau) == 0:
+            return usable
+        friction = usable.filtered(self.inherited.law.torque(motion))
+        return replace(usable, rest=tau - self.inherited.rigid(part) - friction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,25 +140,23 @@ class Columns:
     library: WaveProducts
     friction: tuple[tuple[FrictionTerm, ...], ...]
 
-    def beside(self, motion: Motion) -> Array:
-        """(N, Σ f) friction columns of all joints."""
-        columns = [t.column(motion, j) for j, terms in enumerate(self.friction) for t in terms]
-        return np.column_stack(columns) if columns else np.zeros((motion.samples, 0))
+    def beside(self, usable: Usable) -> Array:
+        """(M, Σ f) friction columns of all joints."""
+        return np.hstack([usable.smoothed(j, terms) for j, terms in enumerate(self.friction)])
 
     def span(self, joint: int) -> slice:
         """Where the joint's columns stand in :meth:`beside`."""
         first = sum(len(terms) for terms in self.friction[:joint])
         return slice(first, first + len(self.friction[joint]))
 
-    def chosen(self, motion: Motion, joint: int, support: Index) -> Array:
-        """(N, s) values of some of the joint's columns."""
+    def chosen(self, usable: Usable, joint: int, support: Index) -> Array:
+        """(M, s) values of some of the joint's columns."""
         size = self.library.size
         candidates = self.library.only(support[support < size])
-        friction = [self.friction[joint][c - size].column(motion, joint) for c in support if c >= size]
-        values = np.empty((motion.samples, len(support)))
-        values[:, support < size] = candidates.columns(motion)
-        if friction:
-            values[:, support >= size] = np.column_stack(friction)
+        friction = [self.friction[joint][c - size] for c in support if c >= size]
+        values = np.empty((usable.motion.samples, len(support)))
+        values[:, support < size] = candidates.columns(usable.motion)
+        values[:, support >= size] = usable.smoothed(joint, friction)
         return values
 
 
@@ -146,15 +183,16 @@ class StepSums:
     def of(chunk: Chunk, choice: Choice, columns: Columns) -> StepSums:
         """Sums of one chunk."""
         usable = choice(chunk)
+        beside = columns.beside(usable)
         codes = usable.moving @ (1 << np.arange(usable.moving.shape[1]))
         cells, power = {}, {}
         for code in np.unique(codes):
             for chooses in (False, True):
                 rows = np.flatnonzero((codes == code) & (usable.validation == chooses))
-                parts = [usable.take(rows[i : i + _AT_ONCE]) for i in range(0, len(rows), _AT_ONCE)]
-                if parts:
+                if len(rows):
                     cell = (int(code), chooses)
-                    cells[cell] = _total(_sums(part, columns) for part in parts)
+                    given = np.hstack([usable.rest[rows], beside[rows]])
+                    cells[cell] = columns.library.sums(_rows(usable.motion, rows), given)
                     power[cell] = (usable.tau[rows] ** 2).sum(axis=0)
         return StepSums(cells, power)
 
@@ -202,10 +240,6 @@ class Problems:
         G[size:, size:] = square[1:, 1:]
         b = np.concatenate([cross[:, 0], square[1:, 0]])
         return Moments(G, b, float(square[0, 0]), float(whole.count))
-
-
-def _sums(part: Usable, columns: Columns) -> WaveSums:
-    return columns.library.sums(part.motion, np.hstack([part.rest, columns.beside(part.motion)]))
 
 
 def _total(parts: Iterable[WaveSums]) -> WaveSums:

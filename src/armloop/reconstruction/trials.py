@@ -57,7 +57,7 @@ class HeldOut:
             if part.motion.samples == 0:
                 continue
             union = np.unique(np.concatenate([fit.support for fit in fits[j]])).astype(np.intp)
-            X = columns.chosen(part.motion, j, union)
+            X = columns.chosen(part, j, union)
             sums = []
             for fit in fits[j]:
                 miss = part.rest[:, j] - X[:, np.searchsorted(union, fit.support)] @ fit.beta
@@ -101,6 +101,6 @@ class Correction:
             if part.motion.samples == 0:
                 gradients.append(np.zeros(len(fit.support)))
                 continue
-            X = columns.chosen(part.motion, j, fit.support)
+            X = columns.chosen(part, j, fit.support)
             gradients.append(X.T @ (part.rest[:, j] - X @ fit.beta))
         return Correction(tuple(gradients))

@@ -80,7 +80,7 @@ def _of(chunk: Chunk, choice: Choice, columns: Columns, fits: Sequence[Fit], noi
         terms = UnbiasedTerms([*own, *inherited], noise)
         waves, gram = terms.columns(part.motion), terms.gram(part.motion)
         # Chosen columns in the order of the support: waves first, then friction.
-        X = columns.chosen(part.motion, joint, np.sort(fit.support))
+        X = columns.chosen(part, joint, np.sort(fit.support))
         k, beside = len(own), X[:, len(own) :]
         load = part.tau - part.rest
         tau = part.tau[:, joint] - friction.torque(part.motion, load=load)[:, joint]
