@@ -41,7 +41,7 @@ def fitted_rows(data: Data, found: Found, shared: bool) -> list[Fitted]:
     if shared:
         rows = sliding_rows(chunk.samples)
         return [Fitted((1, 2, 3), rows if found.final is not None else rows & ~chunk.held_out[:, None])]
-    return step_rows(chunk, found.sorter)
+    return step_rows(chunk, found.regressed_by)
 
 
 def step_rows(chunk: Chunk, sorter: Sorter | None) -> list[Fitted]:

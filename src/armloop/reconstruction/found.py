@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 class Found:
     """Components, friction terms per joint, one report per step, and notes for the user.
 
-    ``history`` is kept in the model file; ``sorter`` is set where the samples were sorted. ``final`` is
+    ``history`` is kept in the model file; ``sorter`` is set where the samples were sorted, ``together`` where the
+    terms of all steps were regressed on all samples nevertheless. ``final`` is
     what becomes the model, where a method regresses its terms once more on all data after the held-out ones
     have judged them.
     """
@@ -34,7 +35,13 @@ class Found:
     notes: list[str] = field(default_factory=list)
     history: dict[str, Any] = field(default_factory=dict)
     sorter: Sorter | None = None
+    together: bool = False
     final: Found | None = None
+
+    @property
+    def regressed_by(self) -> Sorter | None:
+        """What dealt the samples to the regressions; None if each used all of them."""
+        return None if self.together else self.sorter
 
     @property
     def law(self) -> FrictionLaw:

@@ -24,8 +24,10 @@ from armloop.uncertainty.solving import solve
 from armloop.uncertainty.standard_errors import Assembled
 
 #: Estimators whose coefficients are those of least squares on the few terms they keep.
-_LEAST_SQUARES = ("evidence", "debiased_lasso", "thresholded", "stability")
+LEAST_SQUARES = ("evidence", "debiased_lasso", "thresholded", "stability")
 _FARTHEST = 2.5
+#: What the user is told of it.
+REFITTED = "coefficients regressed once more on columns that are filtered like the torque"
 
 
 def refit(found: Found, data: Data, estimator: str) -> bool:
@@ -35,12 +37,12 @@ def refit(found: Found, data: Data, estimator: str) -> bool:
     squared error of the fitted samples would not fall; nor for a joint whose v_s would move by more than a factor
     of two and a half.
     """
-    if data.reference.samples.cutoff_hz <= 0 or estimator not in _LEAST_SQUARES:
+    if data.reference.samples.cutoff_hz <= 0 or estimator not in LEAST_SQUARES:
         return False
     before = ReconstructedModel(found.arm, tuple(found.components), found.law)
     try:
         after, falls = solve(
-            before, lambda model: data.sum(partial(_assembled, model=model, sorter=found.sorter))
+            before, lambda model: data.sum(partial(_assembled, model=model, sorter=found.regressed_by))
         )
     except np.linalg.LinAlgError:
         return False

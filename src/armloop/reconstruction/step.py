@@ -48,6 +48,10 @@ class Part:
     second: str
 
 
+#: The three steps' libraries.
+PARTS = (Part(1, "none"), Part(2, "velocity"), Part(3, "acceleration"))
+
+
 @dataclass(frozen=True)
 class StepPlan:
     """What one regression looks for: one step, or several regressed together.
@@ -57,12 +61,14 @@ class StepPlan:
         orders: (N1, N2) to try, smallest library first; N2 is 1 at most for accelerations.
         friction: kinds of friction columns of the joint itself; ``stribeck`` is profiled over its velocity.
         conditions: conditions whose samples are used.
+        still: N1 up to which candidates that depend on the position alone are looked for, if beyond the orders.
     """
 
     parts: tuple[Part, ...]
     orders: tuple[tuple[int, int], ...]
     friction: tuple[str, ...]
     conditions: tuple[int, ...]
+    still: int = 0
 
     @property
     def name(self) -> str:
@@ -71,7 +77,7 @@ class StepPlan:
 
 
 @dataclass(frozen=True, eq=False)
-class _Candidates:
+class Candidates:
     """The candidates of all parts at the largest orders.
 
     Attributes:
@@ -79,6 +85,7 @@ class _Candidates:
         index: (T, K) factors of each candidate.
         step: (T,) step it belongs to.
         first, second: (T,) its orders in the two feature sets.
+        still: first order up to which those of second order 0 belong to all orders.
     """
 
     factors: Factors
@@ -86,6 +93,7 @@ class _Candidates:
     step: Index
     first: Index
     second: Index
+    still: int
 
     @property
     def size(self) -> int:
@@ -93,28 +101,31 @@ class _Candidates:
 
     def subset(self, orders: tuple[int, int]) -> Index:
         """Columns that belong to smaller orders."""
-        return np.flatnonzero((self.first <= orders[0]) & (self.second <= orders[1])).astype(np.intp)
+        within = (self.first <= orders[0]) & (self.second <= orders[1])
+        return np.flatnonzero(within | ((self.second == 0) & (self.first <= self.still))).astype(np.intp)
 
 
-def _candidates(revolute: tuple[bool, ...], plan: StepPlan) -> _Candidates:
+def candidates_of(revolute: tuple[bool, ...], plan: StepPlan) -> Candidates:
+    """The candidates of a plan at its largest orders."""
     N1, N2 = (max(order[k] for order in plan.orders) for k in (0, 1))
     rows: dict[tuple[int, ...], tuple[int, int, int]] = {}
-    factors = AngleSums(revolute, N1, 0, "none").factors
+    largest = max(N1, plan.still)
+    factors = AngleSums(revolute, largest, 0, "none").factors
     rates = {*factors.block("v"), *factors.block("a")}
     for part in plan.parts:
-        library = AngleSums(revolute, N1, _second_order(part, N2), part.second)
+        library = AngleSums(revolute, largest, _second_order(part, N2), part.second)
         for row, first in zip(library.index, library.order(), strict=True):
             key = tuple(int(e) for e in row if e)
             second = sum(e in rates for e in key)
             # What depends on the position alone belongs to Step I, whose data are the cleanest for it: later
             # steps inherit it instead of trading it against their own terms.
-            if part.step > 1 and second == 0:
+            if part.step > 1 and (second == 0 or first > N1):
                 continue
             rows.setdefault(key, (part.step, int(first), second))
     width = max(1, *(len(key) for key in rows))
     index = np.array([[0] * (width - len(key)) + list(key) for key in rows], dtype=np.intp)
     step, first_order, second_order = np.array(list(rows.values()), dtype=np.intp).T
-    return _Candidates(factors, index, step, first_order, second_order)
+    return Candidates(factors, index, step, first_order, second_order, plan.still)
 
 
 def _second_order(part: Part, N2: int) -> int:
@@ -185,7 +196,7 @@ def regress_step(
         ExcitationError: too few samples for a joint.
         InputError: the estimator's solver does not converge.
     """
-    candidates = _candidates(revolute, plan)
+    candidates = candidates_of(revolute, plan)
     library = WaveProducts(candidates.factors, candidates.index)
     columns = Columns(library, _friction(data, choice, plan))
     sums = data.sum(partial(StepSums.of, choice=choice, columns=columns))

@@ -14,9 +14,10 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
-from armloop.reconstruction.refit import refit
+from armloop.reconstruction.refit import REFITTED, refit
+from armloop.reconstruction.revision import revised
 from armloop.reconstruction.sorter import Sorter
-from armloop.reconstruction.step import Part, StepPlan, regress_step
+from armloop.reconstruction.step import PARTS, Part, StepPlan, regress_step
 from armloop.reconstruction.sums import Choice
 
 # A condition counts as met if what should be absent in it is this much weaker than where it is present.
@@ -61,16 +62,13 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
             law += more
         found.reports += report
     if refit(found, data, options.sparse.estimator):
-        found.notes.append("coefficients regressed once more on columns that are filtered like the torque")
-    return found
-
-
-_PARTS = (Part(1, "none"), Part(2, "velocity"), Part(3, "acceleration"))
+        found.notes.append(REFITTED)
+    return revised(found, data, revolute, options, progress)
 
 
 def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
     """The three steps, each with the orders worth trying."""
-    first, second, third = _PARTS
+    first, second, third = PARTS
     return [
         StepPlan((first,), _orders(revolute, (first,), (0,), options), ("sign",), (1,)),
         StepPlan((second,), _orders(revolute, (second,), (1, 2), options), ("viscous", "stribeck"), (2,)),
@@ -79,8 +77,8 @@ def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
 
 
 def _together(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:
-    orders = _orders(revolute, _PARTS, (2,), options)
-    return [StepPlan(_PARTS, orders, ("sign", "viscous", "stribeck"), (1, 2, 3))]
+    orders = _orders(revolute, PARTS, (2,), options)
+    return [StepPlan(PARTS, orders, ("sign", "viscous", "stribeck"), (1, 2, 3))]
 
 
 def _orders(
