@@ -36,7 +36,8 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
 
     Where the log has no clean static or constant-velocity data, hard clusters would feed a step with
     what it must not see; then the three libraries are regressed together on all samples, their terms
-    still labelled by step, and a note says so.
+    still labelled by step, and a note says so. So they are where the steps leave more than noise
+    (:mod:`armloop.reconstruction.revision`).
 
     Raises:
         ExcitationError: a joint does not move, or a condition has too few samples.
