@@ -129,7 +129,8 @@ def test_the_next_run_names_what_is_there_and_has_no_such_alternatives(model, ca
     second = diagnose(model, [log(motion_of(made.reference), law, 13)])
     assert labels(second) == [truth]
     gone = {each.rival.label() for each in told} | {each.found.label() for each in told}
-    gone -= {"payload"}  # its five parameters still imitate a spring to a few per cent; it is not what is named
+    # its five parameters still imitate a spring to a few per cent; it is not what is named
+    gone -= {"payload"}
     assert not gone & {rival.label() for rival, _ in second.outcome.found[0].rivals}
 
 
