@@ -77,7 +77,7 @@ class Known:
         arm = evidence.model.arm
         if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
             return None
-        return trial
+        return trial if effect.resolved(trial.parameters[-1], shapes) else None
 
 
 def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:

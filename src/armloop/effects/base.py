@@ -155,6 +155,11 @@ class Effect(ABC):
         del arm, parameters
         return True
 
+    def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
+        """Whether the run can show the nonlinear parameter found; beyond what was tried it stands for another effect."""
+        del parameters, tried
+        return True
+
     @abstractmethod
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         """What was found, in words."""
@@ -281,6 +286,9 @@ class ProfiledJointEffect(Effect):
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return number(parameters[self.parameter].value) > 0
+
+    def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
+        return min(tried) <= number(parameters[self.shape_name].value) <= max(tried)
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         level, shape = parameters[self.parameter], parameters[self.shape_name]
