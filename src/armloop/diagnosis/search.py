@@ -79,6 +79,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
     explainable = np.maximum(energy_by_joint(nothing.fit) - rows_per_joint(nothing.fit), 1e-9)
     tell = paced(progress)
     found: list[Found] = []
+    seen: set[frozenset[tuple[str, int | None, int | None]]] = {frozenset()}
     while len(found) < _MOST_EFFECTS:
         best = _best(known, listed, explainable, tell)
         if best is None:
@@ -88,6 +89,11 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
         found = _exchanged(evidence, found, listed, explainable, progress)
         found = _at_one_blow(evidence, nothing, found, explainable, progress)
         known = _known(evidence, found)
+        # What is added may be taken back by an exchange: the same effects a second time are the end of it.
+        places = frozenset(f.effect.place for f in found)
+        if places in seen:
+            break
+        seen.add(places)
     return Outcome(found, nothing.fit, known.fit, nothing.residual)
 
 
