@@ -9,11 +9,13 @@ from armloop.components import RigidBody
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import fit
+from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Known
 from armloop.effects import effect, hypotheses
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
+from armloop.progress import silent
 from armloop.signals import condition
 
 
@@ -66,3 +68,21 @@ def test_a_load_on_an_upright_slide_is_no_torque_offset(mass):
     found = diagnose(model, [measured(motion, tau, 5, noise=0.002)]).outcome
     assert [f.effect.name for f in found.found] == ["payload"]
     assert found.added()[0].parameters["mass"].value == pytest.approx(mass, rel=0.05)
+
+
+def test_the_search_ends_where_what_is_added_is_taken_back(monkeypatch):
+    model = exact("three_axis")
+    motion = fourier_motion(40.0, 100.0, 3)
+    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + 2 * motion.v
+    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    asked = []
+
+    def taken_back(*of_search):
+        asked.append(of_search)
+        assert len(asked) < 3, "the search adds again and again what it has taken back"
+        return []
+
+    assert search(evidence, silent).found
+    monkeypatch.setattr("armloop.diagnosis.search._exchanged", taken_back)
+    assert search(evidence, silent).found == []
