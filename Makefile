@@ -10,6 +10,7 @@ BIN := $(VENV)/bin
 # Stamps, not the folder: each is touched only after its step has ended well.
 PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
+TESTING := $(VENV)/.testing
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
 .PHONY: setup loop test bench blind clean
@@ -36,20 +37,24 @@ $(INSTALLED): $(PACKAGES) pyproject.toml
 	@$(BIN)/pip install -qq --no-deps --no-build-isolation -e .
 	@touch $@
 
+$(TESTING): requirements-test.lock $(INSTALLED)
+	@grep '^[^#]' requirements-test.lock | xargs $(BIN)/pip install -qq --no-deps
+	@touch $@
+
 loop: setup
 	$(BIN)/armloop loop --out out/loop
 
-test: setup
+test: setup $(TESTING)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest $(PYTEST_ARGS)
 
-bench: setup
+bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
 
 # Whole loops with an effect hidden from a seed, and clean ones: how often the verdict is right (about ten minutes).
-blind: setup
+blind: setup $(TESTING)
 	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5
 	$(BIN)/python tests/blind/run.py --arms 20 --cases 16
 
