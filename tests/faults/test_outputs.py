@@ -211,7 +211,7 @@ def writer(path: str, force: bool = False, command: str = "reconstruct", reads: 
             write_json(path, {"schema": "armloop/model/1", "value": 1})
         else:
             write_text(
-                path, "<!doctype html><html><head></head></html>" if path.endswith("html") else "1,2\n"
+                path, "<!doctype html><html><head></head></html>" if path.endswith("html") else f"{command}\n"
             )
 
 
