@@ -20,7 +20,7 @@ LAYERS = (
     {"files", "functions", "motion", "progress", "resources", "workers"},
     {"blocks", "regression", "tables"},
     {"arm", "log"},
-    {"kinematics", "newton_euler", "pieces", "signals"},
+    {"convert", "kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},
     {"components", "effects", "sampling"},
     {"wave_table"},

@@ -18,6 +18,7 @@ from armloop.errors import InputError
 COMMANDS = (
     "loop",
     "collect",
+    "convert",
     "excite",
     "cluster",
     "reconstruct",
