@@ -21,7 +21,7 @@ LAYERS = (
     {"files"},
     {"blocks", "regression", "tables"},
     {"arm", "log"},
-    {"kinematics", "newton_euler", "pieces", "signals"},
+    {"convert", "kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},
     {"components", "effects", "sampling"},
     {"wave_table"},

@@ -23,6 +23,7 @@ from armloop.outputs import guarding
 COMMANDS = (
     "loop",
     "collect",
+    "convert",
     "excite",
     "cluster",
     "reconstruct",
