@@ -46,18 +46,17 @@ def _ridge(X: Array, y: Array, block: NDArray[np.intp], asked: Array) -> Array:
     G, b = [z.T @ z for z, _ in parts], [z.T @ t for z, t in parts]
 
     def solved(A: Array, c: Array, count: int, penalty: float) -> Array:
-        return np.linalg.solve(A + penalty * max(count, 1) * np.eye(len(A)), c)
+        return np.asarray(np.linalg.solve(A + penalty * max(count, 1) * np.eye(len(A)), c), dtype=float)
 
     errors = []
     for penalty in _PENALTIES:
         error = 0.0
         for k, (z, t) in enumerate(parts):
-            theta = solved(sum(G) - G[k], sum(b) - b[k], len(X) - len(z), penalty)
+            theta = solved(np.sum(G, axis=0) - G[k], np.sum(b, axis=0) - b[k], len(X) - len(z), penalty)
             error += float(np.sum((t - z @ theta) ** 2))
         errors.append(error)
-    theta = solved(sum(G), sum(b), len(X), _PENALTIES[int(np.argmin(errors))])
-    made = np.column_stack([(asked[:, used] - mean[used]) / scale[used], np.ones(len(asked))]) @ theta
-    return np.asarray(made, dtype=float)
+    theta = solved(np.sum(G, axis=0), np.sum(b, axis=0), len(X), _PENALTIES[int(np.argmin(errors))])
+    return np.column_stack([(asked[:, used] - mean[used]) / scale[used], np.ones(len(asked))]) @ theta
 
 
 def _trees(X: Array, y: Array, asked: Array) -> Array:
