@@ -33,7 +33,7 @@ class Parts:
         explained: by the model; zero for a model that is worse than none.
         predictable_left: of the residual, by a flexible regression on blocks left out.
         noise: the rest.
-        std_error: of ``predictable_left``, over blocks.
+        std_error: of ``predictable_left``, over blocks: how sure the line between it and the noise is.
         correlation_time: s that the residual remembers itself.
         separated: whether the blocks left out lie further apart than that.
     """
@@ -85,8 +85,11 @@ def _of_joint(joint: int, rows: JointRows) -> Parts:
     cut = split(rows.place, rows.run, memory)
     rest = residual - left_out(rows.X, residual, cut)
     removed = block_sums((residual**2 - rest**2)[judged], cut.block[judged])
+    blocks = block_sums((residual**2)[judged], cut.block[judged])
     predictable = float(np.clip(removed.sum(), 0.0, left))
-    error = float(np.sqrt(len(removed)) * removed.std(ddof=1)) if len(removed) > 1 else left
+    # of the part that is predictable, a ratio of sums over blocks (Cochran, Sampling Techniques, 1977, Ch. 6)
+    scatter = removed - predictable / max(left, 1e-300) * blocks
+    error = float(np.sqrt(len(removed) * np.mean(scatter**2))) if len(removed) > 1 else left
     return Parts(
         joint,
         1 - left / whole,
