@@ -38,7 +38,19 @@ _CHANCE = 1e-3
 #: A simpler law that removes so much of what the best one removes is as good.
 _AS_GOOD = 0.9
 #: Part of a law's column beside all that the model can say, below which it says nothing new.
-_NEW = 0.02
+_NEW = 2e-3
+#: Laws of a joint's friction: they are rungs of the friction ladder, which has had its say.
+_ON_THE_LADDER = (
+    "coulomb_friction",
+    "viscous_friction",
+    "stribeck_friction",
+    "friction_asymmetry",
+    "load_dependent_friction",
+    "quadratic_drag",
+    "presliding_hysteresis",
+)
+#: What comes and goes: the arm as it was trained carries what it carries.
+_OF_A_RUN = ("payload", "friction_drift")
 _MOST = 6
 
 
@@ -64,7 +76,11 @@ class Law:
 
     def to_dict(self) -> dict[str, object]:
         """JSON-ready values."""
-        names = {"effect": self.effect.name, "joint": self.effect.joint, "other_joint": self.effect.other_joint}
+        names = {
+            "effect": self.effect.name,
+            "joint": self.effect.joint,
+            "other_joint": self.effect.other_joint,
+        }
         return {**names, "removes": self.gain}
 
 
@@ -90,6 +106,14 @@ class Laws:
         if not self.chosen:
             return np.zeros((samples.motion.samples, n, 0))
         return smooth(samples, np.concatenate([law.columns for law in self.chosen], axis=2))
+
+    def constant_at(self, joints: int) -> list[int]:
+        """Joints (0-based) at which one of the columns is constant."""
+        found = []
+        for law in self.chosen:
+            constant = (np.ptp(law.columns, axis=0) == 0) & law.columns.any(axis=0)
+            found += [j for j in range(joints) if constant[j].any()]
+        return found
 
     def mass(self, arm: Arm, q: Array) -> Array:
         """(P, n, n, p) what each coefficient adds to M(q) at postures q (P, n)."""
@@ -142,12 +166,8 @@ class Laws:
 
 def permanent(arm: Arm) -> list[Effect]:
     """Laws that an arm may have had all along and that fit beside others as linear columns."""
-    found = []
-    for effect in hypotheses(arm):
-        if effect.memory or effect.name == "friction_drift":
-            continue
-        found.append(effect)
-    return found
+    left_out = (*_ON_THE_LADDER, *_OF_A_RUN)
+    return [effect for effect in hypotheses(arm) if effect.name not in left_out and not effect.memory]
 
 
 def search(
@@ -180,7 +200,9 @@ def search(
         most = max(trial.removed for _, _, trial in trials)
         as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
         effect, shape, trial = min(as_good, key=lambda one: (one[0].complexity, -one[2].removed))
-        progress(f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks")
+        progress(
+            f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
+        )
         chosen.append(Law(effect, shape, columns.raw(effect, shape), trial.share))
     return Laws(chosen, tried)
 

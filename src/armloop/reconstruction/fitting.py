@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.blocks import block_numbers
+from armloop.library.friction import FrictionTerm
 from armloop.motion import Samples
 from armloop.progress import Progress
 from armloop.reconstruction.catalogue import Law, Laws, pruned, search
@@ -70,9 +72,8 @@ class Fitting:
             self.load = load(theta) + laws.load(theta[self._own.shape[2] :][: laws.count])
             priors = {name: padded(prior, laws.count) for name, prior in self._priors.items()}
             self._progress("choosing each joint's friction anew beside the laws found")
-            ladder = climb(
-                self.arm, self.samples, self.columns, self.rows, self.load, self.options, priors
-            )
+            ladder = climb(self.arm, self.samples, self.columns, self.rows, self.load, self.options, priors)
+            ladder = without_offsets(ladder, laws.constant_at(self.arm.n))
             fewer = pruned(laws, self._bench(ladder), self.samples)
             if len(fewer.chosen) == len(laws.chosen):
                 break
@@ -157,6 +158,15 @@ class Fitting:
             return Projected(X, y, rows, (precision, toward), sayable * weight[:, None])
 
         return bench
+
+
+def without_offsets(ladder: Ladder, joints: Sequence[int]) -> Ladder:
+    """The ladder without the constant torque of joints (0-based) where a law brings one: the two cannot be told apart."""
+
+    def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
+        return [[t for t in own if j not in joints or t.kind != "offset"] for j, own in enumerate(terms)]
+
+    return replace(ladder, laws=rest(ladder.laws), candidates=rest(ladder.candidates))
 
 
 def padded(prior: Prior, more: int) -> Prior:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.components import Component
+from armloop.effects import Context
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.motion import Motion
@@ -58,5 +59,10 @@ class Found:
 
     def torque(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far."""
-        rigid = self.rigid(motion)
-        return rigid + self.law.torque(motion, load=rigid)
+        rigid = load = self.rigid(motion)
+        context = Context(self.arm, motion)
+        for added in self.effects:
+            torque = added.torque(context)
+            rigid = rigid + torque
+            load = load + torque if added.effect.load else load
+        return rigid + self.law.torque(motion, load=load)

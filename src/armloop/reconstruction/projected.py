@@ -152,7 +152,7 @@ class Projected:
         if s @ beta < worth * self._squares[joints].min():
             return None
         after, scores = [], []
-        for (fold, piece), z in zip(pieces, Z, strict=True):
+        for (_, piece), z in zip(pieces, Z, strict=True):
             partial = z - self._X[piece] @ give
             scores.append(partial * (self._rest[piece] - partial @ beta)[:, None])
         for fold, factor in enumerate(self._factors):
