@@ -25,6 +25,7 @@ COMMANDS = (
     "crossvalidate",
     "evaluate",
     "diagnose",
+    "export",
     "track",
     "tune",
     "reproduce",
