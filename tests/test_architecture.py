@@ -17,7 +17,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 LAYERS = (
     {"__init__"},
     {"errors"},
-    {"files", "functions", "motion", "progress", "resources", "workers"},
+    {"functions", "motion", "outputs", "progress", "resources", "workers"},
+    {"files"},
     {"blocks", "regression", "tables"},
     {"arm", "log"},
     {"convert", "kinematics", "newton_euler", "pieces", "signals"},
