@@ -38,11 +38,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Export."""
-    from pathlib import Path
-
     from armloop.arm import load_arm
     from armloop.commands.shared import out_file, out_folder, print_json, read_logs
-    from armloop.errors import InputError
     from armloop.export import export, states_of
     from armloop.model import load_model
     from armloop.signals import condition
@@ -51,8 +48,6 @@ def run(options: argparse.Namespace) -> None:
         out_folder(options.out)
     else:
         out_file(options.out, "--out")
-    if Path(options.out).resolve() == Path(options.model).resolve():
-        raise InputError(f"{options.out}: is the model itself; --out must name another file")
     model = load_model(options.model, load_arm(options.arm) if options.arm else None)
     motion = None
     if options.log:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import runpy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     tau = drake_torque(files[0], names, motion.q, motion.v, motion.vdot)
     tau -= _forces(program, presliding_elements(model), motion.q, motion.v)
     whole = whole_torque(model, motion)
-    expected = _smoothed(model, motion, smoothing)
+    expected = _smoothed(model, what, motion, smoothing)
     missing = [line for line in what.missing if line.startswith(("terms that", "no bodies"))]
     kinds = {t.kind for joint in model.friction.terms for t in joint}
     if "load_hysteresis" in kinds:
@@ -111,24 +112,24 @@ def _forces(program: dict[str, Any], elements: list[Any], q: Array, v: Array) ->
     return tau
 
 
-def _smoothed(model: ReconstructedModel, motion: Motion, smoothing: float) -> Array:
-    """(N, n) torques of the model with dry friction smoothed and the load without acceleration, but for what slid."""
-    smooth = ModelEquations(model, MATH, smoothing=smoothing)
+def _smoothed(model: ReconstructedModel, what: Said, motion: Motion, smoothing: float) -> Array:
+    """(N, n) torques of the bodies written and the rest of the model, dry friction smoothed but for what has slid.
+
+    The load that friction grows with is taken without acceleration.
+    """
+    whole = ModelEquations(model, MATH, smoothing=smoothing)
+    bodies = tuple(a for a in model.effects if a.effect.name in ("payload", "rotor_inertia"))
+    rigid = ModelEquations(replace(model, effects=bodies), MATH)
     elements = presliding_elements(model)
+    rows = what.torque(motion.q, motion.v, motion.vdot, frozenset())
     still = [0.0] * model.arm.n
-    rows = []
-    for q, v, vdot in zip(motion.q.tolist(), motion.v.tolist(), motion.vdot.tolist(), strict=True):
-        tau = [
-            x + y
-            for x, y in zip(
-                smooth.rigid(q, v, vdot), smooth.friction(v, smooth.load(q, v, still)), strict=True
-            )
-        ]
-        signs = [MATH.sign(x) - MATH.tanh(x / smoothing) for x in v]
+    for k, (q, v) in enumerate(zip(motion.q.tolist(), motion.v.tolist(), strict=True)):
+        rows[k] += whole.friction(v, whole.load(q, v, still))
+        rows[k] += np.subtract(whole.rigid(q, v, still), rigid.rigid(q, v, still))
         for e in elements:
-            tau[e.joint - 1] += e.level * signs[e.joint - 1]
-        rows.append(tau)
-    return np.array(rows)
+            x = v[e.joint - 1]
+            rows[k, e.joint - 1] += e.level * (MATH.sign(x) - MATH.tanh(x / smoothing))
+    return rows
 
 
 def _smoothing(model: ReconstructedModel, what: Said) -> float:

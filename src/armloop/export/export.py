@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from armloop.export.reading_c import CompiledTorque, compiler
 from armloop.export.rereading import NotInstalled, drake_torque, mujoco_torque
 from armloop.export.robot_xml import SDF_FEATURES, URDF_FEATURES, sdf_text, urdf_text
 from armloop.export.said import Said, random_motion, said
-from armloop.files import replacing
+from armloop.files import write_text
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion
 
@@ -64,24 +65,22 @@ def _described(model: ReconstructedModel, target: str, path: Path, motion: Motio
     names = [joint.name for joint in model.arm.joints]
     whole = whole_torque(model, motion)
     difference = unsaid = None
-    with replacing(path) as draft:
+    source = text(what)
+    with tempfile.TemporaryDirectory() as folder:
         # The consumers know a format by its name's end.
-        place = draft.with_suffix(_SUFFIX[target])
+        place = Path(folder) / f"arm{_SUFFIX[target]}"
+        place.write_text(source, encoding="utf-8")
         try:
-            place.write_text(text(what), encoding="utf-8")
             tau = read(place, names, motion.q, motion.v, motion.vdot)
-            difference = np.abs(tau - what.torque(motion.q, motion.v, motion.vdot, features)).max(axis=0)
-            unsaid = np.abs(tau - whole).max(axis=0)
         except NotInstalled as error:
             consumer = ""
             notes.append(str(error))
-        except RuntimeError as error:  # how Drake refuses a file
-            raise InputError(
-                f"{path}: {consumer} does not read it: {' '.join(str(error).split())}"
-            ) from error
-        finally:
-            if place.exists():
-                place.replace(draft)
+        except (RuntimeError, ValueError) as error:  # how Drake and MuJoCo refuse a file
+            raise ModelError(f"{consumer} does not read the {target} of this model: {error}") from error
+        else:
+            difference = np.abs(tau - what.torque(motion.q, motion.v, motion.vdot, features)).max(axis=0)
+            unsaid = np.abs(tau - whole).max(axis=0)
+    write_text(path, source)
     return Exported(target, [path], consumer, rms_of(whole), difference, unsaid, what.lost(features), notes)
 
 
@@ -90,21 +89,17 @@ def _as_c(model: ReconstructedModel, path: Path, motion: Motion) -> Exported:
     notes, missing = [], list(found.left_out)
     whole = whole_torque(model, motion)
     difference, consumer = None, ""
-    with replacing(path) as draft:
-        place = draft.with_suffix(".c")
-        place.write_text(source, encoding="utf-8")
-        try:
-            program = compiler()
-            if program is None:
-                notes.append(
-                    "no C compiler is at hand (cc, gcc or clang): the file was written, not compiled"
-                )
-            else:
-                consumer = Path(program).name
-                tau = CompiledTorque(place).torque(motion.q, motion.v, motion.vdot)
-                difference = np.abs(tau - whole).max(axis=0)
-        finally:
-            place.replace(draft)
+    program = compiler()
+    if program is None:
+        notes.append("no C compiler is at hand (cc, gcc or clang): the file was written, not compiled")
+    else:
+        consumer = Path(program).name
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder) / "arm.c"
+            place.write_text(source, encoding="utf-8")
+            tau = CompiledTorque(place).torque(motion.q, motion.v, motion.vdot)
+        difference = np.abs(tau - whole).max(axis=0)
+    write_text(path, source)
     if found.has_memory:
         notes.append(
             "armloop_torque_memory carries friction's memory along in a struct; armloop_torque has it fully slid"

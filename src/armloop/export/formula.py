@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from armloop.arm import Arm
 from armloop.dynamics import ModelEquations, effect_law
 from armloop.effects.base import number
 from armloop.effects.listed import EFFECTS
@@ -15,6 +18,7 @@ from armloop.model import AddedEffect, ReconstructedModel
 
 #: Later than any joint has cooled down: what is left of friction that fades.
 _LATE = 1e300
+_ROUNDING = 4e-16
 _MEMORY = ("hysteresis", "load_hysteresis")
 
 
@@ -57,6 +61,7 @@ def formula(model: ReconstructedModel) -> Formula:
         ModelError: an effect has no law of q, v and vdot.
     """
     n = model.arm.n
+    model = replace(model, arm=_exact_quarters(model.arm))
     graph = Graph(n)
     q = [graph.input(f"q[{j}]", j if model.arm.revolute[j] else None) for j in range(n)]
     v = [graph.input(f"v[{j}]") for j in range(n)]
@@ -88,6 +93,14 @@ def formula(model: ReconstructedModel) -> Formula:
         z = level * graph.input(f"z[{k}]")
         remembered[joint] = remembered[joint] + (z * abs(load[joint]) if by_load else z)
     return Formula(torque, remembered, stops, fades, left_out)
+
+
+def _exact_quarters(arm: Arm) -> Arm:
+    """The arm with what is zero but for the rounding of a quarter turn as zero: half of all products go with it."""
+    X_PF, axis = arm.X_PF.copy(), arm.axis.copy()
+    for values in (X_PF[:, :3, :3], axis):
+        values[np.abs(values) < _ROUNDING] = 0.0
+    return replace(arm, X_PF=X_PF, axis=axis)
 
 
 def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[AddedEffect], list[str]]:

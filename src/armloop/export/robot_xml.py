@@ -18,7 +18,7 @@ UNITS = (
     "(N), not a coefficient. rotor_inertia: the drive's, seen at the joint, kg*m^2 (kg)."
 )
 URDF_FEATURES = frozenset({"damping"})
-SDF_FEATURES = frozenset({"damping"})
+SDF_FEATURES = frozenset({"damping", "spring"})
 
 
 def urdf_text(said: Said) -> str:
@@ -79,7 +79,7 @@ def urdf_text(said: Said) -> str:
 
 
 def sdf_text(said: Said) -> str:
-    """The arm as SDFormat. Drake reads damping and its own tags for the rotors, and drops friction."""
+    """The arm as SDFormat. Drake reads damping, springs and its own tags for the rotors, and drops friction."""
     arm = said.arm
     lines = [
         '<?xml version="1.0"?>',

@@ -221,9 +221,8 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
 
 def _viscous(model: ReconstructedModel) -> Array:
     """The sums of the joints' viscous terms, which must not push."""
-    damping = np.array(
-        [sum(t.coefficient for t in terms if t.kind == "viscous") for terms in model.friction.terms]
-    )
+    viscous = [[t.coefficient for t in terms if t.kind == "viscous"] for terms in model.friction.terms]
+    damping = np.array([sum(found) for found in viscous], dtype=float)
     for added in model.effects:
         if added.effect.name == "viscous_friction" and added.effect.joint is not None:
             damping[added.effect.joint - 1] += number(added.parameters["coefficient"].value)
