@@ -17,8 +17,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 LAYERS = (
     {"__init__"},
     {"errors"},
-    {"files", "functions", "motion", "progress", "resources", "workers"},
-    {"blocks", "regression", "tables"},
+    {"files", "functions", "motion", "progress", "resources", "voices", "workers"},
+    {"blocks", "plausibility", "regression", "tables"},
     {"arm", "log"},
     {"kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},

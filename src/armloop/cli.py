@@ -13,6 +13,7 @@ from importlib import import_module
 
 from armloop import __version__
 from armloop.errors import InputError
+from armloop.voices import listening
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
 COMMANDS = (
@@ -41,8 +42,11 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status."""
     try:
-        options = build_parser().parse_args(arguments)
-        options.run(options)
+        with listening() as doubts:
+            options = build_parser().parse_args(arguments)
+            options.run(options)
+        for doubt in doubts:
+            print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
         print(f"armloop: {error}", file=sys.stderr)
         return 2
