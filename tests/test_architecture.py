@@ -17,10 +17,11 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 LAYERS = (
     {"__init__"},
     {"errors"},
-    {"files", "functions", "motion", "progress", "resources", "voices", "workers"},
+    {"functions", "motion", "outputs", "progress", "resources", "voices", "workers"},
+    {"files"},
     {"blocks", "plausibility", "regression", "tables"},
     {"arm", "log"},
-    {"kinematics", "newton_euler", "pieces", "signals"},
+    {"convert", "kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},
     {"components", "effects", "sampling"},
     {"wave_table"},

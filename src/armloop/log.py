@@ -151,7 +151,7 @@ class MotionLog:
             key: None if getattr(self, key) is None else getattr(self, key)[rows]
             for key in ("time", "q", "v", "tau", "vdot")
         }
-        return _unchecked(**cut, name=self.name, tau_unit=self.tau_unit, v_derived=self.v_derived)
+        return unchecked_log(**cut, name=self.name, tau_unit=self.tau_unit, v_derived=self.v_derived)
 
 
 def read_log(
@@ -191,13 +191,13 @@ def read_log(
     if derived:
         _check_time(time, str(path), lambda row: place(path, first + row))
         stacked["v"] = differentiated(time, stacked["q"], str(path))
-    log = _unchecked(time=time, **stacked, name=path.stem, tau_unit=tau_unit, v_derived=derived)
-    _check(log, str(path), lambda row: place(path, first + row))
+    log = unchecked_log(time=time, **stacked, name=path.stem, tau_unit=tau_unit, v_derived=derived)
+    check_log(path, log, first)
     if not quiet:
         _say_doubts(log, str(path))
     if gains is None:
         return log
-    return _unchecked(**{**vars(log), "tau": log.tau * gains, "tau_unit": "N*m"})
+    return unchecked_log(**{**vars(log), "tau": log.tau * gains, "tau_unit": "N*m"})
 
 
 def write_log(path: str | Path, log: MotionLog) -> None:
@@ -210,6 +210,15 @@ def write_log(path: str | Path, log: MotionLog) -> None:
         if values is not None and not (kind == "v" and log.v_derived):
             columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
     write_columns(Path(path), columns)
+
+
+def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
+    """Raise `LogError` unless the samples are a motion that an arm can have made.
+
+    path : where the samples come from, for the message
+    first : the row of the file that the first sample stands in, counted from 0
+    """
+    _check(log, str(path), lambda row: place(path, first + row))
 
 
 def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
@@ -324,8 +333,8 @@ def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
         raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]})") from error
 
 
-def _unchecked(**values: Any) -> MotionLog:
-    """A log of arrays that have been checked, or are part of a log."""
+def unchecked_log(**values: Any) -> MotionLog:
+    """A log of arrays that have been checked, are part of a log, or will be (`check_log`)."""
     log = object.__new__(MotionLog)
     for field in fields(MotionLog):
         object.__setattr__(log, field.name, values.get(field.name, field.default))

@@ -22,7 +22,7 @@ from armloop.components import COMPONENTS, Component
 from armloop.effects import Context, Effect, Estimate, effect
 from armloop.effects.base import Pointwise as EffectPointwise
 from armloop.errors import ArmError, ModelError
-from armloop.files import write_text
+from armloop.files import write_json
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
 from armloop.log import TAU_UNITS
@@ -240,7 +240,7 @@ class ReconstructedModel:
 
     def save(self, path: str | Path) -> None:
         """Write the model file (JSON), whole or not at all."""
-        write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
+        write_json(path, self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values with the schema version."""
