@@ -345,5 +345,5 @@ def test_measured_logs_are_read_as_they_are(measured: Path) -> None:
     for path in sorted(measured.glob("*/*.csv")):
         if path.name.endswith(".truth.csv"):
             continue
-        log = read_log(path, joints=joints.get(path.parent.name, 6))
+        log = read_log(path, joints=joints.get(path.parent.name, 6), quiet=True)
         assert log.runs() == [slice(0, log.samples)], path

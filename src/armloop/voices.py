@@ -18,7 +18,7 @@ _SAID: ContextVar[list[str] | None] = ContextVar("said", default=None)
 
 def warn(message: str) -> None:
     """Say something that is doubtful, in one line."""
-    warnings.warn(InputWarning(message), stacklevel=3)
+    warnings.warn(InputWarning(message), stacklevel=4)
 
 
 def said() -> list[str]:
