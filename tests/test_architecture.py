@@ -28,7 +28,7 @@ LAYERS = (
     {"wave_table"},
     {"pointwise"},
     {"model"},
-    {"dynamics", "scoring", "uncertainty"},
+    {"dynamics", "goodness", "scoring", "uncertainty"},
     {"design", "drake_systems", "reconstruction"},
     {"validation"},
     {"diagnosis"},

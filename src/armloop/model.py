@@ -89,7 +89,8 @@ class ReconstructedModel:
         conditioning: how the training logs were filtered; later logs are treated alike.
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
         baseline: what the model leaves on data of its own training runs that were not fitted:
-            ``rmse``, ``rms``, ``nrmse`` per joint, and ``worst``, the RMSE that one block in ten exceeds.
+            ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
+            the parts of the torque that are explained, predictable but not explained, and noise.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
