@@ -100,10 +100,10 @@ def main() -> None:
     )
 
 
-def _python(call, calls: int = 4000) -> float:
+def _python(call, calls: int = 500) -> float:
     call(0)
     best = np.inf
-    for _ in range(5):
+    for _ in range(20):
         begin = time.perf_counter()
         for k in range(calls):
             call(k % 256)
@@ -111,7 +111,7 @@ def _python(call, calls: int = 4000) -> float:
     return 1e9 * best
 
 
-def _compiled(program: str, source: str, states: list, flags: str, calls: int = 400_000) -> float:
+def _compiled(program: str, source: str, states: list, flags: str, calls: int = 4000) -> float:
     with tempfile.TemporaryDirectory() as folder:
         file, library = Path(folder) / "arm.c", Path(folder) / "arm.so"
         file.write_text(source + LOOP)
@@ -133,7 +133,7 @@ def _compiled(program: str, source: str, states: list, flags: str, calls: int = 
     bench.restype = ctypes.c_double
     pointer = ctypes.POINTER(ctypes.c_double)
     arguments = [x.ctypes.data_as(pointer) for x in states]
-    return min(bench(ctypes.c_long(calls), *arguments, ctypes.c_long(256)) for _ in range(5)) / calls
+    return min(bench(ctypes.c_long(calls), *arguments, ctypes.c_long(256)) for _ in range(300)) / calls
 
 
 if __name__ == "__main__":

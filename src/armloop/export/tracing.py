@@ -117,6 +117,8 @@ class Graph:
             return b
         if y == 0.0:
             return a
+        if b.key[0] == "-" and b.key[2] is a:  # c + (1 - c) of a rotation about a coordinate axis
+            return b.key[1]
         if b.key[0] == "*" and _value(b.key[1]) == -1.0:
             return self._made(("-", a, b.key[2]), _combined(a, b, 1))
         return self._made(("+", a, b), _combined(a, b, 1))
