@@ -1,6 +1,6 @@
 """The command line: parse, call.
 
-Exit status: 0 done; 2 the input is at fault, with one line on standard error.
+Exit status: 0 done; 2 the input is at fault, with one line on standard error; 3 `armloop watch` has a new alarm.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ COMMANDS = (
     "diagnose",
     "track",
     "tune",
+    "watch",
     "reproduce",
 )
 
@@ -42,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status."""
     try:
         options = build_parser().parse_args(arguments)
-        options.run(options)
+        status = options.run(options)
     except InputError as error:
         print(f"armloop: {error}", file=sys.stderr)
         return 2
@@ -53,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("armloop: interrupted", file=sys.stderr)
         return 130
-    return 0
+    return int(status or 0)
 
 
 def build_parser() -> argparse.ArgumentParser:

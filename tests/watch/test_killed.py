@@ -1,0 +1,99 @@
+"""kill -9 at any moment: the next call makes good what is missing, to the byte."""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from operation import contents
+
+from armloop.cli import main
+
+pytestmark = pytest.mark.slow
+
+KILLS = 20
+# Everything is imported before the parent is told, so that the kill falls into the work.
+CHILD = """
+import sys
+import armloop.commands.watch, armloop.watch, armloop.reports.watch_tables, pyarrow.parquet, scipy.signal
+from armloop.cli import main
+print("ready", flush=True)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory, fleet: Path) -> Path:
+    """One arm's logs, so that a call takes a second or two and has an alarm."""
+    root = tmp_path_factory.mktemp("small")
+    shutil.copytree(fleet / "logs" / "loaded", root / "logs" / "loaded")
+    shutil.copytree(fleet / "models", root / "models")
+    (root / "logs" / "loaded" / "broken.csv").write_text("time\n", encoding="utf-8")
+    return root
+
+
+def test_killed_at_random_moments(small: Path, tmp_path: Path) -> None:
+    rng = random.Random(0)
+    whole, broken = tmp_path / "whole", tmp_path / "broken"
+    words = ["--models", str(small / "models"), "--logs", str(small / "logs"), "--sums-only"]
+    began = time.monotonic()
+    assert main(["watch", *words, "--store", str(whole)]) == 3
+    takes = time.monotonic() - began
+    killed = 0
+    for _ in range(4 * KILLS):
+        child = subprocess.Popen(
+            [sys.executable, "-c", CHILD, "watch", *words, "--store", str(broken)],
+            stdout=subprocess.PIPE,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        )
+        assert child.stdout is not None and child.stdout.readline() == b"ready\n"
+        # most of a call is reading logs, of which each kill leaves fewer to do: aim at what is left
+        left = 1.0 - len(list(broken.glob("sums/*/*/*.parquet"))) / 40
+        time.sleep(rng.uniform(0.0, 0.25) * takes * max(left, 0.1))
+        if child.poll() is None:
+            child.send_signal(signal.SIGKILL)
+            killed += 1
+        child.wait()
+        child.stdout.close()
+        if killed == KILLS:
+            break
+        if child.returncode in (0, 3):  # it came to its end: begin again
+            shutil.rmtree(broken)
+    assert killed == KILLS, f"{killed} kills"
+    assert main(["watch", *words, "--store", str(broken)]) in (0, 3)
+    assert contents(broken) == contents(whole)
+
+
+def test_an_alarm_that_was_not_told_is_told_by_the_next_call(small: Path, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    words = [
+        "--models",
+        str(small / "models"),
+        "--logs",
+        str(small / "logs"),
+        "--sums-only",
+        "--store",
+        str(store),
+    ]
+    assert main(["watch", *words]) == 3
+    (store / "announced.json").unlink()
+    assert main(["watch", *words]) == 3
+    assert main(["watch", *words]) == 0
+
+
+def test_two_at_once_are_refused(small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import fcntl
+
+    from armloop.watch.store import Store
+
+    Store(tmp_path / "store")
+    with (tmp_path / "store" / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        words = ["--models", str(small / "models"), "--logs", str(small / "logs")]
+        assert main(["watch", *words, "--store", str(tmp_path / "store")]) == 2
+    assert "another armloop watch is at work" in capsys.readouterr().err
