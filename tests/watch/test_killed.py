@@ -1,9 +1,7 @@
 """kill -9 at any moment: the next call makes good what is missing, to the byte."""
 
 import os
-import random
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -17,13 +15,33 @@ from armloop.cli import main
 pytestmark = pytest.mark.slow
 
 KILLS = 20
-# Everything is imported before the parent is told, so that the kill falls into the work.
-CHILD = """
-import sys
+# Everything is imported once, and each call is a fork of that, so that the kill falls into the work. No thread may run
+# before a fork: that is why this is a process of its own.
+DRIVER = """
+import os, random, shutil, signal, sys, time
 import armloop.commands.watch, armloop.watch, armloop.reports.watch_tables, pyarrow.parquet, scipy.signal
+from pathlib import Path
 from armloop.cli import main
-print("ready", flush=True)
-sys.exit(main(sys.argv[1:]))
+
+kills, takes, store, words = int(sys.argv[1]), float(sys.argv[2]), Path(sys.argv[3]), sys.argv[4:]
+rng, killed = random.Random(0), 0
+for attempt in range(5 * kills):
+    child = os.fork()
+    if child == 0:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os._exit(main(["watch", *words, "--store", str(store)]))
+    # most of a call is reading logs, of which each kill leaves fewer to do: aim at what is left
+    left = 1.0 - len(list(store.glob("sums/*/*/*.parquet"))) / 40
+    time.sleep(rng.uniform(0.0, 0.3) * takes * max(left, 0.1))
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        killed += 1
+    else:  # it had come to its end: begin again
+        shutil.rmtree(store)
+    if killed == kills:
+        break
+print(killed)
 """
 
 
@@ -38,33 +56,20 @@ def small(tmp_path_factory: pytest.TempPathFactory, fleet: Path) -> Path:
 
 
 def test_killed_at_random_moments(small: Path, tmp_path: Path) -> None:
-    rng = random.Random(0)
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     words = ["--models", str(small / "models"), "--logs", str(small / "logs"), "--sums-only"]
     began = time.monotonic()
     assert main(["watch", *words, "--store", str(whole)]) == 3
     takes = time.monotonic() - began
-    killed = 0
-    for _ in range(4 * KILLS):
-        child = subprocess.Popen(
-            [sys.executable, "-c", CHILD, "watch", *words, "--store", str(broken)],
-            stdout=subprocess.PIPE,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        )
-        assert child.stdout is not None and child.stdout.readline() == b"ready\n"
-        # most of a call is reading logs, of which each kill leaves fewer to do: aim at what is left
-        left = 1.0 - len(list(broken.glob("sums/*/*/*.parquet"))) / 40
-        time.sleep(rng.uniform(0.0, 0.25) * takes * max(left, 0.1))
-        if child.poll() is None:
-            child.send_signal(signal.SIGKILL)
-            killed += 1
-        child.wait()
-        child.stdout.close()
-        if killed == KILLS:
-            break
-        if child.returncode in (0, 3):  # it came to its end: begin again
-            shutil.rmtree(broken)
-    assert killed == KILLS, f"{killed} kills"
+    done = subprocess.run(
+        [sys.executable, "-c", DRIVER, str(KILLS), str(takes), str(broken), *words],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
+    assert done.stdout.split() == [str(KILLS)], done.stderr
     assert main(["watch", *words, "--store", str(broken)]) in (0, 3)
     assert contents(broken) == contents(whole)
 
