@@ -116,8 +116,7 @@ def read_log(
     table = read_columns(path, names, rows)
     stacked = {kind: np.stack([table[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in quantities}
     log = MotionLog(table["time"], **stacked, name=path.stem, tau_unit=tau_unit)
-    _check_time(path, log.time, rows[0] if rows else 0)
-    _check_units(path, log)
+    check_log(path, log, rows[0] if rows else 0)
     if gains is None:
         return log
     return MotionLog(log.time, log.q, log.v, log.tau * gains, log.vdot, log.name, "N*m")
@@ -133,6 +132,16 @@ def write_log(path: str | Path, log: MotionLog) -> None:
         if values is not None:
             columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
     write_columns(Path(path), columns)
+
+
+def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
+    """Raise `LogError` unless the samples are a motion: time rises, and q, v and time are in SI units.
+
+    path : where the samples come from, for the message
+    first : the row of the file that the first sample stands in, counted from 0
+    """
+    _check_time(path, log.time, first)
+    _check_units(path, log)
 
 
 def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:

@@ -334,7 +334,7 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
     ),
     "NaN for a coefficient": (
         ("evaluate", model_with(lambda m: m["friction"][0][0].update(coefficient=float("nan"))), GOOD),
-        r"bad\.json: a coefficient is not a finite number",
+        r"bad\.json: NaN is not a finite number",
     ),
     "a model of another arm to evaluate": (
         ("evaluate", MODEL, GOOD, "--arm", "scara"),

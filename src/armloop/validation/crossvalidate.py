@@ -100,7 +100,7 @@ def crossvalidate(
     if leave_out not in LEAVE_OUT:
         raise InputError(f"unknown --leave-out {leave_out!r}; there are: {', '.join(LEAVE_OUT)}")
     splits = by_file(logs) if leave_out == "file" else by_blocks(logs, block_seconds)
-    options = replace(options or Options(), standard_errors=False)
+    options = replace(options or Options(), standard_errors=False, parts=False)
     errors: list[list[_Judged]] = [[] for _ in logs]
     results = []
     for number, split in enumerate(splits, 1):

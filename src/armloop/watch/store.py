@@ -16,6 +16,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import secrets
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.errors import InputError
-from armloop.files import replacing, write_text
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal
 from armloop.monitoring.sums import LogSums
@@ -65,7 +65,7 @@ class Store:
                 f"{self.folder}: is neither empty nor a store of armloop watch; name another folder"
             )
         else:
-            write_text(mark, json.dumps({"schema": SCHEMA}) + "\n")
+            _write(mark, json.dumps({"schema": SCHEMA}) + "\n")
 
     @contextmanager
     def locked(self, shared_drafts: bool = False) -> Iterator[None]:
@@ -118,14 +118,14 @@ class Store:
         about = {**about, "columns": [column.key for column in sums.columns]}
         written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
         path = self.folder / "sums" / _partition(arm) / f"day={day}" / f"{log}-{model}.parquet"
-        with replacing(path) as draft:
+        with _placing(path) as draft:
             pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
         for aside in self.folder.glob(f"aside/{log}-*.json"):
             aside.unlink(missing_ok=True)
 
     def set_aside(self, log: str, model: str, about: dict[str, Any]) -> None:
         """Remember why a log was not used."""
-        write_text(self.folder / "aside" / f"{log}-{model}.json", json.dumps(about, sort_keys=True) + "\n")
+        _write(self.folder / "aside" / f"{log}-{model}.json", json.dumps(about, sort_keys=True) + "\n")
 
     def aside(self) -> list[dict[str, Any]]:
         """What was set aside, in the order of the names."""
@@ -154,7 +154,7 @@ class Store:
     def set_tested(self, arm: str, answer: dict[str, Any]) -> None:
         """Keep what the tests of an arm came to."""
         path = self.folder / "tested" / f"{_partition(arm)}.json"
-        write_text(path, json.dumps(answer, sort_keys=True) + "\n")
+        _write(path, json.dumps(answer, sort_keys=True) + "\n")
 
     def alarm(self, arm: str, name: str) -> dict[str, Any] | None:
         """An alarm by its identifier."""
@@ -164,7 +164,7 @@ class Store:
     def add_alarm(self, arm: str, name: str, alarm: dict[str, Any]) -> None:
         """Keep an alarm."""
         path = self.folder / "alarms" / _partition(arm) / f"{name}.json"
-        write_text(path, json.dumps(alarm, sort_keys=True) + "\n")
+        _write(path, json.dumps(alarm, sort_keys=True) + "\n")
 
     def alarms(self) -> list[dict[str, Any]]:
         """All alarms, by time and arm."""
@@ -179,7 +179,7 @@ class Store:
     def announce(self, names: Sequence[str]) -> None:
         """Remember that alarms were told, after they were: a call killed before tells them again."""
         every = sorted(self.announced() | set(names))
-        write_text(self.folder / "announced.json", json.dumps({"alarms": every}) + "\n")
+        _write(self.folder / "announced.json", json.dumps({"alarms": every}) + "\n")
 
 
 class History:
@@ -258,6 +258,27 @@ class History:
             gram[k].T[upper] = packed
         units = np.asarray(index, dtype=np.intp)
         return Normal(gram, self.units.moment[units], self.units.energy[units].sum(axis=1))
+
+
+@contextmanager
+def _placing(path: Path) -> Iterator[Path]:
+    """A draft that takes its place when the block ends well.
+
+    All below a store is the store's own, and its bytes must not depend on the order of writing: the marks and records
+    by which :mod:`armloop.outputs` knows a command's outputs have no place here.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        yield draft
+        os.replace(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _write(path: Path, text: str) -> None:
+    with _placing(path) as draft:
+        draft.write_text(text, encoding="utf-8")
 
 
 def _partition(arm: str) -> str:
