@@ -17,10 +17,10 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 LAYERS = (
     {"__init__"},
     {"errors"},
-    {"functions", "motion", "outputs", "progress", "resources", "workers"},
+    {"functions", "motion", "outputs", "progress", "resources", "voices", "workers"},
     {"files", "reading"},
     {"schemas"},
-    {"blocks", "regression", "tables"},
+    {"blocks", "plausibility", "regression", "tables"},
     {"arm", "log"},
     {"convert", "kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},

@@ -151,8 +151,7 @@ class ReconstructedModel:
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
-        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
-        return Context(self.arm, motion, inertial, period)
+        return Context(self.arm, motion, inertial, motion.period)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
