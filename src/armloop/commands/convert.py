@@ -80,7 +80,6 @@ def run(options: argparse.Namespace) -> None:
     out_file(options.out, "--out")
     if out.suffix not in (".csv", ".parquet"):
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; --out must end in .parquet or .csv")
-    _spare(out, options.sources)
     mapping = read_map(options.map) if options.map else None
     answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)
     found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
@@ -107,9 +106,11 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     else:
         place = None
     if place is not None:
+        if place.exists() and not options.force:
+            raise InputError(
+                f"{place}: exists; --suggest writes a new map, give another name with --map, or add --force"
+            )
         out_file(str(place), "--map")
-        if place.exists():
-            raise InputError(f"{place}: exists; --suggest writes a new map, give another name with --map")
     recording = read_sources(options.sources[:1], arm, options.topic)[0]  # type: ignore[arg-type]
     mapping, unsure = suggested(recording, arm)  # type: ignore[arg-type]
     text = written(mapping, unsure, recording)
@@ -125,16 +126,6 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     print(
         f"wrote {place}; complete it, then: armloop convert {recording.path} --map {place} --out LOG.parquet"
     )
-
-
-def _spare(out: object, sources: list[str]) -> None:
-    from pathlib import Path
-
-    from armloop.errors import InputError
-
-    for source in sources:
-        if Path(source).resolve() == Path(str(out)).resolve():
-            raise InputError(f"{out}: is one of the sources; --out must name another file")
 
 
 def _answer(found: object, out: object) -> dict[str, object]:
