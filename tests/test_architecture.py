@@ -20,7 +20,7 @@ LAYERS = (
     {"functions", "motion", "outputs", "progress", "resources", "voices", "workers"},
     {"files", "reading"},
     {"schemas"},
-    {"blocks", "plausibility", "regression", "tables"},
+    {"blocks", "plausibility", "regression", "tables", "urdf"},
     {"arm", "log"},
     {"convert", "kinematics", "newton_euler", "pieces", "signals"},
     {"conditions", "excitation", "library"},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import ARM_HELP, add_json
+from armloop.commands.arguments import ARM_HELP, add_chain, add_json
 
 HELP = (
     "turn other programs' logs (ROS bags, RTDE, libfranka, LeRobot, .mat, .npz, any table) into a motion log"
@@ -27,6 +27,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--out", default=None, metavar="LOG", help="the log to write, .parquet or .csv")
     p.add_argument("--arm", default=None, help=f"match the joints by name with those of {ARM_HELP}")
+    add_chain(p)
     p.add_argument(
         "--map",
         default=None,
@@ -64,13 +65,12 @@ def run(options: argparse.Namespace) -> None:
     """Convert, or suggest a map."""
     from pathlib import Path
 
-    from armloop.arm import load_arm
-    from armloop.commands.shared import drive_gains, out_file, print_json
+    from armloop.commands.shared import arm_of, drive_gains, out_file, print_json
     from armloop.convert import Answers, convert, read_map
     from armloop.errors import InputError
     from armloop.tables import write_columns
 
-    arm = load_arm(options.arm) if options.arm else None
+    arm = arm_of(options) if options.arm else None
     if options.suggest:
         _suggest(options, arm)
         return
