@@ -18,6 +18,7 @@ from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
+from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
@@ -103,7 +104,8 @@ def reconstruct(
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
         library: one of :data:`LIBRARIES`; by default what suits the number of joints, or rigid-body where the double
             feature set turns out to be much worse (:mod:`armloop.reconstruction.rival`) and no option speaks of it.
-        conditioning: filter; by default what suits the library.
+        conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
+            (:mod:`armloop.reconstruction.bandwidth`).
         recorded: how the logs recorded the torque, kept in the model for later logs.
         workers: who passes over logs that are not kept in memory; by default this process.
         in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
@@ -111,7 +113,8 @@ def reconstruct(
             the other libraries read everything.
 
     Raises:
-        InputError: logs that do not fit the arm, an unknown method or friction law, or too little excitation.
+        InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
+            or too little excitation.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
@@ -136,15 +139,26 @@ def reconstruct(
     kept = [] if large and method == "stepwise" else [log.read() for log in logs]
     require_different(kept)
 
+    if conditioning is None:
+        progress("choosing the low-pass on held-out blocks")
+        bandwidth = choose_bandwidth(kept or logs, arm, Conditioning())
+    else:
+        bandwidth = Bandwidth(conditioning.cutoff_hz)
+        check_nyquist(kept or logs, conditioning.cutoff_hz)
+
     def attempt(library: str) -> Attempt:
-        how = conditioning or default_conditioning(library)
+        how = conditioning or bandwidth.suited(default_conditioning(library))
         progress(f"conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if large and method == "stepwise" and library == "double-feature-set":
             data = Data.streamed(logs, how, options, workers)
         else:
             data = Data.of(condition(kept or [log.read() for log in logs], how), options)
         check_recorded(arm, data.reference.samples)
-        return Attempt(library, how, data, _found(arm, data, method, library, options, progress))
+        found = _found(arm, data, method, library, options, progress)
+        if bandwidth.trials:
+            found.history["bandwidth"] = bandwidth.to_dict()
+        found.notes += bandwidth.notes()
+        return Attempt(library, how, data, found)
 
     tried = attempt(library)
     if not asked and method == "stepwise" and tried.may_have_rival:
