@@ -1,23 +1,30 @@
 """The command line: parse, call.
 
-Exit status: 0 done; 2 the input is at fault, with one line on standard error.
+Exit status: 0 done; 2 the input is at fault; 1 something else is (memory, a process killed); 130 Ctrl-C; 143 SIGTERM;
+with one line on standard error.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 
 from armloop import __version__
 from armloop.errors import InputError
+from armloop.outputs import guarding
+from armloop.voices import listening
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
 COMMANDS = (
     "loop",
     "collect",
+    "convert",
     "excite",
     "cluster",
     "reconstruct",
@@ -38,22 +45,86 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(f"{command + ': ' if command else ''}{message}; see {self.prog} --help")
 
 
+class _Ended(BaseException):
+    """The process was asked to end (SIGTERM); not an Exception, so that nothing takes it for a fault."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a name that the terminal's encoding lacks is spelt out
+            stream.reconfigure(errors="backslashreplace")
     try:
-        options = build_parser().parse_args(arguments)
-        options.run(options)
+        with listening() as doubts, _ending_on_request():
+            options = build_parser().parse_args(arguments)
+            with guarding(options.command, _named_files(options), options.force):
+                options.run(options)
+        for doubt in doubts:
+            print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
-        print(f"armloop: {error}", file=sys.stderr)
-        return 2
+        return _fault(str(error), 2)
     except BrokenPipeError:
         # Whoever read the answer (head, a pager) has had enough; Python would complain again at its exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename is not None else ""
+        return _fault(f"{place}{error.strerror or error}; check that it is there and may be used", 2)
+    except MemoryError:
+        return _fault("not enough memory for this; give shorter logs, fewer terms or a lower order", 1)
+    except RuntimeError as error:
+        if type(error).__name__ != "BrokenProcessPool":
+            raise
+        return _fault("a worker process was ended from outside, perhaps for want of memory; run again", 1)
     except KeyboardInterrupt:
-        print("armloop: interrupted", file=sys.stderr)
-        return 130
+        return _fault("interrupted", 130)
+    except _Ended:
+        return _fault("ended on request (SIGTERM)", 143)
     return 0
+
+
+def _fault(message: str, status: int) -> int:
+    print(f"armloop: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
+@contextmanager
+def _ending_on_request() -> Iterator[None]:
+    """Take SIGTERM for an exception, so that drafts are removed and worker processes end."""
+
+    def end(*_: object) -> None:
+        raise _Ended
+
+    try:
+        before = signal.signal(signal.SIGTERM, end)
+    except ValueError:  # not the main thread: signals are somebody else's
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+#: Options that name what is written; every other file on a command line is read.
+_WRITTEN = {"out", "report", "next_run", "store"}
+
+
+def _named_files(options: argparse.Namespace) -> list[str]:
+    """Files that the command line names as inputs: LOG, NAME=MODEL.json, FILE:NAME."""
+    found = []
+    for name, value in vars(options).items():
+        for each in value if isinstance(value, list) else [value]:
+            if name not in _WRITTEN and isinstance(each, str):
+                found += [part for part in (each, each.partition("=")[2], each.rpartition(":")[0]) if part]
+    return [path for path in found if _is_file(path)]
+
+
+def _is_file(path: str) -> bool:
+    try:
+        return os.path.isfile(path)
+    except ValueError:  # a zero byte
+        return False
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -75,6 +146,11 @@ def build_parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         command.arguments(p)
+        p.add_argument(
+            "--force",
+            action="store_true",
+            help="replace files that are read, or that this command has not written",
+        )
         p.set_defaults(run=command.run)
     return parser
 

@@ -6,10 +6,15 @@ for any number of workers.
 
 from __future__ import annotations
 
+import ctypes
+import logging
 import os
+import re
+import signal
+import socket
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
 from functools import reduce
 from multiprocessing import get_context
 from operator import add
@@ -22,6 +27,8 @@ Answer = TypeVar("Answer")
 
 #: Seconds that a scheduler has to answer.
 PATIENCE = 10.0
+#: Seconds that a connection to it may take.
+_CONNECTED = 3.0
 #: Chunks handed to each worker of a cluster ahead of what has been taken back, so that answers do not pile up.
 _AHEAD = 4
 
@@ -54,6 +61,57 @@ class Serial:
         pass
 
 
+class Pool(ProcessPoolExecutor):
+    """Forked processes with one BLAS thread each that end with the process that made them, however it ends.
+
+    An exception in the ``with`` block, Ctrl-C among them, does not wait for what the processes are at.
+
+    Args:
+        jobs: how many.
+        prepare, arguments: called in each process when it begins; inherited, so they need not be picklable.
+    """
+
+    def __init__(
+        self, jobs: int, prepare: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
+    ) -> None:
+        super().__init__(
+            jobs, get_context("fork"), initializer=_begin, initargs=(os.getpid(), prepare, arguments)
+        )
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        # The first task forks the processes: until they ignore Ctrl-C themselves, it has to wait.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        try:
+            return super().submit(function, *arguments, **named)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        if kind is not None:
+            for process in list((self._processes or {}).values()):
+                process.kill()
+        self.shutdown(wait=True, cancel_futures=kind is not None)
+
+
+def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    # Ctrl-C reaches every process of a terminal; the parent answers it, and ends these.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    _die_with(parent)
+    _one_thread()
+    if prepare is not None:
+        prepare(*arguments)
+
+
+def _die_with(parent: int) -> None:
+    """Be killed when the parent ends, even by SIGKILL (Linux: prctl PR_SET_PDEATHSIG)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+    if os.getppid() != parent:  # it has ended before it could be said
+        os._exit(1)
+
+
 class Processes:
     """In forked processes, one BLAS thread each; they inherit function and chunks, only answers are copied.
 
@@ -70,7 +128,7 @@ class Processes:
             yield from map(function, chunks)
             return
         with _inherited(function, chunks) as key:
-            with ProcessPoolExecutor(jobs, get_context("fork"), _one_thread) as pool:
+            with Pool(jobs) as pool:
                 yield from pool.map(_call, [key] * len(chunks), range(len(chunks)))
 
     def close(self) -> None:
@@ -94,12 +152,17 @@ class Cluster:
             raise InputError(
                 "--scheduler needs Dask, which is not installed; install the extra: armloop[dask]"
             ) from error
+        _somebody_listens(address)
         try:
-            self.client = Client(address, timeout=PATIENCE, set_as_default=False)
+            with _quiet("distributed"):
+                self.client = Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(_nobody(address)) from error
+        if not self.client.scheduler_info()["workers"]:
+            self.client.close()
             raise InputError(
-                f"--scheduler {address}: no Dask scheduler answers there; give an address like tcp://10.0.0.7:8786"
-            ) from error
+                f"--scheduler {address}: the scheduler has no workers; start `dask worker {address}`"
+            )
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         most = _AHEAD * max(1, len(self.client.scheduler_info()["workers"]))
@@ -115,6 +178,36 @@ class Cluster:
 
     def close(self) -> None:
         self.client.close()
+
+
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(\[[0-9a-fA-F:.]+\]|[^/:\s]+):(\d{1,5})")
+
+
+def _nobody(address: str) -> str:
+    return f"--scheduler {address}: no Dask scheduler answers there; give an address like tcp://10.0.0.7:8786"
+
+
+def _somebody_listens(address: str) -> None:
+    """Refuse what is no address, and one at which nothing listens, at once: Dask would try for twice its patience."""
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found[2]) < 1 << 16:
+        raise InputError(_nobody(address))
+    try:
+        socket.create_connection((found[1].strip("[]"), int(found[2])), _CONNECTED).close()
+    except (OSError, UnicodeError) as error:
+        raise InputError(_nobody(address)) from error
+
+
+@contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """Keep a library from logging below errors: what goes wrong is told by our own line."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:

@@ -48,7 +48,7 @@ def drake_plant(arm, time_step=0.0):
 
 
 def moved(plant, port, start, source, seconds, output="state"):
-    """States (N, 2n), every 20 ms, of a plant that a source drives from a state."""
+    """States (N, 2n), every 20 ms and at the end, of a plant that a source drives from a state."""
     builder = DiagramBuilder()
     builder.AddSystem(plant)
     builder.AddSystem(source)
@@ -59,7 +59,9 @@ def moved(plant, port, start, source, seconds, output="state"):
     start(plant.GetMyMutableContextFromRoot(context))
     simulator.get_mutable_integrator().set_target_accuracy(1e-6)
     simulator.AdvanceTo(seconds)
-    return log.FindLog(context).data().T
+    end = plant.GetOutputPort(output).Eval(plant.GetMyContextFromRoot(context))
+    # An end that lies a rounding error before a multiple of 20 ms has no sample of its own.
+    return np.vstack([log.FindLog(context).data().T, end])
 
 
 def at_rest(context):
@@ -137,7 +139,28 @@ def test_a_trajectory_is_planned_with_the_identified_model():
         program.SetInitialGuess(plan.input(k), Dynamics(model).gravity(Q0 + part * (goal - Q0)))
     result = Solve(program)
     assert result.is_success()
-    tau = plan.ReconstructInputTrajectory(result)
+    found = result.GetSolution(program.decision_variables())
+    # A local minimum, whichever of them it is: solved again from itself, it stays.
+    again = Solve(program, found)
+    assert again.is_success()
+    assert_allclose(again.get_optimal_cost(), result.get_optimal_cost(), rtol=1e-6)
+    tau, x = plan.ReconstructInputTrajectory(result), plan.ReconstructStateTrajectory(result)
+    # The solver keeps constraints to 1e-6 of the size of what it solves for.
+    kept = 1e-6 * np.linalg.norm(found)
+    assert_allclose(x.value(0.0).ravel(), np.r_[Q0, np.zeros(3)], atol=kept)
+    assert_allclose(x.value(x.end_time()).ravel(), np.r_[goal, np.zeros(3)], atol=kept)
+    # Knots and midpoints are where collocation asks for the dynamics; Drake's own plant is asked about them.
+    own = drake_plant(ARM)
+    context = own.CreateDefaultContext()
+    for t in np.linspace(0.0, x.end_time(), 2 * N - 1):
+        q, v = np.split(x.value(t).ravel(), 2)
+        qdot, vdot = np.split(x.EvalDerivative(t).ravel(), 2)
+        own.SetPositionsAndVelocities(context, np.r_[q, v])
+        forces = own.CalcGravityGeneralizedForces(context) - own.CalcBiasTerm(context) - 2.65 * v
+        assert np.abs(tau.value(t)).max() <= 20.0 + kept
+        assert_allclose(qdot, v, atol=kept)
+        M = own.CalcMassMatrix(context)
+        assert_allclose(vdot, np.linalg.solve(M, tau.value(t).ravel() + forces), atol=kept)
     plant = ArmPlant(ARM, [JointFriction(viscous=2.65)] * 3)
     states = moved(
         plant,

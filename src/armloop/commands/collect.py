@@ -28,8 +28,9 @@ def run(options: argparse.Namespace) -> None:
     from armloop.commands.shared import out_folder, progress
     from armloop.log import write_log
     from armloop.loop import collect_logs
+    from armloop.sampling import CONDITIONS
 
-    folder = out_folder(options.out)
+    folder = out_folder(options.out, (f"{name}.csv" for name in CONDITIONS))
     logs = collect_logs(options.arm, options.plan, options.seed, progress(options))
     for name, log in logs.items():
         write_log(folder / f"{name}.csv", log)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from armloop.commands.arguments import add_json, add_logs, add_recorded
 from armloop.commands.next_run import add_next_run
@@ -39,13 +38,13 @@ def run(options: argparse.Namespace) -> None:
     from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
     from armloop.diagnosis import close
     from armloop.diagnosis import diagnose as run
-    from armloop.files import write_text
+    from armloop.files import write_json, write_text
     from armloop.reports.diagnosis_report import diagnosis_report
     from armloop.reports.diagnosis_tables import diagnosis_table
 
-    folder = out_folder(options.out)
+    folder = out_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
     model, logs = model_and_logs(options)
-    apart = held_out_logs(options, model)
+    apart = held_out_logs(options, model, logs)
     wanted = wish(options, model)
     result = run(model, logs, progress(options))
     closing = close(model, result.model, result.samples, apart)
@@ -54,7 +53,7 @@ def run(options: argparse.Namespace) -> None:
     if planned is not None:
         answer["next_run"] = planned.to_dict()
     page = diagnosis_report(result, model, [log.name for log in logs], closing)
-    write_text(folder / "diagnosis.json", json.dumps(answer, indent=1) + "\n")
+    write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)
     if planned is not None:

@@ -23,7 +23,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the whole loop."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.loop import run_loop
+    from armloop.loop import LOOP_FILES, run_loop
 
-    folder = out_folder(options.out)
+    folder = out_folder(options.out, LOOP_FILES)
     run_loop(folder, options.seed, progress(options))

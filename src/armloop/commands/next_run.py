@@ -54,10 +54,12 @@ def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
     out_file(options.next_run, "--next-run")
     if not options.next_run.endswith((CSV, PARQUET)):
         raise InputError(f"--next-run {options.next_run}: a reference ends in {CSV} or {PARQUET}")
+    duration = 60.0 if options.next_run_duration is None else options.next_run_duration
     known = training_ranges(model)
     ranges = read_ranges(options, model.arm, "urdf", known) if ranges_stated(options) else known
-    duration = 60.0 if options.next_run_duration is None else options.next_run_duration
-    return Wish(ranges, options.reserve, duration)
+    wanted = Wish(ranges, options.reserve, duration)
+    wanted.check(model)
+    return wanted
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +77,16 @@ class Planned:
         return {"reference": self.path, **self.run.to_dict()}
 
     def write(self) -> None:
-        """Write the reference, if there is one; raise ``InputError`` if none was possible."""
-        from armloop.errors import InputError
+        """Write the reference, if there is one."""
         from armloop.excitation import write_reference
 
-        if self.fault:
-            raise InputError(f"--next-run {self.path}: {self.fault}")
         if self.run is not None:
             write_reference(self.path, self.run.reference, _RATE)
 
     def words(self) -> str:
         """What the motion is for, for a terminal."""
+        if self.fault:
+            return f"No motion to make next with what was found: {self.fault}."
         return _NOTHING if self.run is None else _words(self.path, self.run)
 
 

@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
-    from armloop.reports.tables import formulas, score_table, steps_table
+    from armloop.reports.tables import formulas, parts_table, score_table, steps_table
     from armloop.signals import Conditioning
     from armloop.workers import Cluster, Processes
 
@@ -145,6 +145,8 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})
         return
+    for warning in result.warnings:
+        print(f"WARNING: {warning}")
     print(steps_table(result.reports))
     print()
     print(formulas(result.model), *result.model.legend(), sep="\n")
@@ -156,6 +158,7 @@ def run(options: argparse.Namespace) -> None:
             print(table, end="\n\n") if table else None
         print(NOTE, end="\n\n")
     print(score_table(result.held_out, arm))
+    print(parts_table(result.parts, arm))
     for note in result.notes:
         print(f"note: {note}")
     print(f"model written to {options.out}")

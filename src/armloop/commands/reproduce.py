@@ -28,19 +28,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the items, print and write what they come to."""
-    import json
     import time
 
     from armloop.commands.shared import out_folder, print_json, progress
     from armloop.errors import InputError
-    from armloop.files import write_text
+    from armloop.files import write_json, write_text
     from armloop.reports.reproduction_report import reproduction_report, terminal_text
     from armloop.reproduction import Context, chosen, run_item
 
     names = chosen(options.items)
     if not 1 <= options.draws <= 1000:
         raise InputError(f"--draws {options.draws}: give a number of draws from 1 to 1000")
-    folder = out_folder(options.out)
+    folder = out_folder(options.out, ("reproduction.json", "report.html"))
     tell = progress(options)
     context = Context(draws=options.draws, progress=tell)
     answer, seconds, entries = {}, {}, []
@@ -53,7 +52,7 @@ def run(options: argparse.Namespace) -> None:
         entries.append((name, outcome.headline, outcome.verdict, outcome.section))
         if not options.json:
             print(terminal_text(name, outcome.section, outcome.verdict, seconds[name]), flush=True)
-    write_text(folder / "reproduction.json", json.dumps(answer, indent=1) + "\n")
+    write_json(folder / "reproduction.json", answer)
     write_text(folder / "report.html", reproduction_report(entries, seconds))
     if options.json:
         print_json(answer)

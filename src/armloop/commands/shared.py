@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,13 @@ import numpy as np
 
 from armloop.arm import Arm, load_arm
 from armloop.errors import InputError, ModelError
-from armloop.log import MotionLog, read_log
+from armloop.files import strict
+from armloop.log import MotionLog, read_log, same_measurement
 from armloop.model import ReconstructedModel, load_model
+from armloop.outputs import take_file, take_folder
 from armloop.progress import Progress, silent
 from armloop.signals import condition
+from armloop.voices import said
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -28,30 +30,18 @@ def progress(options: argparse.Namespace) -> Progress:
 
 
 def print_json(value: Any) -> None:
-    """Print the answer of ``--json``."""
-    print(json.dumps(value))
+    """Print the answer of ``--json``, strict JSON, with what is doubtful about the input as ``warnings``."""
+    print(strict({**value, "warnings": said()} if said() else value))
 
 
-def out_folder(path: str) -> Path:
-    """The output folder, checked before any work is done; it is made when the first file is written."""
-    folder = Path(path)
-    existing = folder
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir():
-        raise InputError(f"{existing}: is a file; --out must name a folder")
-    if not os.access(existing, os.W_OK):
-        raise InputError(f"{existing}: cannot be written to; choose another folder for --out")
-    return folder
+def out_folder(path: str, names: Iterable[str] = ()) -> Path:
+    """The output folder with the files that will go into it; see :func:`armloop.outputs.take_folder`."""
+    return take_folder(path, names)
 
 
 def out_file(path: str | None, option: str) -> None:
-    """Check the place of an output file before any work is done."""
-    if path is None:
-        return
-    if Path(path).is_dir():
-        raise InputError(f"{path}: is a folder; {option} must name a file")
-    out_folder(str(Path(path).parent))
+    """Check the place of an output file before any work is done; see :func:`armloop.outputs.take_file`."""
+    take_file(path, option)
 
 
 def drive_gains(text: str | None) -> list[float] | None:
@@ -103,15 +93,18 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
     return model, read_logs(options.logs, model.arm.n, recorded)
 
 
-def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> list[MotionLog]:
+def held_out_logs(
+    options: argparse.Namespace, model: ReconstructedModel, fitted: list[MotionLog]
+) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
-    fitted = {Path(path).resolve() for path in options.logs}
-    for path in options.held_out:
-        if Path(path).resolve() in fitted:
-            raise InputError(
-                f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted"
-            )
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    for path, log in zip(options.held_out, logs, strict=True):
+        for other in fitted:
+            if same_measurement(log, other):
+                raise InputError(
+                    f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
+                    "--held-out takes runs that are not fitted"
+                )
     for log in logs:
         condition([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

@@ -18,6 +18,17 @@ EXAMPLE = (
     "armloop track three_axis_tracking --model step1=model.json --model step3=model.json --out out/track"
 )
 
+#: What any kind of scenario writes.
+_FILES = (
+    "tracking.json",
+    "tracking.png",
+    "replay.html",
+    "spread.png",
+    "diagnosis.json",
+    "augmented.json",
+    "since_the_grasp.csv",
+    "model.json",
+)
 _PATIENCE = 30.0  # s that are waited for a browser
 
 
@@ -68,7 +79,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.model import load_model
     from armloop.resources import find_scenario
 
-    folder = out_folder(options.out) if options.out else None
+    folder = out_folder(options.out, _FILES) if options.out else None
     find_scenario(options.scenario)
     if options.rate is not None and not options.meshcat:
         raise InputError("--rate is the pace of --meshcat; give both, or leave it out")

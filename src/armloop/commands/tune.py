@@ -39,7 +39,9 @@ def run(options: argparse.Namespace) -> None:
     from armloop.commands.shared import out_folder, print_json, progress
     from armloop.resources import find_scenario
 
-    folder = out_folder(options.out) if options.out else None
+    folder = (
+        out_folder(options.out, ("tune.json", "report.html", "bode.png", "step.png")) if options.out else None
+    )
     find_scenario(options.scenario)  # before Drake is imported
     from armloop.drake_systems.scenarios import load_tracking
     from armloop.loop import tune_scenario

@@ -21,16 +21,12 @@ from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_ranges
 from armloop.diagnosis.rivals import Law, found_laws, lookalikes, pairs
 from armloop.effects import Effect
-from armloop.errors import InputError
 from armloop.excitation import FourierReference
 from armloop.progress import Progress, silent
 
 __all__ = ["FAR_ENOUGH", "NextRun", "Told", "Wish", "next_run", "training_ranges"]
 
 Array = NDArray[np.float64]
-
-#: s that a diagnosis needs at least.
-_SHORTEST, _LONGEST = 12.0, 3600.0
 
 
 @dataclass(frozen=True)
@@ -95,12 +91,7 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
         InputError: a choice is out of range, or the limits exclude any motion.
     """
     wish = wish or Wish()
-    if not _SHORTEST <= wish.duration <= _LONGEST:
-        raise InputError(
-            f"next run of {wish.duration:g} s: a diagnosis needs {_SHORTEST:g} s; give up to {_LONGEST:g}"
-        )
-    if not 0 <= wish.reserve < 1:
-        raise InputError(f"reserve {wish.reserve:g}: give a part of the effort limits, from 0 to below 1")
+    wish.check()
     if not diagnosis.outcome.found and diagnosis.unlisted is None:
         return None
     planner = Planner.of(diagnosis, wish, progress)

@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 
 #: s of a period, repeated, and its harmonics: up to 0.4 Hz.
 PERIOD, _HARMONICS = 20.0, 8
+#: s that a diagnosis needs at least, and that an arm is asked to move at most.
+_SHORTEST, _LONGEST = 12.0, 3600.0
 #: Random motions that show what is possible within the limits, and s between their samples.
 _TYPICAL, _STEP = 8, 0.05
 #: Of those, motions on which it is judged whether two effects can be told apart at all.
@@ -70,10 +72,33 @@ class Wish:
     starts: int | None = None
     seed: int = 0
 
+    def check(self, model: ReconstructedModel | None = None) -> None:
+        """Raise ``InputError`` where a choice is out of range or, with ``model``, where it leaves no motion."""
+        if not _SHORTEST <= self.duration <= _LONGEST:
+            raise InputError(
+                f"next run of {self.duration:g} s: a diagnosis needs {_SHORTEST:g} s; give up to {_LONGEST:g}"
+            )
+        if not 0 <= self.reserve < 1:
+            raise InputError(f"reserve {self.reserve:g}: give a part of the effort limits, from 0 to below 1")
+        if model is not None:
+            _typical(model, self)
+
     @property
     def whole_duration(self) -> float:
         """Length of the motion, s: whole periods."""
         return PERIOD * float(np.ceil(self.duration / PERIOD - 1e-9))
+
+
+def _typical(model: ReconstructedModel, wish: Wish) -> tuple[Limits, list[FourierReference]]:
+    """The limits of the motion, and random motions within them; raises ``InputError`` where there are none."""
+    ranges = wish.ranges or training_ranges(model)
+    effort = (1 - wish.reserve) * np.array([joint.effort for joint in model.arm.joints])
+    limits = Limits(ranges, effort, lambda motion: model.predict(motion, sensors=False))
+    check_rest(model.arm, limits)
+    drawn = random_references(limits, PERIOD, _TYPICAL, wish.seed)
+    if not drawn:
+        raise InputError(f"{model.arm.name}: hardly any motion keeps within the effort limits; widen them")
+    return limits, drawn
 
 
 def training_ranges(model: ReconstructedModel) -> MotionRanges:
@@ -116,15 +141,7 @@ class Planner:
     def of(diagnosis: Diagnosis, wish: Wish, progress: Progress) -> Planner:
         """Draw the typical motions; raises ``InputError`` where the limits exclude any motion."""
         model = diagnosis.model
-        ranges = wish.ranges or training_ranges(model)
-        effort = (1 - wish.reserve) * np.array([joint.effort for joint in model.arm.joints])
-        limits = Limits(ranges, effort, lambda motion: model.predict(motion, sensors=False))
-        check_rest(model.arm, limits)
-        drawn = random_references(limits, PERIOD, _TYPICAL, wish.seed)
-        if not drawn:
-            raise InputError(
-                f"{model.arm.name}: hardly any motion keeps within the effort limits; widen them"
-            )
+        limits, drawn = _typical(model, wish)
         evidence = diagnosis.evidence
         # in their whole length, over which friction may drift
         whole = [replace(each, duration=wish.whole_duration) for each in drawn[:_STAGES]]

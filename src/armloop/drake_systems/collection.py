@@ -6,7 +6,6 @@ segments the arm is put to the next start instead of being driven there: nothing
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -28,6 +27,7 @@ from armloop.excitation import (
     static_segments,
 )
 from armloop.log import MotionLog
+from armloop.workers import Pool
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -114,9 +114,7 @@ def collect(
     with ExitStack() as stack:
         record: Iterator[Recording] = map(crew.record, jobs)
         if processes > 1:
-            fork = multiprocessing.get_context("fork")
-            pool = stack.enter_context(fork.Pool(processes, _inherit, (crew,)))
-            record = pool.imap(_record_inherited, jobs)
+            record = stack.enter_context(Pool(processes, _inherit, (crew,))).map(_record_inherited, jobs)
         for job, recording in zip(jobs, record, strict=True):
             recordings[job] = recording
             done += crew.duration(job)

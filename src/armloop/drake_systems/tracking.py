@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import multiprocessing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -24,6 +23,7 @@ from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.dynamics import Dynamics, with_mass_matrix
 from armloop.model import ReconstructedModel
+from armloop.workers import Pool
 
 Array = NDArray[np.float64]
 
@@ -99,10 +99,8 @@ def run_tracking(
     if processes <= 1 or len(names) == 1:
         return {name: track(scenario, name, models, effects) for name in names}
     # Arguments of the initializer are inherited by the fork: nothing needs to be picklable on the way in.
-    fork = multiprocessing.get_context("fork")
-    with fork.Pool(min(processes, len(names)), _inherit, (scenario, models, effects)) as pool:
-        results = pool.map(_track_inherited, names, chunksize=1)
-    return dict(zip(names, results, strict=True))
+    with Pool(min(processes, len(names)), _inherit, (scenario, models, effects)) as pool:
+        return dict(zip(names, pool.map(_track_inherited, names), strict=True))
 
 
 _inherited: tuple[TrackingScenario, Mapping[str, FeedforwardModel], Sequence[UndeclaredEffect]]

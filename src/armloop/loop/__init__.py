@@ -2,12 +2,13 @@
 
 from armloop.loop.collecting import collect_logs
 from armloop.loop.pickup import run_pickup_scenario
-from armloop.loop.run import LoopResult, run_loop
+from armloop.loop.run import LOOP_FILES, LoopResult, run_loop
 from armloop.loop.tracking import run_scenario
 from armloop.loop.tuning import tune_scenario
 from armloop.loop.wear import run_wear_scenario
 
 __all__ = [
+    "LOOP_FILES",
     "LoopResult",
     "collect_logs",
     "run_loop",

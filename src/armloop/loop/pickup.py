@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from armloop.drake_systems.pickup import PickupResult, run_pickup
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.tracking import MAIN_MODEL
 from armloop.errors import InputError
-from armloop.files import replacing, write_text
+from armloop.files import write_figure, write_json
 from armloop.log import MotionLog, write_log
 from armloop.loop.tracking import models_for, result_answer, save_made, tracking_answer
 from armloop.model import ReconstructedModel
@@ -57,13 +56,12 @@ def run_pickup_scenario(
         from armloop.reports.plots import tracking_figure
         from armloop.reports.tracking_tables import PHASES
 
-        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
-        write_text(folder / "diagnosis.json", json.dumps(diagnosis.to_dict(), indent=1) + "\n")
+        write_json(folder / "tracking.json", answer)
+        write_json(folder / "diagnosis.json", diagnosis.to_dict())
         write_log(folder / "since_the_grasp.csv", result.log)
         diagnosis.model.save(folder / "augmented.json")
         save_made(folder, chosen, models)
-        with replacing(folder / "tracking.png") as draft:
-            tracking_figure(phases, PHASES).savefig(draft, format="png", dpi=110)
+        write_figure(folder / "tracking.png", tracking_figure(phases, PHASES))
         progress("recording the replay")
         # every phase holds the whole run
         write_replay(folder / "replay.html", scenario.plant.arm, {"pid_step3": phases["augmented"]})

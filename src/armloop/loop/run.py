@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from armloop.arm import Arm
 from armloop.conditions import Clusters, sort_samples
@@ -23,17 +19,30 @@ from armloop.drake_systems.replay import write_replay
 from armloop.drake_systems.scenarios import TrackingScenario, load_plan, load_tracking
 from armloop.drake_systems.tracking import TrackingResult, track
 from armloop.effects import EFFECTS
-from armloop.files import replacing, write_text
+from armloop.files import write_figure, write_json, write_text
 from armloop.log import MotionLog, read_log, write_log
 from armloop.loop.tracking import tracking_answer
 from armloop.loop.undeclared import draw
 from armloop.model import ReconstructedModel, load_model
 from armloop.progress import Progress
 from armloop.reconstruction import Reconstruction, reconstruct
+from armloop.sampling import CONDITIONS
 from armloop.signals import condition
+from armloop.workers import Pool
 
 SCHEMA = "armloop/loop/1"
 SCENARIO = "three_axis_tracking"
+#: What the loop writes, beside its logs.
+LOOP_FILES = (
+    *(f"logs/{name}.csv" for name in (*CONDITIONS, "second_run")),
+    "model.json",
+    "augmented.json",
+    "diagnosis.json",
+    "loop.json",
+    "loop.png",
+    "replay.html",
+    "report.html",
+)
 
 
 @dataclass(eq=False)
@@ -84,7 +93,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         logs = collect(plant.arm, plant.config, load_plan("paper"), seed, processes=2)
         for name, log in logs.items():
             write_log(folder / "logs" / f"{name}.csv", log)
-    with _Workers() as workers:
+    with Pool(2) as workers:  # two cores, no more
         with _Clock(
             seconds, "reconstruct", progress, "2/6 reconstruct: three steps, each inheriting the last"
         ):
@@ -141,10 +150,9 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         flush=True,
     )
     with _Clock(seconds, "report", progress, "6/6 writing the report"):
-        write_text(folder / "loop.json", json.dumps(loop_answer(result, scenario), indent=1) + "\n")
+        write_json(folder / "loop.json", loop_answer(result, scenario))
         write_text(folder / "report.html", loop_report(result))
-        with replacing(folder / "loop.png") as draft:
-            loop_figure(result).savefig(draft, format="png", dpi=110, facecolor="white")
+        write_figure(folder / "loop.png", loop_figure(result), facecolor="white")
     print(f"open {folder}/report.html  ({sum(seconds.values()):.0f} s)")
     return result
 
@@ -184,7 +192,7 @@ def _diagnose(folder: Path, progress: Progress) -> Diagnosis:
     model: ReconstructedModel = load_model(folder / "model.json")
     log = read_log(folder / "logs" / "second_run.csv", joints=model.arm.n)
     diagnosis = diagnose(model, [log], progress)
-    write_text(folder / "diagnosis.json", json.dumps(diagnosis.to_dict(), indent=1) + "\n")
+    write_json(folder / "diagnosis.json", diagnosis.to_dict())
     diagnosis.model.save(folder / "augmented.json")
     return diagnosis
 
@@ -203,17 +211,6 @@ def _in_words(undeclared: UndeclaredEffect) -> str:
     joint = undeclared.joint if EFFECTS[undeclared.name].joint_wise else None
     numbers = ", ".join(f"{key} {np.round(value, 4)}" for key, value in undeclared.parameters.items())
     return EFFECTS[undeclared.name](joint).label() + f" ({numbers})"
-
-
-class _Workers(ProcessPoolExecutor):
-    """Two forked processes with one BLAS thread each: two cores, no more."""
-
-    def __init__(self) -> None:
-        super().__init__(2, get_context("fork"), initializer=_one_thread)
-
-
-def _one_thread() -> None:
-    threadpool_limits(1)
 
 
 class _Clock:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from armloop.drake_systems.tracking import (
     run_tracking,
     track_in_view,
 )
-from armloop.files import replacing, write_text
+from armloop.files import write_figure, write_json
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
 from armloop.reconstruction import reconstruct
@@ -54,9 +53,8 @@ def run_scenario(
         from armloop.reports.plots import tracking_figure
 
         progress("drawing and recording the replay")
-        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
-        with replacing(folder / "tracking.png") as draft:
-            tracking_figure(results).savefig(draft, format="png", dpi=110)
+        write_json(folder / "tracking.json", answer)
+        write_figure(folder / "tracking.png", tracking_figure(results))
         write_replay(folder / "replay.html", scenario.plant.arm, results)
         save_made(folder, chosen, models)
     return answer, results

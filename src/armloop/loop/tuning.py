@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,7 @@ from armloop.drake_systems.loop_analysis import model_posture, posture_model
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.tuned_loop import TunedLoop, Tuning, look_at
 from armloop.dynamics import with_mass_matrix
-from armloop.files import replacing, write_text
+from armloop.files import write_figure, write_json, write_text
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
 
@@ -58,11 +57,10 @@ def tune_scenario(
         from armloop.reports.plots.loops import bode_figure, step_figure
         from armloop.reports.tuning_report import tuning_report
 
-        write_text(folder / "tune.json", json.dumps(answer, indent=1) + "\n")
+        write_json(folder / "tune.json", answer)
         write_text(folder / "report.html", tuning_report(tuning))
         for name, draw in (("bode.png", bode_figure), ("step.png", step_figure)):
-            with replacing(folder / name) as draft:
-                draw(tuning).savefig(draft, format="png", dpi=110, facecolor="white")
+            write_figure(folder / name, draw(tuning), facecolor="white")
     return answer, tuning
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.wear import WearResult, run_wear
-from armloop.files import replacing, write_text
+from armloop.files import write_figure, write_json
 from armloop.loop.tracking import SCHEMA, models_for, save_made
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -44,10 +43,9 @@ def run_wear_scenario(
     if folder is not None:
         from armloop.reports.plots.spread import spread_figure
 
-        write_text(folder / "tracking.json", json.dumps(answer, indent=1) + "\n")
+        write_json(folder / "tracking.json", answer)
         save_made(folder, chosen, models)
-        with replacing(folder / "spread.png") as draft:
-            spread_figure(result).savefig(draft, format="png", dpi=110, facecolor="white")
+        write_figure(folder / "spread.png", spread_figure(result), facecolor="white")
     return answer, result
 
 

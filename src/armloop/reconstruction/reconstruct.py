@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.errors import InputError
+from armloop.goodness import Parts, merged
+from armloop.log import require_different
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.pieces import IN_MEMORY, LogSource
@@ -21,6 +23,7 @@ from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
+from armloop.reconstruction.judged import held_out_parts
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
@@ -44,18 +47,28 @@ class Reconstruction:
         reports: one per step.
         held_out: score on blocks that no step has seen.
         notes: what the user should know.
+        parts: how much of each joint's torque is explained, predictable but not explained, and noise, on the same
+            blocks; empty where nobody asked.
     """
 
     model: ReconstructedModel
     reports: list[StepReport]
     held_out: Score
     notes: list[str]
+    parts: list[Parts] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What must be said before anything else: joints of which the model leaves much that is predictable."""
+        return [one.sentence() for one in self.parts if one.much_is_left]
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop reconstruct --json``, without the model's path."""
         return {
             "steps": [report.to_dict() for report in self.reports],
             "held_out": self.held_out.moving,
+            "joints": merged(self.parts),
+            "warnings": self.warnings,
             "notes": self.notes,
         }
 
@@ -119,14 +132,17 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
 
+    large = sum(log.samples for log in logs) > in_memory
+    kept = [] if large and method == "stepwise" else [log.read() for log in logs]
+    require_different(kept)
+
     def attempt(library: str) -> Attempt:
         how = conditioning or default_conditioning(library)
         progress(f"conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
-        large = sum(log.samples for log in logs) > in_memory
         if large and method == "stepwise" and library == "double-feature-set":
             data = Data.streamed(logs, how, options, workers)
         else:
-            data = Data.of(condition([log.read() for log in logs], how), options)
+            data = Data.of(condition(kept or [log.read() for log in logs], how), options)
         check_recorded(arm, data.reference.samples)
         return Attempt(library, how, data, _found(arm, data, method, library, options, progress))
 
@@ -176,7 +192,11 @@ def _finished(
         },
     )
     tally = tried.tally(found.sorter)
-    model = replace(model, baseline=tally.baseline())
+    parts = []
+    if options.parts:
+        progress("what a flexible regression still finds in what the model leaves")
+        parts = held_out_parts(model, data)
+    model = replace(model, baseline={**tally.baseline(), "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
@@ -185,7 +205,7 @@ def _finished(
         progress("standard errors of the coefficients")
         shared = tried.library in ("rigid-body", "lagrangian")
         model = replace(model, uncertainty=uncertainty(model, data, found, shared))
-    return Reconstruction(model, found.reports, tally.score(), found.notes)
+    return Reconstruction(model, found.reports, tally.score(), found.notes, parts)
 
 
 def _range(motion: Motion) -> list[list[float]]:

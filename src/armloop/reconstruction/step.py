@@ -21,6 +21,7 @@ from armloop.library.double_feature_set import DoubleFeatureSet, Factors
 from armloop.library.friction import FrictionTerm
 from armloop.library.wave_moments import WaveProducts
 from armloop.reconstruction.data import Data
+from armloop.reconstruction.distinct import repeated, twins
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.sums import Choice, Columns, Problems, StepSums
 from armloop.reconstruction.trials import Correction, Fit, HeldOut
@@ -139,6 +140,7 @@ class _Joint:
     Attributes:
         fit, all: normal equations of the samples that do not choose orders, and of all.
         size: number of library columns.
+        distinct: (size,) library columns that are no other's function on the data.
         fixed, profile: friction columns that are always there, and those of which one is chosen.
         scale: root mean square of the torque.
     """
@@ -146,12 +148,14 @@ class _Joint:
     fit: Moments
     all: Moments
     size: int
+    distinct: NDArray[np.bool_]
     fixed: Index
     profile: Index
     scale: float
 
     def select(self, moments: Moments, library: Index, sparse: Sparse) -> Fit:
         """Support among the library columns ``library`` and the friction columns, and its coefficients."""
+        library = library[self.distinct[library]]
         chosen = np.zeros(0, dtype=np.intp)
         best: Index = np.zeros(0, dtype=np.intp)
         parts = (self.fit, self.all - self.fit) if moments is self.all and sparse.needs_parts else ()
@@ -260,7 +264,11 @@ def _joints(columns: Columns, sums: StepSums, plan: StepPlan) -> list[_Joint]:
         profiled = np.array([laws[k].kind == "stribeck" for k in alive], dtype=bool)
         places = (size + alive).astype(np.intp)
         fit = problems.moments(j, choosing=False)
-        joints.append(_Joint(fit, every, size, places[~profiled], places[profiled], sums.scale(j)))
+        fixed, profile = places[~profiled], places[profiled]
+        distinct = ~twins(columns.library.factors, columns.library.index, [laws[k] for k in alive], j)
+        own = np.flatnonzero(distinct).astype(np.intp)
+        distinct[own] = ~repeated(every.G, fixed, own)
+        joints.append(_Joint(fit, every, size, distinct, fixed, profile, sums.scale(j)))
     return joints
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -10,6 +9,7 @@ from typing import Any, TypeVar
 from threadpoolctl import threadpool_limits
 
 from armloop.progress import Progress, silent
+from armloop.workers import Pool
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -50,9 +50,8 @@ class Context:
         if self.processes <= 1 or len(jobs) == 1:
             with threadpool_limits(1):
                 return [function(job) for job in jobs]
-        fork = multiprocessing.get_context("fork")
-        with fork.Pool(self.processes, threadpool_limits, (1,)) as pool:
-            for k, result in enumerate(pool.imap(function, jobs)):
+        with Pool(self.processes) as pool:
+            for k, result in enumerate(pool.map(function, jobs)):
                 results.append(result)
                 self.progress(f"{what}: {k + 1} of {len(jobs)}")
         return results

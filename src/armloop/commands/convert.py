@@ -1,0 +1,197 @@
+"""Turn logs of other programs into a motion log."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import ARM_HELP, add_json
+
+HELP = (
+    "turn other programs' logs (ROS bags, RTDE, libfranka, LeRobot, .mat, .npz, any table) into a motion log"
+)
+EXAMPLE = (
+    "armloop convert bag_folder --arm ur10e.urdf --tau-unit N*m --out run.parquet\n"
+    "  armloop convert rtde.csv --drive-gains 12.5,12.5,12.5,9.2,9.2,9.2 --out run.parquet\n"
+    "  armloop convert table.csv --suggest --map map.yaml     then complete map.yaml, and\n"
+    "  armloop convert table.csv --map map.yaml --out run.parquet"
+)
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument(
+        "sources",
+        nargs="+",
+        metavar="SOURCE",
+        help="a ROS bag (folder, .db3, .mcap, .bag), CSV of RTDE or libfranka, a LeRobot data set, .mat, .npz or a table",
+    )
+    p.add_argument("--out", default=None, metavar="LOG", help="the log to write, .parquet or .csv")
+    p.add_argument("--arm", default=None, help=f"match the joints by name with those of {ARM_HELP}")
+    p.add_argument(
+        "--map",
+        default=None,
+        metavar="MAP.yaml",
+        help="what the columns are (with --suggest: where to write it)",
+    )
+    p.add_argument(
+        "--suggest",
+        action="store_true",
+        help="write a map from the header instead of a log, to --map (else beside --out), and say what is unsure",
+    )
+    p.add_argument(
+        "--tau-unit",
+        choices=("N*m", "A"),
+        default=None,
+        help="what effort, current or torque columns hold, where the source does not say",
+    )
+    p.add_argument(
+        "--drive-gains",
+        default=None,
+        metavar="K1,..,KN",
+        help="N·m/A per joint: turn motor currents into torques",
+    )
+    p.add_argument(
+        "--angle-unit",
+        choices=("rad", "deg"),
+        default=None,
+        help="of positions and velocities, where the source does not say",
+    )
+    p.add_argument("--topic", default=None, help="which joint states of a bag with several")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Convert, or suggest a map."""
+    from pathlib import Path
+
+    from armloop.arm import load_arm
+    from armloop.commands.shared import drive_gains, out_file, print_json
+    from armloop.convert import Answers, convert, read_map
+    from armloop.errors import InputError
+    from armloop.tables import write_columns
+
+    arm = load_arm(options.arm) if options.arm else None
+    if options.suggest:
+        _suggest(options, arm)
+        return
+    if options.out is None:
+        raise InputError("convert: --out is missing; give the log to write, such as --out run.parquet")
+    out = Path(options.out)
+    out_file(options.out, "--out")
+    if out.suffix not in (".csv", ".parquet"):
+        raise InputError(f"{out}: unknown suffix {out.suffix!r}; --out must end in .parquet or .csv")
+    _spare(out, options.sources)
+    mapping = read_map(options.map) if options.map else None
+    answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)
+    found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
+    write_columns(out, found.columns())
+    if options.json:
+        print_json(_answer(found, out))
+        return
+    _tell(found, out, arm)
+
+
+def _suggest(options: argparse.Namespace, arm: object) -> None:
+    from pathlib import Path
+
+    from armloop.commands.shared import out_file
+    from armloop.convert import doubts, read_sources, suggested, written
+    from armloop.errors import InputError
+    from armloop.files import write_text
+
+    out = None if options.out is None else Path(options.out)
+    if options.map is not None:
+        place: Path | None = Path(options.map)
+    elif out is not None:
+        place = out if out.suffix in (".yaml", ".yml") else out.with_suffix(".map.yaml")
+    else:
+        place = None
+    if place is not None:
+        out_file(str(place), "--map")
+        if place.exists():
+            raise InputError(f"{place}: exists; --suggest writes a new map, give another name with --map")
+    recording = read_sources(options.sources[:1], arm, options.topic)[0]  # type: ignore[arg-type]
+    mapping, unsure = suggested(recording, arm)  # type: ignore[arg-type]
+    text = written(mapping, unsure, recording)
+    if place is None:
+        print(text, end="")
+        return
+    write_text(place, text)
+    print(f"{recording.path.name}: {recording.kind}, {recording.samples} rows, {mapping.n} joints")
+    for line in doubts(unsure):
+        print(f"  unsure of {line}")
+    if not unsure:
+        print("  nothing is unsure; the map is not needed, but shows what will be read")
+    print(
+        f"wrote {place}; complete it, then: armloop convert {recording.path} --map {place} --out LOG.parquet"
+    )
+
+
+def _spare(out: object, sources: list[str]) -> None:
+    from pathlib import Path
+
+    from armloop.errors import InputError
+
+    for source in sources:
+        if Path(source).resolve() == Path(str(out)).resolve():
+            raise InputError(f"{out}: is one of the sources; --out must name another file")
+
+
+def _answer(found: object, out: object) -> dict[str, object]:
+    from armloop.convert import Converted
+
+    assert isinstance(found, Converted)
+    log = found.log
+    return {
+        "log": str(out),
+        "kinds": found.kinds,
+        "samples": log.samples,
+        "period": log.period,
+        "runs": [[run.start, run.stop] for run in log.runs()],
+        "joints": found.joints,
+        "tau_unit": log.tau_unit,
+        "kept": list(found.extra),
+        "notes": found.notes,
+    }
+
+
+def _tell(found: object, out: object, arm: object) -> None:
+    import numpy as np
+
+    from armloop.arm import Arm
+    from armloop.convert import Converted
+    from armloop.reports.tables import table
+
+    assert isinstance(found, Converted) and isinstance(arm, Arm | None)
+    log = found.log
+    seconds = sum(float(log.time[run.stop - 1] - log.time[run.start]) for run in log.runs())
+    runs = log.runs()
+    print(
+        f"{', '.join(dict.fromkeys(found.kinds))}: {log.samples} samples at {1 / log.period:.4g} Hz, {seconds:.4g} s, "
+        f"{len(runs)} run{'s' if len(runs) > 1 else ''}"
+    )
+    rows = []
+    for j in range(log.joints):
+        name = "" if arm is None else arm.joints[j].name
+        reach = f"{log.q[:, j].min():.4g} … {log.q[:, j].max():.4g}"
+        rows.append(
+            [
+                j + 1,
+                name,
+                found.joints[j],
+                reach,
+                f"{np.abs(log.v[:, j]).max():.4g}",
+                f"{np.abs(log.tau[:, j]).max():.4g}",
+            ]
+        )
+    unit = "A" if log.tau_unit == "A" else "N·m"
+    print(
+        table(["joint", "arm", "source", "q, rad (m)", "largest |v|, rad/s", f"largest |tau|, {unit}"], rows)
+    )
+    for note in found.notes:
+        print(f"  {note}")
+    if found.extra:
+        print(f"  kept beside it: {', '.join(list(found.extra)[:12])}{' …' if len(found.extra) > 12 else ''}")
+    print(f"wrote {out}")
+    if log.tau_unit == "A":
+        print("tau is in A: later commands need --tau-unit A (or --drive-gains to make it a torque)")

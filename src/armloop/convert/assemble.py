@@ -1,0 +1,320 @@
+"""From recordings and their maps to one motion log: units, signs, joint order, time, and what is kept beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.convert.joints import match, may_be_unordered
+from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
+from armloop.convert.recording import Array, Recording
+from armloop.convert.units import CURRENTS, FACTORS, canonical
+from armloop.errors import LogError
+from armloop.log import GAP_PERIODS, MotionLog, unchecked_log
+
+_OWN = re.compile(r"(q|v|tau|vdot)\d{1,3}|time")
+# A run that follows another starts so many sample periods later: clearly a gap.
+_APART = 4 * GAP_PERIODS
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What the command line says of what a source does not: units, and gains that turn currents into torques."""
+
+    tau_unit: str | None = None
+    drive_gains: Sequence[float] | None = None
+    angle_unit: str | None = None
+
+
+@dataclass(eq=False)
+class Part:
+    """One source as a motion log.
+
+    Attributes:
+        log: with the times of the source, counted from its first sample.
+        extra: further columns by name, each (N,).
+        starts: index of the first sample of each part that must become a run of its own.
+        joints: the source's name of each joint, base to tip.
+        epoch: s since 1970 of the first sample, where the source says it.
+    """
+
+    log: MotionLog
+    extra: dict[str, Array]
+    starts: list[int]
+    joints: list[str]
+    epoch: float | None
+    notes: list[str] = field(default_factory=list)
+
+
+def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answers) -> Part:
+    """One source as a motion log, in SI units, base to tip.
+
+    Raises:
+        LogError: a column is missing or holds no numbers, a unit is not said, or joints do not match the arm's.
+    """
+    where = str(recording.path)
+    mapping = _answered(recording, mapping, arm, answers)
+    notes = list(recording.notes)
+    order = _order(recording, mapping, arm, notes)
+    n, N = len(order), recording.samples
+    values: dict[str, Array] = {}
+    for kind, quantity in mapping.quantities().items():
+        values[kind] = np.stack([_column(recording, quantity, kind, j) for j in order], axis=1)
+    time, keep, starts = _time(recording, mapping, notes)
+    cells = {name: cells[keep] for name, cells in values.items()}
+    if not np.any(cells["tau"]):
+        raise LogError(f"{where}: the torques are zero throughout; this source did not record them")
+    if "v" not in cells:
+        cells["v"] = _differences(time, cells["q"], starts)
+        notes.append("v: central differences of q, for the source has no velocities")
+    unit = "A" if mapping.tau.gains is None and canonical(_unit(mapping.tau, 0), "tau") in CURRENTS else "N*m"
+    # Parts that follow one another without a gap may jump: they are checked once they are kept apart.
+    log = unchecked_log(time=time, **cells, name=recording.path.stem, tau_unit=unit)
+    used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {
+        mapping.time.column or ""
+    }
+    extra = {}
+    for name in recording.columns if mapping.keep == "all" else mapping.keep:
+        if name not in recording.columns:
+            raise LogError(f"{where}: no column {name} to keep; {_there_are(recording)}")
+        if name not in used:
+            extra[f"source.{name}" if _OWN.fullmatch(name) else name] = recording.columns[name][keep]
+    if len(keep) < N:
+        notes.append(f"{N - len(keep)} of {N} {recording.rows}s repeat the time of the last; left out")
+    joints = mapping.joints or [str(j + 1) for j in range(n)]
+    return Part(log, extra, starts, [joints[j] for j in order], recording.epoch, notes)
+
+
+def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
+    """All parts below each other, with a gap in time between those that the sources keep apart.
+
+    Sources that say when they were recorded, and were so one after the other, keep their distance in time.
+    """
+    clocks, logs, last = [], [one.log for one in parts], 0.0
+    if len({log.tau_unit for log in logs}) > 1:
+        raise LogError("the sources hold torques and currents; say --drive-gains, or convert them one by one")
+    epochs = [one.epoch for one in parts]
+    for index, one in enumerate(parts):
+        time = _spread(one.log.time, one.starts)
+        if index:
+            step = max(1.0, _APART * one.log.period)
+            shift = last + step
+            first, epoch = epochs[0], epochs[index]
+            if first is not None and epoch is not None and epoch - first > last:
+                shift = epoch - first
+            time = time + shift
+        clocks.append(time)
+        last = float(time[-1])
+    has_vdot = all(log.vdot is not None for log in logs)
+    log = unchecked_log(
+        time=np.concatenate(clocks),
+        q=np.concatenate([one.q for one in logs]),
+        v=np.concatenate([one.v for one in logs]),
+        tau=np.concatenate([one.tau for one in logs]),
+        vdot=np.concatenate([one.vdot for one in logs if one.vdot is not None]) if has_vdot else None,
+        name=logs[0].name,
+        tau_unit=logs[0].tau_unit,
+    )
+    names = dict.fromkeys(name for one in parts for name in one.extra)
+    extra = {
+        name: np.concatenate([one.extra.get(name, np.full(one.log.samples, np.nan)) for one in parts])
+        for name in names
+    }
+    return log, extra
+
+
+def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answers) -> Mapping:
+    """The map with the command line's answers in it; raises ``LogError`` where something is still not said."""
+    where = str(recording.path)
+    joints, asked = mapping.n, []
+    tau, q, v = mapping.tau, mapping.q, mapping.v
+    if answers.drive_gains is not None:
+        if len(answers.drive_gains) != joints:
+            raise LogError(
+                f"{where}: {len(answers.drive_gains)} drive gains for {joints} joints; give one per joint"
+            )
+        gains = list(answers.drive_gains)
+        if arm is not None and mapping.joints is not None:
+            # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns.
+            at = match(mapping.joints, [joint.name for joint in arm.joints], where)
+            gains = [gains[at.index(j)] for j in range(joints)]
+        tau = QuantityMap(tau.columns, _said(tau.unit, "A"), tau.sign, tau.offset, gains)
+    elif answers.tau_unit is not None:
+        tau = QuantityMap(tau.columns, answers.tau_unit, tau.sign, tau.offset, tau.gains)
+    if answers.angle_unit is not None:
+        rates = {"rad": "rad/s", "deg": "deg/s"}
+        q = QuantityMap(q.columns, _said(q.unit, answers.angle_unit), q.sign, q.offset)
+        if v is not None:
+            v = QuantityMap(v.columns, _said(v.unit, rates[answers.angle_unit]), v.sign, v.offset)
+    if not _is_said(tau):
+        asked.append("what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A)")
+    elif canonical(_unit(tau, 0), "tau") == "%" and tau.gains is None:
+        raise LogError(f"{where}: tau is in percent of a rating: give gains (N·m per percent) in a --map")
+    if not _is_said(q) or (v is not None and not _is_said(v)):
+        asked.append("the unit of positions and velocities (--angle-unit rad or deg)")
+    if mapping.time.rate is None and mapping.time.column is None:
+        asked.append("the time (no column of it was found; --map with time: {rate: HZ})")
+    if asked:
+        what = recording.kind
+        raise LogError(
+            f"{where}: the {what} does not say {' nor '.join(asked)}; say it, or answer in the map that --suggest writes"
+        )
+    unit = mapping.time.unit
+    if mapping.time.column is not None and (unit is None or unit == UNSAID):
+        unit = _time_unit(recording, mapping, q, v)
+    time = type(mapping.time)(mapping.time.column, unit, mapping.time.rate)
+    return Mapping(time, q, tau, v, mapping.vdot, mapping.joints, mapping.keep)
+
+
+def _time_unit(recording: Recording, mapping: Mapping, q: QuantityMap, v: QuantityMap | None) -> str:
+    """The unit of time with which v is the rate of q: measured, not guessed; raises ``LogError`` if none fits."""
+    if v is not None:
+        time = recording.columns.get(mapping.time.column or "")
+        if time is not None and len(time) > 2:
+            ratio = rate_ratio(time, recording, q, v)
+            for unit, factor in FACTORS["time"].items():
+                if 0.7 < ratio / factor < 1.4:
+                    return unit
+    raise LogError(
+        f"{recording.path}: the unit of the column {mapping.time.column} is not said, and no velocity tells it; "
+        "say it in a --map: time: {column: …, unit: s, ms, us or ns}"
+    )
+
+
+def rate_ratio(time: Array, recording: Recording, q: QuantityMap, v: QuantityMap) -> float:
+    """How many times v, in its unit per second, the rate of q per unit of time is; 0 where nothing moves."""
+    moved = []
+    for j in range(len(q.names())):
+        position, velocity = _column(recording, q, "q", j), _column(recording, v, "v", j)
+        step = np.diff(time)
+        good = step > 0
+        rate = np.diff(position)[good] / step[good]
+        mean = 0.5 * (velocity[1:] + velocity[:-1])[good]
+        square = float(mean @ mean)
+        if square > 0:
+            moved.append((square, float(rate @ mean) / square))
+    return max(moved)[1] if moved else 0.0
+
+
+def _said(unit: str | list[str] | None, answer: str) -> str | list[str]:
+    return answer if unit is None or unit == UNSAID else unit
+
+
+def _is_said(quantity: QuantityMap) -> bool:
+    units = quantity.unit if isinstance(quantity.unit, list) else [quantity.unit]
+    return not any(unit is None or unit == UNSAID for unit in units)
+
+
+def _unit(quantity: QuantityMap, j: int) -> str:
+    return str(quantity.unit[j] if isinstance(quantity.unit, list) else quantity.unit)
+
+
+def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[str]) -> list[int]:
+    names, where = mapping.joints, str(recording.path)
+    if arm is None:
+        if names is not None and recording.named:
+            if may_be_unordered(names):
+                raise LogError(
+                    f"{where}: the joints are in the order of the alphabet ({', '.join(names)}), which need not be that "
+                    "of the arm; give --arm with its URDF, or a --map with joints base to tip"
+                )
+            notes.append(
+                f"joints in the order of the source, base to tip: {', '.join(names)} (--arm would match them)"
+            )
+        return list(range(mapping.n))
+    if names is not None:
+        return match(names, [joint.name for joint in arm.joints], where)
+    if mapping.n != arm.n:
+        raise LogError(f"{where}: has {mapping.n} joints; the arm {arm.name} has {arm.n}")
+    return list(range(arm.n))
+
+
+def _column(recording: Recording, quantity: QuantityMap, kind: str, j: int) -> Array:
+    """One column of the source in SI units."""
+    n, name = len(quantity.names()), quantity.names()[j]
+    cells = recording.columns.get(name)
+    if cells is None:
+        raise LogError(
+            f"{recording.path}: no column {name}, which {kind} of joint {j + 1} needs; {_there_are(recording)}"
+        )
+    bad = np.flatnonzero(~np.isfinite(cells))
+    if len(bad):
+        raise LogError(
+            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
+            f"({len(bad)} of {len(cells)}); correct or drop what was not measured"
+        )
+    unit = canonical(_unit(quantity, j), kind)
+    factor = FACTORS[kind][unit] if unit is not None else 1.0
+    if quantity.gains is not None:
+        factor = factor * per_joint(quantity.gains, n)[j]
+    return (cells + per_joint(quantity.offset, n)[j]) * (factor * per_joint(quantity.sign, n)[j])
+
+
+def _there_are(recording: Recording) -> str:
+    names = list(recording.columns)
+    return f"there are: {', '.join(names[:12])}{' …' if len(names) > 12 else ''}"
+
+
+def _time(
+    recording: Recording, mapping: Mapping, notes: list[str]
+) -> tuple[Array, NDArray[np.intp], list[int]]:
+    """Seconds from the first sample, the rows that are kept, and where parts of the source start among them."""
+    N = recording.samples
+    if mapping.time.rate is not None:
+        return np.arange(N) / mapping.time.rate, np.arange(N), list(recording.starts)
+    name = mapping.time.column
+    raw = recording.columns.get(name or "")
+    if raw is None:
+        raise LogError(f"{recording.path}: no column {name} for the time; {_there_are(recording)}")
+    bad = np.flatnonzero(~np.isfinite(raw))
+    if len(bad):
+        raise LogError(
+            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number; correct the time"
+        )
+    edges = set(recording.starts)
+    step = np.diff(raw, prepend=raw[0] - 1)
+    step[list(edges)] = 1.0
+    back = np.flatnonzero(step < 0)
+    if len(back):
+        row = int(back[0])
+        raise LogError(
+            f"{recording.path}: column {name}, {recording.rows} {row + 1}: {raw[row]:.9g} follows {raw[row - 1]:.9g}; "
+            "time must rise; give runs that were recorded one by one as files of their own"
+        )
+    keep = np.flatnonzero(step > 0)
+    factor = FACTORS["time"][canonical(mapping.time.unit or "s", "time") or "s"]
+    starts = [int(k) for k in np.searchsorted(keep, sorted(edges))]
+    return (raw[keep] - raw[0]) * factor, keep, starts
+
+
+def _spread(time: Array, starts: Sequence[int]) -> Array:
+    """The same times with a gap before each part, where it does not lie behind one already."""
+    time = time - time[0]
+    steps = np.diff(time)
+    inside = np.ones(len(steps), dtype=bool)
+    inside[[start - 1 for start in starts if 0 < start < len(time)]] = False
+    apart = max(1.0, _APART * float(np.median(steps[inside]))) if inside.any() else 1.0
+    for start in starts:
+        if 0 < start < len(time):
+            missing = apart - (time[start] - time[start - 1])
+            if missing > 0:
+                time[start:] += missing
+    return time
+
+
+def _differences(time: Array, q: Array, starts: Sequence[int]) -> Array:
+    """Central differences within each part and between its gaps, one-sided at the ends: no shift in time."""
+    v = np.zeros_like(q)
+    steps = np.diff(time)
+    gaps = np.flatnonzero((steps > GAP_PERIODS * np.median(steps)) | (steps <= 0)) + 1
+    edges = sorted({0, len(time), *starts, *(int(k) for k in gaps)})
+    for first, last in pairwise(edges):
+        if last - first >= 2:
+            v[first:last] = np.gradient(q[first:last], time[first:last], axis=0)
+    return v

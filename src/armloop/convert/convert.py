@@ -1,0 +1,100 @@
+"""From sources in other people's formats to one motion log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.convert.assemble import Answers, Part, joined, part
+from armloop.convert.detect import read_source
+from armloop.convert.mapping import Mapping
+from armloop.convert.recording import Array, Recording
+from armloop.errors import LogError
+from armloop.log import MotionLog, check_log
+
+
+@dataclass(eq=False)
+class Converted:
+    """What a conversion gave.
+
+    Attributes:
+        log: in SI units, base to tip; ``tau_unit`` says whether tau is a torque or a current.
+        extra: further columns that are kept, by name, each (N,).
+        joints: the name that the source gives each joint, base to tip.
+        kinds: what each source is.
+        notes: what was read, left and decided, one line each.
+    """
+
+    log: MotionLog
+    extra: dict[str, Array]
+    joints: list[str]
+    kinds: list[str]
+    notes: list[str]
+
+    def columns(self) -> dict[str, Array]:
+        """The columns of the log's file, in its order."""
+        log = self.log
+        columns = {"time": log.time}
+        for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
+            if values is not None:
+                columns |= {f"{kind}{j + 1}": values[:, j] for j in range(log.joints)}
+        return columns | self.extra
+
+
+def read_sources(paths: Sequence[str | Path], arm: Arm | None, topic: str | None = None) -> list[Recording]:
+    """Read each source by its format; raises ``LogError``."""
+    wanted = None if arm is None else [joint.name for joint in arm.joints]
+    return [read_source(Path(path), topic, wanted) for path in paths]
+
+
+def convert(
+    paths: Sequence[str | Path],
+    *,
+    arm: Arm | None = None,
+    mapping: Mapping | None = None,
+    answers: Answers | None = None,
+    topic: str | None = None,
+) -> Converted:
+    """Read sources of one arm into one log; each source and each part of one becomes a run of its own.
+
+    Args:
+        paths: files or folders, in the order in which they are to stand in the log.
+        arm: its joints are found by name where the source names them.
+        mapping: what the columns are; what the format itself says otherwise.
+        answers: what the source does not say.
+        topic: of a bag that has several joint states.
+
+    Raises:
+        LogError: one line that names the source, what is wrong or not said, and what would be right.
+    """
+    parts: list[Part] = []
+    recordings = read_sources(paths, arm, topic)
+    for recording in recordings:
+        chosen = mapping or recording.mapping
+        if chosen is None:
+            why = recording.unsure.get("columns", "the columns are not recognised")
+            raise LogError(
+                f"{recording.path}: {why}; write a map (--suggest starts one) and give it with --map"
+            )
+        if mapping is None and recording.kind == "table" and recording.unsure:
+            first = next(iter(f"{field}: {text}" for field, text in recording.unsure.items()))
+            recording.notes.append(f"columns recognised by their names ({first})")
+        parts.append(part(recording, chosen, arm, answers or Answers()))
+    if len({one.log.joints for one in parts}) > 1:
+        raise LogError(
+            f"{paths[-1]}: has {parts[-1].log.joints} joints, {paths[0]} {parts[0].log.joints}; give logs of one arm"
+        )
+    log, extra = joined(parts)
+    check_log(Path(paths[0]), log)
+    notes = []
+    for path, one in zip(paths, parts, strict=True):
+        head = f"{Path(path).name}: " if len(parts) > 1 else ""
+        notes += [head + note for note in one.notes]
+    empty = [name for name, cells in extra.items() if np.isnan(cells).all()]
+    for name in empty:
+        del extra[name]
+    return Converted(log, extra, parts[0].joints, [r.kind for r in recordings], notes)

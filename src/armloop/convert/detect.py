@@ -1,0 +1,73 @@
+"""Which reader a source belongs to, by its name and what it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from armloop.convert.recording import Recording
+from armloop.errors import LogError
+
+KNOWN = (
+    "a ROS bag (folder, .db3, .mcap, .bag), an RTDE or libfranka CSV, a LeRobot data set, .mat, .npz, "
+    "or a table (.csv, .tsv, .txt, .parquet)"
+)
+
+
+def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | None = None) -> Recording:
+    """Read one source; raises ``LogError`` where it is missing, of no known format, or broken."""
+    if not path.exists():
+        raise LogError(f"{path}: no such file; give {KNOWN}")
+    suffix = path.suffix.lower()
+    try:
+        if suffix in (".db3", ".mcap", ".bag") or (path.is_dir() and (path / "metadata.yaml").is_file()):
+            from armloop.convert.rosbag import read_rosbag
+
+            return read_rosbag(path, topic, wanted)
+        if topic is not None:
+            raise LogError(f"{path}: --topic belongs to ROS bags")
+        if path.is_dir() or suffix == ".parquet":
+            return _folder_or_parquet(path)
+        if suffix == ".mat":
+            from armloop.convert.matlab import read_matlab
+
+            return read_matlab(path)
+        if suffix == ".npz":
+            from armloop.convert.numpy_archive import read_npz
+
+            return read_npz(path)
+        if suffix in (".csv", ".tsv", ".txt", ".log", ".dat"):
+            return _text(path)
+    except OSError as error:
+        raise LogError(
+            f"{path}: cannot be read ({error.strerror or error}); check its permissions"
+        ) from error
+    raise LogError(f"{path}: unknown format {path.suffix!r}; give {KNOWN}")
+
+
+def _folder_or_parquet(path: Path) -> Recording:
+    from armloop.convert.lerobot import is_lerobot, read_lerobot
+
+    if is_lerobot(path):
+        return read_lerobot(path)
+    if path.is_dir():
+        raise LogError(
+            f"{path}: a folder with neither metadata.yaml (a ROS 2 bag) nor meta/info.json (LeRobot)"
+        )
+    from armloop.convert.table import read_table
+
+    return read_table(path)
+
+
+def _text(path: Path) -> Recording:
+    from armloop.convert.libfranka import is_libfranka, read_libfranka
+    from armloop.convert.rtde import is_rtde, read_rtde
+    from armloop.convert.table import read_table
+    from armloop.convert.text import header_of
+
+    header = header_of(path)
+    if is_rtde(header):
+        return read_rtde(path)
+    if is_libfranka(header):
+        return read_libfranka(path)
+    return read_table(path)

@@ -1,0 +1,243 @@
+"""What the names of columns suggest: which are the time, positions, velocities and torques of which joint.
+
+Nothing here is certain. What comes out is a map to be looked at, with what it is unsure of.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
+from armloop.convert.units import canonical
+
+# In the order of preference: the first word that a name holds decides.
+_WORDS = {
+    "vdot": ("vdot", "ddq", "qdd", "qacc", "acceleration", "accelerations", "acc", "accel"),
+    "v": ("dq", "qd", "qdot", "qvel", "velocity", "velocities", "vel", "speed", "speeds", "omega", "v"),
+    "tau": (
+        "tau",
+        "torque",
+        "torques",
+        "effort",
+        "efforts",
+        "moment",
+        "moments",
+        "trq",
+        "current",
+        "currents",
+        "amps",
+        "i",
+    ),
+    "q": ("q", "qpos", "position", "positions", "pos", "angle", "angles", "theta", "state", "jointangles"),
+    "time": ("time", "timestamp", "timestamps", "stamp", "t", "sec", "secs", "seconds", "clock", "duration"),
+}
+_CURRENT = {"current", "currents", "amps", "i"}
+# A name with one of these is not what was measured at the joint.
+_WANTED = {
+    "target", "desired", "des", "cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "goal", "action",
+    "d", "c", "error", "err", "ext", "external", "hat", "motor", "tcp", "ee", "cartesian", "limit", "max", "min", "var",
+    "std",     "temperature", "temperatures", "temp", "voltage",
+    "gripper",
+}  # fmt: skip
+_UNIT = re.compile(r"[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]\s*$")
+_UNIT_WORDS = {
+    "deg": "deg",
+    "degrees": "deg",
+    "rad": "rad",
+    "mm": "mm",
+    "nm": "N*m",
+    "amp": "A",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
+    "ma": "mA",
+}
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns whose names differ in the joint alone."""
+
+    key: str
+    columns: tuple[str, ...]
+    joints: tuple[str, ...]
+    words: tuple[str, ...]
+    unit: str
+    by_name: bool = False
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A map and, by field, what was not clear."""
+
+    mapping: Mapping | None
+    unsure: dict[str, str]
+
+
+def suggest(columns: Sequence[str], joints: Sequence[str] = ()) -> Suggestion:
+    """A map for a table with these columns; ``joints`` are the names of the arm's, where one is given."""
+    unsure: dict[str, str] = {}
+    groups = _numbered(columns) + _named(columns, joints)
+    best: dict[str, list[Group]] = {kind: _ranked(kind, groups) for kind in ("q", "v", "tau", "vdot")}
+    if not best["q"] or not best["tau"]:
+        missing = " and ".join(
+            {"q": "positions", "tau": "torques or currents"}[k] for k in ("q", "tau") if not best[k]
+        )
+        return Suggestion(None, {"columns": f"no columns of {missing} were recognised"})
+    q = best["q"][0]
+    fields: dict[str, QuantityMap | None] = {"v": None, "vdot": None}
+    for kind, ranked in best.items():
+        fitting = [ordered for group in ranked if (ordered := _in_order(group, q)) is not None]
+        if not fitting:
+            if kind == "tau":
+                return Suggestion(None, {"columns": f"no {len(q.columns)} columns of torque go with {q.key}"})
+            continue
+        group = fitting[0]
+        fields[kind] = QuantityMap(list(group.columns), _unit(kind, group))
+        if len(fitting) > 1:
+            unsure[kind] = "also possible: " + ", ".join(other.key for other in fitting[1:4])
+    time, doubt = _time(columns)
+    if doubt:
+        unsure["time"] = doubt
+    found = fields["q"], fields["tau"]
+    assert found[0] is not None and found[1] is not None
+    named = not q.joints[0].isdecimal()
+    mapping = Mapping(
+        time, found[0], found[1], fields["v"], fields["vdot"], list(q.joints) if named else None
+    )
+    if fields["v"] is None:
+        unsure["v"] = "no velocities were recognised; they will be differenced from q"
+    if not named:
+        unsure["joints"] = "the columns are taken base to tip"
+    return Suggestion(mapping, unsure)
+
+
+def _in_order(group: Group, first: Group) -> Group | None:
+    """The group with its columns in the order of the joints of another, or None where the joints differ."""
+    if first.joints[0].isdecimal() or group.joints[0].isdecimal():
+        same = (
+            len(group.columns) == len(first.columns)
+            and group.joints[0].isdecimal() == first.joints[0].isdecimal()
+        )
+        return group if same else None
+    if set(group.joints) != set(first.joints):
+        return None
+    columns = dict(zip(group.joints, group.columns, strict=True))
+    return replace(group, columns=tuple(columns[joint] for joint in first.joints), joints=first.joints)
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, lower case: ``joint1Pos_deg`` gives joint, 1, pos, deg."""
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
+    return re.findall(r"[a-z%µ°]+|\d+", spaced.lower())
+
+
+def _split_unit(name: str) -> tuple[str, str]:
+    """A name without its unit, and the unit as it is written, in brackets or as the last word."""
+    found = _UNIT.search(name)
+    if found:
+        return name[: found.start()].strip(), found[1]
+    last = words_of(name)[-1:]
+    if last and last[0] in _UNIT_WORDS and len(words_of(name)) > 1:
+        return name, _UNIT_WORDS[last[0]]
+    return name, ""
+
+
+def _numbered(columns: Sequence[str]) -> list[Group]:
+    """Groups like ``q1, q2, …`` or ``state.q[0], state.q[1], …`` with consecutive numbers from 0 or 1."""
+    found: dict[tuple[str, str, str], dict[int, str]] = {}
+    for column in columns:
+        name, unit = _split_unit(column)
+        for place in re.finditer(r"\d+", name):
+            key = (name[: place.start()], name[place.end() :], unit)
+            found.setdefault(key, {}).setdefault(int(place[0]), column)
+    groups = []
+    for (before, after, unit), members in found.items():
+        numbers = sorted(members)
+        if numbers[0] not in (0, 1) or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+            continue
+        words = [word for word in words_of(f"{before} {after}") if not word.isdecimal()]
+        label = f"{before}{{{numbers[0]}..{numbers[-1]}}}{after}"
+        groups.append(
+            Group(
+                label, tuple(members[k] for k in numbers), tuple(str(k) for k in numbers), tuple(words), unit
+            )
+        )
+    most = max((len(group.columns) for group in groups), default=0)
+    # A lone column with a 1 in its name is a group only where the arm may have one joint.
+    return [group for group in groups if len(group.columns) > 1 or most == 1]
+
+
+def _named(columns: Sequence[str], joints: Sequence[str]) -> list[Group]:
+    """Groups like ``elbow.pos, wrist.pos`` that share a beginning or an end, or hold the names of the arm's joints."""
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    for column in columns:
+        name, unit = _split_unit(column)
+        hits = [joint for joint in joints if joint in name]
+        if hits:
+            joint = max(hits, key=len)
+            found.setdefault((name.replace(joint, " "), unit), {})[joint] = column
+            continue
+        for separator in ("/", ".", "__", " ", "_"):
+            first, _, last = name.rpartition(separator)
+            if first and last and not last.isdecimal() and not _WANTED & set(words_of(first)):
+                found.setdefault((separator + last, unit), {})[first] = column
+                break
+    groups = []
+    for (key, unit), members in found.items():
+        if len(members) > 1 or (len(joints) == 1 and members):
+            ordered = (
+                sorted(members, key=list(joints).index) if set(members) <= set(joints) else list(members)
+            )
+            words = tuple(word for word in words_of(key) if not word.isdecimal())
+            names = tuple(members[joint] for joint in ordered)
+            groups.append(
+                Group(f"*{key.strip()}", names, tuple(ordered), words, unit, set(members) == set(joints))
+            )
+    return groups
+
+
+def _ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
+    """The groups that may hold a quantity, the likeliest first."""
+
+    def rank(group: Group) -> tuple[int, int, int, int]:
+        wanted = sum(word in _WANTED for word in group.words)
+        place = min(_WORDS[kind].index(word) for word in group.words if word in _WORDS[kind])
+        how = 0 if group.by_name else 1 if group.joints[0].isdecimal() else 2
+        return wanted, how, place, -len(group.columns)
+
+    return sorted((group for group in groups if _kind(group.words) == kind and rank(group)[0] < 2), key=rank)
+
+
+def _kind(words: Sequence[str]) -> str | None:
+    for kind, known in _WORDS.items():
+        if any(word in known for word in words):
+            return kind
+    return None
+
+
+def _unit(kind: str, group: Group) -> str | None:
+    said = canonical(group.unit, kind)
+    if said is None and group.unit and kind in ("v", "vdot"):
+        said = canonical(f"{group.unit}/s" + ("^2" if kind == "vdot" else ""), kind)
+    if said is None and kind == "tau" and _CURRENT & set(group.words):
+        return None
+    return said
+
+
+def _time(columns: Sequence[str]) -> tuple[TimeMap, str]:
+    found = []
+    for column in columns:
+        name, unit = _split_unit(column)
+        # a variable inside a struct: data.time
+        words = [word for word in words_of(name.rpartition(".")[2]) if word not in _UNIT_WORDS]
+        if words and all(word in _WORDS["time"] for word in words):
+            found.append((_WORDS["time"].index(words[0]), column, canonical(unit, "time")))
+    if not found:
+        return TimeMap(column=None, rate=None), "no column of time was recognised; say time: {rate: HZ}"
+    found.sort(key=lambda entry: entry[0])
+    _, column, written = found[0]
+    doubt = "" if len(found) == 1 else "also possible: " + ", ".join(entry[1] for entry in found[1:3])
+    return TimeMap(column, written), doubt

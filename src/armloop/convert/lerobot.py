@@ -1,0 +1,159 @@
+"""LeRobot data sets: a folder with ``meta/info.json`` and ``data/**/*.parquet``, or one of its Parquet files.
+
+``observation.state`` is a list per row; ``info.json`` names its entries. Positions may be in degrees, rad or
+normalised, and torques are there only where a robot's driver records them (``observation.effort`` and the like):
+the data set says neither, so both are asked for.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.convert.headers import suggest
+from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
+from armloop.convert.recording import Array, Recording, flatten
+from armloop.errors import LogError
+
+_TORQUES = (
+    "observation.effort",
+    "observation.torque",
+    "observation.current",
+    "effort",
+    "torque",
+    "observation.state.effort",
+)
+_VELOCITIES = ("observation.velocity", "observation.state.velocity", "velocity")
+_ENDINGS = {
+    "q": ("pos", "position", "q"),
+    "v": ("vel", "velocity"),
+    "tau": ("effort", "torque", "tau", "current", "trq"),
+}
+
+
+def is_lerobot(path: Path) -> bool:
+    """Whether a folder or a Parquet file is a LeRobot data set."""
+    if path.is_dir():
+        return (path / "meta" / "info.json").is_file()
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        names = pyarrow.parquet.read_schema(path).names
+    except (pyarrow.ArrowInvalid, OSError) as error:
+        raise LogError(f"{path}: not a Parquet file; write it anew, or name it .csv if it is text") from error
+    return "observation.state" in names
+
+
+def read_lerobot(path: Path) -> Recording:
+    """Read all episodes, each a run of its own; raises ``LogError`` where torques are missing."""
+    import pyarrow.parquet
+
+    files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
+    if not files:
+        raise LogError(f"{path}: the data set holds no data/**/*.parquet")
+    info = _info(path)
+    tables = [pyarrow.parquet.read_table(file) for file in files]
+    arrays: dict[str, Any] = {}
+    for name in tables[0].column_names:
+        parts = [_array(table.column(name)) for table in tables if name in table.column_names]
+        if len(parts) == len(tables) and all(part is not None for part in parts):
+            arrays[name] = np.concatenate([part for part in parts if part is not None])
+    features = info.get("features", {})
+    columns: dict[str, Array] = {}
+    for name, values in arrays.items():
+        entries = _names(features.get(name, {}).get("names"))
+        if values.ndim == 2 and len(entries) == values.shape[1]:
+            columns |= {f"{name}/{entry}": values[:, k] for k, entry in enumerate(entries)}
+        else:
+            columns |= flatten({name: values})
+    mapping, named = _mapping(columns, info)
+    if mapping is None:
+        raise LogError(
+            f"{path}: no torques or currents among {', '.join(sorted(arrays))}; a log needs them "
+            "(observation.effort, or a state with …effort or …current), or a --map that says where they are"
+        )
+    episode = arrays.get("episode_index")
+    starts = [0] if episode is None else [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(episode)))]
+    notes = [f"{len(starts)} episodes"]
+    return Recording(path, "LeRobot data set", columns, mapping, named=named, starts=starts, notes=notes)
+
+
+def _mapping(columns: dict[str, Array], info: dict[str, Any]) -> tuple[Mapping | None, bool]:
+    fps = info.get("fps")
+    time = TimeMap("timestamp", "s") if "timestamp" in columns else TimeMap(rate=float(fps) if fps else None)
+    states = [name for name in columns if name.startswith("observation.state")]
+    by_ending = {kind: [n for n in states if _ending(n) in endings] for kind, endings in _ENDINGS.items()}
+    torques = next((found for stem in _TORQUES if (found := _of(columns, stem))), by_ending["tau"])
+    velocities = next((found for stem in _VELOCITIES if (found := _of(columns, stem))), by_ending["v"])
+    positions = by_ending["q"] or [name for name in states if name not in (*torques, *velocities)]
+    if not positions or len(torques) != len(positions):
+        guess = suggest(list(columns)).mapping
+        return (
+            (None, False) if guess is None or guess.time.column is None else (guess, guess.joints is not None)
+        )
+    v = QuantityMap(velocities) if len(velocities) == len(positions) else None
+    names = [_joint(name) for name in positions]
+    named = "/" in positions[0]
+    return Mapping(
+        time, QuantityMap(positions), QuantityMap(torques), v, joints=names if named else None
+    ), named
+
+
+def _of(columns: dict[str, Array], stem: str) -> list[str]:
+    return [name for name in columns if name == stem or name.startswith((f"{stem}/", f"{stem}["))]
+
+
+def _ending(name: str) -> str:
+    return name.replace("_", ".").rpartition(".")[2].lower()
+
+
+def _joint(name: str) -> str:
+    entry = name.rpartition("/")[2]
+    return entry.rpartition(".")[0] if _ending(entry) in _ENDINGS["q"] and "." in entry else entry
+
+
+def _info(path: Path) -> dict[str, Any]:
+    folders = [path] if path.is_dir() else list(path.parents)[:4]
+    for folder in folders:
+        file = folder / "meta" / "info.json"
+        if file.is_file():
+            try:
+                found = json.loads(file.read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                raise LogError(
+                    f"{file}: no JSON ({error}); a LeRobot data set describes itself there"
+                ) from error
+            return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _names(value: Any) -> list[str]:
+    """The entries of a feature: a list, or a list under some key, or a dict of indices."""
+    if isinstance(value, dict):
+        inner = next(iter(value.values()), None)
+        return _names(inner) if isinstance(inner, list) else [str(key) for key in value]
+    return [str(entry) for entry in value] if isinstance(value, list) else []
+
+
+def _array(column: Any) -> Any:
+    import pyarrow
+
+    kind = column.type
+    if (
+        pyarrow.types.is_list(kind)
+        or pyarrow.types.is_large_list(kind)
+        or pyarrow.types.is_fixed_size_list(kind)
+    ):
+        rows = column.combine_chunks()
+        inner = kind.value_type
+        if not (pyarrow.types.is_floating(inner) or pyarrow.types.is_integer(inner)):
+            return None
+        flat = np.asarray(rows.flatten().to_numpy(zero_copy_only=False), dtype=np.float64)
+        return flat.reshape(len(rows), -1) if len(rows) and len(flat) % len(rows) == 0 else None
+    if pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
+        return column.to_numpy().astype(np.float64)
+    return None

@@ -1,0 +1,159 @@
+"""A map from a table's columns to a motion log: which column holds what, in which unit, sign and joint order.
+
+The file is YAML, one field per quantity; what it leaves out is not in the source::
+
+    schema: armloop/map/1
+    time: {column: timestamp, unit: ms}      # or {rate: 500} for samples at so many Hz
+    joints: [shoulder, elbow]                # names, in the order of the columns; matched with the arm's
+    q: {columns: [pos_a, pos_b], unit: deg, sign: [1, -1], offset: [0, 90]}
+    v: {columns: [vel_a, vel_b], unit: deg/s, sign: [1, -1]}
+    tau: {columns: "i_{1..2}", unit: A, gains: [8.1, 7.9]}   # N·m per unit of the column
+    keep: all                                # or the names of further columns to keep, or []
+
+A number, unit or sign stands for all joints, a list gives one per joint. An ``offset`` is in the column's unit
+and added before the sign. ``"i_{1..2}"`` stands for ``[i_1, i_2]``. A ``?`` is a question still to be answered.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from armloop.convert.units import FACTORS, canonical
+from armloop.errors import InputError
+
+SCHEMA = "armloop/map/1"
+UNSAID = "?"
+_RANGE = re.compile(r"\{(\d+)\.\.(\d+)\}")
+
+T = TypeVar("T")
+
+
+class TimeMap(msgspec.Struct, forbid_unknown_fields=True):
+    """Where the time comes from: a column and its unit, or an even rate in Hz."""
+
+    column: str | None = None
+    unit: str | None = None
+    rate: float | None = None
+
+
+class QuantityMap(msgspec.Struct, forbid_unknown_fields=True):
+    """The columns of one quantity, base to tip or in the order of ``joints``."""
+
+    columns: list[str] | str
+    unit: str | list[str] | None = None
+    sign: float | list[float] = 1.0
+    offset: float | list[float] = 0.0
+    gains: float | list[float] | None = None
+
+    def names(self) -> list[str]:
+        """The columns' names, with a range written out."""
+        if not isinstance(self.columns, str):
+            return self.columns
+        found = _RANGE.search(self.columns)
+        if found is None:
+            return [self.columns]
+        first, last = int(found[1]), int(found[2])
+        before, after = self.columns[: found.start()], self.columns[found.end() :]
+        return [f"{before}{k}{after}" for k in range(first, last + 1)]
+
+
+class Mapping(msgspec.Struct, forbid_unknown_fields=True):
+    """What each column of a source is; see the module."""
+
+    time: TimeMap
+    q: QuantityMap
+    tau: QuantityMap
+    v: QuantityMap | None = None
+    vdot: QuantityMap | None = None
+    joints: list[str] | None = None
+    keep: str | list[str] = "all"
+    schema: str = SCHEMA
+
+    def quantities(self) -> dict[str, QuantityMap]:
+        """The quantities that the source has, by name."""
+        found = {"q": self.q, "v": self.v, "tau": self.tau, "vdot": self.vdot}
+        return {name: quantity for name, quantity in found.items() if quantity is not None}
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.q.names())
+
+
+def read_map(path: str | Path) -> Mapping:
+    """Read and check a map.
+
+    Raises:
+        InputError: the file is missing or no map: one line that names the field.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); --map takes the path of a YAML file"
+        ) from error
+    # The standard YAML reader is loaded by msgspec when it is asked.
+    import msgspec.yaml
+
+    try:
+        mapping = msgspec.yaml.decode(text, type=Mapping)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}: no map: {error}; `armloop convert SOURCE --suggest` writes one to start from"
+        ) from error
+    check_map(mapping, str(path))
+    return mapping
+
+
+def check_map(mapping: Mapping, where: str) -> None:
+    """Raise ``InputError`` unless units are known, lists have one entry per joint, and nothing is asked twice."""
+    if mapping.schema != SCHEMA:
+        raise InputError(f"{where}: schema is {mapping.schema!r}; it must be {SCHEMA}")
+    if (mapping.time.column is None) == (mapping.time.rate is None):
+        raise InputError(f"{where}: time: give either column (with its unit) or rate in Hz")
+    if mapping.time.rate is not None and not 0 < mapping.time.rate < 1e6:
+        raise InputError(f"{where}: time: rate is {mapping.time.rate:g}; it must be a positive number of Hz")
+    _check_unit(mapping.time.unit, "time", where)
+    n = mapping.n
+    if mapping.joints is not None and len(mapping.joints) != n:
+        raise InputError(
+            f"{where}: joints: {len(mapping.joints)} names for {n} columns of q; give one per column"
+        )
+    for name, quantity in mapping.quantities().items():
+        if len(quantity.names()) != n:
+            raise InputError(
+                f"{where}: {name}: {len(quantity.names())} columns, but q has {n}; give one per joint"
+            )
+        for unit in [quantity.unit] if isinstance(quantity.unit, str | None) else quantity.unit:
+            _check_unit(unit, name, where)
+        for field in ("unit", "sign", "offset", "gains"):
+            value = getattr(quantity, field)
+            if isinstance(value, list) and len(value) != n:
+                raise InputError(f"{where}: {name}: {field} has {len(value)} entries; give one, or {n}")
+        if any(abs(sign) != 1 for sign in per_joint(quantity.sign, n)):
+            raise InputError(f"{where}: {name}: sign must be 1 or -1")
+        if quantity.gains is not None and name != "tau":
+            raise InputError(f"{where}: {name}: gains belong to tau alone (N·m per unit of the column)")
+        if quantity.gains is not None and not all(gain > 0 for gain in per_joint(quantity.gains, n)):
+            raise InputError(f"{where}: tau: every gain must be positive; say a direction with sign")
+    if isinstance(mapping.keep, str) and mapping.keep != "all":
+        raise InputError(f"{where}: keep is {mapping.keep!r}; it must be all or a list of columns")
+
+
+def per_joint(value: T | list[T], n: int) -> list[T]:
+    """One value for each of n joints."""
+    return value if isinstance(value, list) else [value] * n
+
+
+def _check_unit(unit: str | None, quantity: str, where: str) -> None:
+    if unit is None or unit == UNSAID:
+        return
+    if canonical(unit, quantity) is None:
+        raise InputError(
+            f"{where}: {quantity}: unit {unit!r} is unknown; it must be one of {', '.join(FACTORS[quantity])}"
+        )

@@ -1,0 +1,165 @@
+"""ROS bags (ROS 2 db3 and MCAP, with or without their folder; ROS 1 .bag), read without ROS.
+
+A ``sensor_msgs/JointState`` names its joints in every message; positions are in rad (m) and velocities in rad/s
+(m/s) by its definition. What ``effort`` holds it does not say: many drivers publish motor current in A.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.convert.joints import match
+from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
+from armloop.convert.recording import Array, Recording
+from armloop.errors import LogError
+
+JOINT_STATE = "JointState"
+# Messages of a topic that are looked at for the arm's joints; a gripper's driver may share the topic.
+_FIRST = 100
+
+
+def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> Recording:
+    """Read the joint states of one bag.
+
+    Args:
+        topic: which one, where a bag has several.
+        wanted: the joints' names; messages without them (of a gripper's driver) are left out. None takes the
+            names of the first message.
+
+    Raises:
+        LogError: the bag is unreadable, holds no joint states, or several that only ``topic`` can tell apart.
+    """
+    import msgspec
+    from rosbags.highlevel import AnyReader, AnyReaderError
+    from rosbags.typesys import Stores, get_typestore
+
+    stamps: list[int] = []
+    received: list[int] = []
+    rows: list[tuple[Array, Array, Array]] = []
+    names: tuple[str, ...] = ()
+    others: dict[str, None] = {}
+    fault: LogError | None = None
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            connections = [c for c in reader.connections if c.msgtype.rpartition("/")[2] == JOINT_STATE]
+            chosen = _topic(path, {c.topic for c in connections}, topic, reader, wanted)
+            left = sorted({c.topic for c in reader.connections} - {chosen})
+            order: dict[tuple[str, ...], list[int] | None] = {}
+            for connection, at, raw in reader.messages([c for c in connections if c.topic == chosen]):
+                message: Any = reader.deserialize(raw, connection.msgtype)
+                found = tuple(message.name)
+                if found not in order:
+                    try:
+                        order[found] = match(found, wanted or names or found, f"{path}: {chosen}")
+                    except LogError as error:
+                        order[found], fault = None, error
+                index = order[found]
+                if index is None:
+                    continue
+                names = names or tuple(found[k] for k in index)
+                others |= dict.fromkeys(name for k, name in enumerate(found) if k not in index)
+                if not (len(message.position) == len(message.velocity) == len(message.effort) == len(found)):
+                    raise _short(path, chosen, len(rows) + 1, message, len(found))
+                stamp = message.header.stamp
+                stamps.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
+                received.append(at)
+                rows.append((message.position[index], message.velocity[index], message.effort[index]))
+    except (
+        AnyReaderError,
+        msgspec.DecodeError,
+        KeyError,
+        EOFError,
+        AssertionError,
+        UnicodeDecodeError,
+    ) as error:
+        raise LogError(
+            f"{path}: no readable bag ({error}); give the bag's folder, a .db3, .mcap or .bag"
+        ) from error
+    if not rows:
+        raise fault or LogError(f"{path}: {chosen} has no messages; record the joint states of a moving arm")
+    notes = [f"{len(rows)} messages of {chosen}"]
+    if left:
+        notes.append(f"topics not read: {', '.join(left)}")
+    if others:
+        notes.append(f"joints that are not the arm's, left out: {', '.join(sorted(others))}")
+    clock = np.array(stamps, dtype=np.int64)
+    if not (clock > 0).any() or (np.diff(clock) == 0).all():
+        clock = np.array(received, dtype=np.int64)
+        notes.append("time is when a message was recorded: the headers hold no stamps")
+    return _recording(path, clock, rows, names, notes)
+
+
+def _recording(
+    path: Path, clock: Any, rows: list[tuple[Array, Array, Array]], names: tuple[str, ...], notes: list[str]
+) -> Recording:
+    late = np.flatnonzero(np.diff(clock) < 0)
+    if len(late):
+        by_time = np.argsort(clock, kind="stable")
+        clock, rows = clock[by_time], [rows[int(k)] for k in by_time]
+        notes.append(f"{len(late)} messages were recorded out of turn; they are sorted by their stamps")
+    columns = {"stamp": (clock - clock[0]) * 1e-9}
+    fields = {}
+    for k, (field, kind) in enumerate((("position", "q"), ("velocity", "v"), ("effort", "tau"))):
+        values = np.array([row[k] for row in rows], dtype=np.float64)
+        fields[kind] = [f"{name}/{field}" for name in names]
+        columns |= {column: values[:, j] for j, column in enumerate(fields[kind])}
+    mapping = Mapping(
+        TimeMap("stamp", "s"),
+        # rad or m, rad/s or m/s: the joint's kind says which, and both are SI
+        QuantityMap(fields["q"], "rad"),
+        QuantityMap(fields["tau"], None),
+        QuantityMap(fields["v"], "rad/s"),
+        joints=list(names),
+    )
+    return Recording(
+        path,
+        "ROS bag",
+        columns,
+        mapping,
+        named=True,
+        epoch=float(clock[0]) * 1e-9,
+        rows="message",
+        notes=notes,
+    )
+
+
+def _topic(path: Path, found: set[str], topic: str | None, reader: Any, wanted: Sequence[str] | None) -> str:
+    if topic is not None and topic not in found:
+        listed = ", ".join(sorted(found)) or "none"
+        raise LogError(f"{path}: no joint states under the topic {topic}; there are: {listed}")
+    if topic is not None:
+        return topic
+    if not found:
+        kinds = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})) or "no topics"
+        raise LogError(f"{path}: holds no sensor_msgs/JointState, but {kinds}; record the joint states")
+    if len(found) > 1 and wanted is not None:
+        found = {name for name in found if _has_joints(reader, name, wanted)} or found
+    if len(found) > 1:
+        raise LogError(
+            f"{path}: joint states under several topics; say --topic with one of: {', '.join(sorted(found))}"
+        )
+    return next(iter(found))
+
+
+def _has_joints(reader: Any, topic: str, wanted: Sequence[str]) -> bool:
+    """Whether one of the first messages of a topic holds the joints."""
+    messages = reader.messages([c for c in reader.connections if c.topic == topic])
+    for connection, _, raw in islice(messages, _FIRST):
+        with suppress(LogError):
+            match(reader.deserialize(raw, connection.msgtype).name, wanted, topic)
+            return True
+    return False
+
+
+def _short(path: Path, topic: str, row: int, message: Any, n: int) -> LogError:
+    sizes = f"{len(message.position)} positions, {len(message.velocity)} velocities, {len(message.effort)} efforts"
+    return LogError(
+        f"{path}: {topic}, message {row}: {sizes} for {n} joints; a log needs all three of every joint, "
+        "so record a driver that publishes effort"
+    )

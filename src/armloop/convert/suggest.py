@@ -1,0 +1,122 @@
+"""A map written from what a source says of itself, with a question where it says nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.convert.assemble import rate_ratio
+from armloop.convert.headers import suggest
+from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
+from armloop.convert.recording import Recording
+from armloop.convert.units import FACTORS, RATES, canonical
+from armloop.errors import LogError
+
+_BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
+_YAML_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
+
+
+def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str, str]]:
+    """The map of a source, and by field what is not sure of it.
+
+    Raises:
+        LogError: no positions or no torques are recognised among the columns.
+    """
+    mapping, unsure = recording.mapping, dict(recording.unsure)
+    if mapping is None or (arm is not None and mapping.n != arm.n and not recording.named):
+        names = [] if arm is None else [joint.name for joint in arm.joints]
+        found = suggest(list(recording.columns), names)
+        if found.mapping is None:
+            columns = ", ".join(list(recording.columns)[:20])
+            raise LogError(
+                f"{recording.path}: {found.unsure['columns']} ({columns}); write a map by hand, see docs/convert.md"
+            )
+        mapping, unsure = found.mapping, found.unsure
+    if mapping.tau.unit is None:
+        unsure["tau.unit"] = "N*m for torques, A for motor currents (then with gains, in N·m/A)"
+    for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
+        if quantity is not None and quantity.unit is None:
+            unsure[f"{kind}.unit"] = (
+                f"{_range(recording, quantity)}: rad or deg?" if kind == "q" else "as that of q, per s"
+            )
+    if mapping.time.column is not None and mapping.time.unit is None:
+        unsure["time.unit"] = _time_evidence(recording, mapping)
+    return mapping, unsure
+
+
+def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> str:
+    """The map as YAML with its doubts as comments; what is not said is a ``?``."""
+    lines = [
+        f"# A map of {recording.path.name} ({recording.kind}, {recording.samples} rows) to a motion log.",
+        "# Answer each ? and look at each line marked unsure, then: armloop convert SOURCE --map THIS --out LOG.parquet",
+        f"schema: {SCHEMA}",
+    ]
+    time = mapping.time
+    if time.rate is not None:
+        lines.append(f"time: {{rate: {time.rate:g}}}")
+    elif time.column is None:
+        lines.append(f"time: {{rate: {UNSAID!r}}}" + _doubt(unsure, "time"))
+    else:
+        unit = time.unit or UNSAID
+        lines.append(f"time: {{column: {_word(time.column)}, unit: {_word(unit)}}}" + _doubt(unsure, "time"))
+    if mapping.joints is not None:
+        lines.append(f"joints: {_words(mapping.joints)}" + _doubt(unsure, "joints"))
+    elif "joints" in unsure:
+        lines.append(f"# joints: unsure: {unsure['joints']}; names here would be matched with the arm's")
+    for kind, quantity in mapping.quantities().items():
+        lines.append(f"{kind}:{_doubt(unsure, kind)}")
+        lines.append(f"  columns: {_words(quantity.names())}")
+        lines.append(f"  unit: {_word(str(quantity.unit or UNSAID))}" + _doubt(unsure, f"{kind}.unit"))
+        if kind == "tau" and quantity.unit is None:
+            lines.append("  # gains: [..]  N·m per A, one per joint, if these are currents")
+    if "v" in unsure and mapping.v is None:
+        lines.append(f"# v: unsure: {unsure['v']}")
+    used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {time.column}
+    extra = [name for name in recording.columns if name not in used]
+    lines.append(
+        "keep: all" + (f"  # {', '.join(extra[:8])}{' …' if len(extra) > 8 else ''}" if extra else "")
+    )
+    return "\n".join(lines) + "\n"
+
+
+def doubts(unsure: dict[str, str]) -> list[str]:
+    """What is not sure, one line each."""
+    return [f"{field}: {text}" for field, text in unsure.items()]
+
+
+def _time_evidence(recording: Recording, mapping: Mapping) -> str:
+    assert mapping.time.column is not None
+    time = recording.columns[mapping.time.column]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    text = f"samples are {step:.6g} apart"
+    if mapping.v is not None and mapping.v.unit is None and mapping.q.unit is None:
+        # With the rates of the positions' unit, whichever it is.
+        plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, RATES["rad"])
+        ratio = rate_ratio(time, recording, *plain)
+        for unit, factor in FACTORS["time"].items():
+            if 0.7 < ratio / factor < 1.4:
+                return f"{text}; v agrees with the rate of q if it is {unit}"
+    return f"{text}: s, ms, us or ns?"
+
+
+def _range(recording: Recording, quantity: QuantityMap) -> str:
+    cells = np.concatenate([recording.columns[name] for name in quantity.names()])
+    return f"from {np.nanmin(cells):.4g} to {np.nanmax(cells):.4g}"
+
+
+def _doubt(unsure: dict[str, str], field: str) -> str:
+    return f"  # unsure: {unsure[field]}" if field in unsure else ""
+
+
+def _words(names: Sequence[str]) -> str:
+    return "[" + ", ".join(_word(name) for name in names) + "]"
+
+
+def _word(text: str) -> str:
+    """A YAML scalar, between quotes unless it is plainly a word."""
+    if _BARE.fullmatch(text) and text.lower() not in _YAML_WORDS and canonical(text, "q") is None:
+        return text.strip() if text == text.strip() else f"'{text}'"
+    return "'" + text.replace("'", "''") + "'"

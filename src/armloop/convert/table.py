@@ -1,0 +1,64 @@
+"""Any other table, CSV (any separator) or Parquet: its columns' names suggest a map, and a map makes it certain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armloop.convert.headers import suggest
+from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
+from armloop.convert.recording import Array, Recording
+from armloop.convert.text import read_text
+from armloop.errors import LogError
+
+
+def read_table(path: Path) -> Recording:
+    """Read one table; raises ``LogError`` where it cannot be read."""
+    if path.suffix == ".parquet":
+        columns, starts, dropped = _parquet(path)
+    else:
+        table = read_text(path)
+        columns, starts, dropped = table.columns, table.starts, table.dropped
+    notes = [f"columns left out: {', '.join(dropped)}"] if dropped else []
+    own = _own(columns)
+    if own is not None:
+        return Recording(path, "motion log", columns, own, starts=starts, notes=notes)
+    found = suggest(list(columns))
+    return Recording(path, "table", columns, found.mapping, starts=starts, notes=notes, unsure=found.unsure)
+
+
+def _own(columns: dict[str, Array]) -> Mapping | None:
+    """The map of a table that is a motion log already: its units are SI by definition, except of tau (A or N·m)."""
+    n = next(k for k in range(100) if f"q{k + 1}" not in columns)
+    names = {kind: [f"{kind}{j}" for j in range(1, n + 1)] for kind in ("q", "v", "tau", "vdot")}
+    if n == 0 or "time" not in columns or not all(c in columns for kind in ("v", "tau") for c in names[kind]):
+        return None
+    vdot = QuantityMap(names["vdot"], "rad/s^2") if all(c in columns for c in names["vdot"]) else None
+    return Mapping(
+        TimeMap("time", "s"),
+        QuantityMap(names["q"], "rad"),
+        QuantityMap(names["tau"], "N*m"),
+        QuantityMap(names["v"], "rad/s"),
+        vdot,
+    )
+
+
+def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str]]:
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.read_table(path)
+    except (pyarrow.ArrowException, OSError) as error:
+        raise LogError(f"{path}: not a Parquet file; write it anew, or name it .csv if it is text") from error
+    columns, dropped = {}, []
+    for name in table.column_names:
+        kind = table.schema.field(name).type
+        if (
+            pyarrow.types.is_floating(kind)
+            or pyarrow.types.is_integer(kind)
+            or pyarrow.types.is_boolean(kind)
+        ):
+            columns[name] = table.column(name).cast(pyarrow.float64()).to_numpy()
+        else:
+            dropped.append(f"{name} ({kind})")
+    return columns, [0], dropped

@@ -1,0 +1,77 @@
+"""Units that other people's logs come in, and the factor that takes each to SI."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_DEGREE = np.pi / 180
+
+#: By quantity: the factor from the unit to SI. A motor current stays one, in A, and so does a percentage of a
+#: rated torque: only a gain turns them into a torque.
+FACTORS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "q": {"rad": 1.0, "deg": _DEGREE, "rev": 2 * np.pi, "m": 1.0, "mm": 1e-3},
+    "v": {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": np.pi / 30, "rev/s": 2 * np.pi, "m/s": 1.0, "mm/s": 1e-3},
+    "vdot": {"rad/s^2": 1.0, "deg/s^2": _DEGREE, "m/s^2": 1.0, "mm/s^2": 1e-3},
+    "tau": {"N*m": 1.0, "mN*m": 1e-3, "kN*m": 1e3, "N": 1.0, "A": 1.0, "mA": 1e-3, "%": 1.0},
+}
+#: Units of `tau` that are no torque.
+CURRENTS = ("A", "mA")
+_ALIASES = {
+    "sec": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "millisec": "ms",
+    "milliseconds": "ms",
+    "usec": "us",
+    "µs": "us",
+    "microseconds": "us",
+    "nsec": "ns",
+    "nanoseconds": "ns",
+    "radian": "rad",
+    "radians": "rad",
+    "degree": "deg",
+    "degrees": "deg",
+    "°": "deg",
+    "°/s": "deg/s",
+    "rads": "rad/s",
+    "degs": "deg/s",
+    "rad/s2": "rad/s^2",
+    "rad/s²": "rad/s^2",
+    "rad/s**2": "rad/s^2",
+    "deg/s2": "deg/s^2",
+    "deg/s²": "deg/s^2",
+    "m/s2": "m/s^2",
+    "m/s²": "m/s^2",
+    "nm": "N*m",
+    "n*m": "N*m",
+    "n·m": "N*m",
+    "n.m": "N*m",
+    "n m": "N*m",
+    "n-m": "N*m",
+    "newton": "N",
+    "n": "N",
+    "mnm": "mN*m",
+    "mn*m": "mN*m",
+    "a": "A",
+    "amp": "A",
+    "amps": "A",
+    "ampere": "A",
+    "ma": "mA",
+    "percent": "%",
+}
+#: The unit of the velocity that goes with a position's, and so on.
+RATES = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s"}
+ACCELERATIONS = {"rad": "rad/s^2", "deg": "deg/s^2", "m": "m/s^2", "mm": "mm/s^2"}
+
+
+def canonical(text: str, quantity: str) -> str | None:
+    """The unit of a quantity as this module spells it, or None where the text names none of that quantity."""
+    text = text.strip()
+    known = FACTORS[quantity]
+    if text in known:
+        return text
+    alias = _ALIASES.get(text.lower(), text.lower())
+    return alias if alias in known else None

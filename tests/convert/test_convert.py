@@ -1,0 +1,343 @@
+"""Each format, written as its program writes it, gives the motion back; what it does not say is asked for."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+from foreign_logs import NAMES, bag, libfranka, motion, rtde
+from synthetic import three_axis
+
+from armloop.cli import main
+from armloop.convert import Answers, convert, read_map
+from armloop.convert.headers import suggest
+from armloop.errors import InputError
+from armloop.log import MotionLog, read_log
+
+TORQUE = Answers(tau_unit="N*m")
+
+
+@pytest.fixture(scope="module")
+def log() -> MotionLog:
+    return motion()
+
+
+def assert_same(found: MotionLog, log: MotionLog, tolerance: float = 1e-8) -> None:
+    assert found.samples == log.samples
+    np.testing.assert_allclose(found.q, log.q, atol=tolerance * 10)
+    np.testing.assert_allclose(found.v, log.v, atol=tolerance * 10)
+    np.testing.assert_allclose(found.tau, log.tau, atol=tolerance * 100)
+
+
+def refused(line: list[str], capsys) -> str:
+    """The line that a command refuses its input with."""
+    assert main(line) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("armloop: ") and error.count("\n") == 1
+    return error
+
+
+@pytest.mark.parametrize("kind", ["db3", "mcap"])
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1]])
+def test_a_bag_gives_the_joints_by_name(tmp_path, log, kind, order):
+    path = bag(tmp_path / "bag", log, order, kind=kind, shuffle=True, gripper=True)
+    for source in (path, path.parent):
+        found = convert([source], arm=three_axis(), answers=TORQUE)
+        assert_same(found.log, log)
+        np.testing.assert_allclose(found.log.time, log.time, atol=2e-9)
+        assert found.joints == NAMES
+
+
+def test_a_bag_without_stamps_is_timed_by_its_recorder(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="mcap", stamps=False)
+    found = convert([path], arm=three_axis(), answers=TORQUE)
+    np.testing.assert_allclose(found.log.time, log.time, atol=2e-9)
+    assert any("recorded" in note for note in found.notes)
+
+
+def test_prefixed_names_match_and_others_are_told(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [2, 1, 0], kind="db3", names=[f"left_{name}" for name in NAMES])
+    assert_same(convert([path], arm=three_axis(), answers=TORQUE).log, log)
+    other = bag(tmp_path / "other", log, [2, 1, 0], kind="db3", names=["a", "b", "c"])
+    with pytest.raises(InputError, match="no joint matches") as error:
+        convert([other], arm=three_axis(), answers=TORQUE)
+    assert all(name in str(error.value) for name in [*NAMES, "a, b, c"[::-1][:1]])
+
+
+def test_an_order_of_the_alphabet_needs_the_arm(tmp_path, log):
+    names = ["base", "elbow", "wrist"]
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="db3", names=names)
+    with pytest.raises(InputError, match="order of the alphabet"):
+        convert([path], answers=TORQUE)
+    counted = bag(tmp_path / "counted", log, [0, 1, 2], kind="db3", names=["j1", "j2", "j3"])
+    assert_same(convert([counted], answers=TORQUE).log, log)
+
+
+def test_several_topics_are_asked_for(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="mcap", topics=("/a/joint_states", "/b/joint_states"))
+    with pytest.raises(InputError, match=r"--topic with one of: /a/joint_states, /b/joint_states"):
+        convert([path], arm=three_axis(), answers=TORQUE)
+    assert_same(convert([path], arm=three_axis(), answers=TORQUE, topic="/b/joint_states").log, log)
+
+
+def test_the_unit_of_effort_is_asked_for_in_a_line(tmp_path, log, capsys):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="db3")
+    out = tmp_path / "log.parquet"
+    line = ["convert", str(path), "--arm", "three_axis", "--out", str(out)]
+    error = refused(line, capsys)
+    assert "does not say what tau holds" in error and "--tau-unit" in error
+    assert not out.exists()
+    assert main([*line, "--drive-gains", "2,3,4"]) == 0
+    assert_same(replace(read_log(out, joints=3), time=log.time), replace(log, tau=log.tau * [2, 3, 4]))
+    assert main([*line, "--tau-unit", "A"]) == 0
+    assert "--tau-unit A" in capsys.readouterr().out
+
+
+def test_a_folder_or_file_that_is_no_bag(tmp_path, capsys):
+    (tmp_path / "x.mcap").write_bytes(b"no bag at all")
+    (tmp_path / "x.db3").write_bytes(b"no bag at all")
+    (tmp_path / "empty").mkdir()
+    for name in ("x.mcap", "x.db3", "empty", "nowhere.db3"):
+        assert name in refused(["convert", str(tmp_path / name), "--out", str(tmp_path / "o.csv")], capsys)
+    assert not (tmp_path / "o.csv").exists()
+
+
+@pytest.mark.parametrize("separator", [" ", ",", ";"])
+def test_rtde_keeps_temperatures_and_its_currents_take_gains(tmp_path, log, separator):
+    path = rtde(tmp_path / "robot.csv", log, separator)
+    currents = convert([path])
+    assert currents.log.tau_unit == "A"
+    assert_same(replace(currents.log, tau=currents.log.tau * 10), log)
+    found = convert([path], answers=Answers(drive_gains=[10, 10, 10]), arm=three_axis())
+    assert found.log.tau_unit == "N*m"
+    assert_same(found.log, log)
+    np.testing.assert_allclose(found.extra["joint_temperatures_1"], 30 + 2 * log.time, atol=1e-6)
+
+
+@pytest.mark.parametrize("old", [True, False])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_libfranka_repeats_its_header_and_each_starts_a_run(tmp_path, log, old, parts):
+    found = convert([libfranka(tmp_path / "log.csv", log, old=old, parts=parts)])
+    assert_same(found.log, log, 1e-7)
+    assert len(found.log.runs()) == parts
+    assert [run.stop - run.start for run in found.log.runs()] == [600 // parts] * parts
+    np.testing.assert_allclose(found.log.period, 0.01)
+
+
+def lerobot(folder: Path, log: MotionLog, unit: float) -> Path:
+    (folder / "meta").mkdir(parents=True)
+    (folder / "data" / "chunk-000").mkdir(parents=True)
+    turn = [2, 0, 1]
+    names = [f"{NAMES[j]}.pos" for j in turn]
+    features = {
+        "observation.state": {"names": names},
+        "observation.effort": {"names": [f"{NAMES[j]}" for j in turn]},
+    }
+    (folder / "meta" / "info.json").write_text(json.dumps({"fps": 100, "features": features}))
+    half = log.samples // 2
+    for k, rows in enumerate((slice(0, half), slice(half, None))):
+        table = pa.table(
+            {
+                "observation.state": list(unit * log.q[rows][:, turn]),
+                "observation.effort": list(log.tau[rows][:, turn]),
+                "timestamp": log.time[rows] - log.time[rows][0],
+                "episode_index": np.full(len(log.time[rows]), k),
+            }
+        )
+        pyarrow.parquet.write_table(table, folder / "data" / "chunk-000" / f"episode_{k:06d}.parquet")
+    return folder
+
+
+def test_lerobot_episodes_are_runs_and_degrees_are_asked_for(tmp_path, log):
+    folder = lerobot(tmp_path / "set", log, 180 / np.pi)
+    with pytest.raises(InputError, match=r"--tau-unit.*--angle-unit"):
+        convert([folder], arm=three_axis())
+    found = convert([folder], arm=three_axis(), answers=Answers(tau_unit="N*m", angle_unit="deg"))
+    assert len(found.log.runs()) == 2
+    np.testing.assert_allclose(found.log.q, log.q, atol=1e-9)
+    np.testing.assert_allclose(found.log.tau, log.tau, atol=1e-9)
+    assert np.abs(found.log.v - log.v)[5:-5].max() < 0.05  # differenced, within and not across the episodes
+    assert any("central differences" in note for note in found.notes)
+    one = convert(
+        [folder / "data/chunk-000/episode_000001.parquet"],
+        arm=three_axis(),
+        answers=Answers("N*m", None, "deg"),
+    )
+    np.testing.assert_allclose(one.log.q, log.q[300:], atol=1e-9)
+
+
+@pytest.mark.parametrize("sideways", [True, False])
+def test_matlab_and_numpy_arrays(tmp_path, log, sideways):
+    from scipy.io import savemat
+
+    turn = (lambda x: x.T) if sideways else (lambda x: x)
+    arrays = {
+        "t": log.time,
+        "q": turn(log.q),
+        "dq": turn(log.v),
+        "tau": turn(log.tau),
+        "note": "a text",
+        "k": 3.0,
+    }
+    savemat(tmp_path / "a.mat", arrays)
+    savemat(tmp_path / "b.mat", {"data": arrays})
+    np.savez(tmp_path / "c.npz", **{key: arrays[key] for key in ("t", "q", "dq", "tau")})
+    np.savez(
+        tmp_path / "d.npz",
+        o=np.array([{}], dtype=object),
+        **{key: arrays[key] for key in ("t", "q", "dq", "tau")},
+    )
+    for name in ("a.mat", "b.mat", "c.npz", "d.npz"):
+        with pytest.raises(InputError, match="--angle-unit"):
+            convert([tmp_path / name], answers=TORQUE)
+        found = convert([tmp_path / name], answers=Answers("N*m", None, "rad"))
+        assert_same(found.log, log, 1e-12)
+        np.testing.assert_allclose(found.log.time, log.time, atol=1e-12)
+
+
+def test_a_map_turns_units_signs_and_order(tmp_path, log, capsys):
+    table = tmp_path / "table.txt"
+    rows = np.column_stack(
+        [1e3 * log.time, np.degrees(log.q[:, ::-1]) * [1, -1, 1], np.degrees(log.v[:, ::-1]) * [1, -1, 1]]
+    )
+    rows = np.column_stack([rows, 1e3 * log.tau[:, ::-1] / [3, 2, 1], 20 + log.time])
+    names = ["ms", "p_c", "p_b", "p_a", "s_c", "s_b", "s_a", "i_c", "i_b", "i_a", "oil temperature"]
+    text = ["\t".join(names), *("\t".join(f"{x:.12g}".replace(".", ",") for x in row) for row in rows)]
+    table.write_text("\n".join(text) + "\n")
+    (tmp_path / "map.yaml").write_text(
+        "time: {column: ms, unit: ms}\n"
+        f"joints: [{', '.join(NAMES[::-1])}]\n"
+        "q: {columns: [p_c, p_b, p_a], unit: deg, sign: [1, -1, 1]}\n"
+        "v: {columns: [s_c, s_b, s_a], unit: deg/s, sign: [1, -1, 1]}\n"
+        "tau: {columns: [i_c, i_b, i_a], unit: mA, gains: [3, 2, 1]}\n"
+    )
+    out = tmp_path / "log.csv"
+    assert (
+        main(
+            [
+                "convert",
+                str(table),
+                "--map",
+                str(tmp_path / "map.yaml"),
+                "--arm",
+                "three_axis",
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
+    assert_same(read_log(out, joints=3), log)
+    assert "oil temperature" in out.read_text().splitlines()[0]
+
+
+def test_suggest_writes_a_map_with_questions_that_must_be_answered(tmp_path, log, capsys):
+    table = tmp_path / "table.csv"
+    names = [
+        "Time [ms]",
+        *(f"Axis{j} position (deg)" for j in (1, 2, 3)),
+        *(f"Axis{j} velocity (deg/s)" for j in (1, 2, 3)),
+    ]
+    names += [f"Axis{j} current" for j in (1, 2, 3)] + ["Axis1 target position (deg)", "state"]
+    rows = np.column_stack(
+        [1e3 * log.time, np.degrees(log.q), np.degrees(log.v), log.tau, np.degrees(log.q[:, 0])]
+    )
+    lines = [",".join([*(f"{x:.12g}" for x in row), "RUN"]) for row in rows]
+    table.write_text("\n".join([",".join(names), *lines]) + "\n")
+    place, out = tmp_path / "map.yaml", tmp_path / "log.parquet"
+    assert main(["convert", str(table), "--suggest", "--map", str(place)]) == 0
+    assert "tau.unit" in capsys.readouterr().out
+    assert read_map(place).q.unit == "deg" and read_map(place).time.unit == "ms"
+    line = ["convert", str(table), "--map", str(place), "--out", str(out)]
+    assert "does not say what tau holds" in refused(line, capsys)
+    assert "exists" in refused(["convert", str(table), "--suggest", "--map", str(place)], capsys)
+    place.write_text(place.read_text().replace("unit: '?'", "unit: N*m"))
+    assert main(line) == 0
+    assert_same(read_log(out), log)
+
+
+HEADERS = {
+    "t,pos0,pos1,vel0,vel1,effort0,effort1": "pos0 pos1 effort0 effort1",
+    "time,joint_1_q,joint_2_q,joint_1_dq,joint_2_dq,joint_1_tau,joint_2_tau": "joint_1_q joint_2_q joint_1_tau joint_2_tau",
+    "stamp,q_d[0],q_d[1],q[0],q[1],tau_J[0],tau_J[1],tau_ext[0],tau_ext[1]": "q[0] q[1] tau_J[0] tau_J[1]",
+    "timestamp_ns,elbow.pos,wrist.pos,elbow.torque,wrist.torque": "elbow.pos wrist.pos elbow.torque wrist.torque",
+    "sec,ActualPos1,ActualPos2,TargetPos1,TargetPos2,Torque1,Torque2": "ActualPos1 ActualPos2 Torque1 Torque2",
+}
+
+
+@pytest.mark.parametrize("header", HEADERS)
+def test_headers_are_understood(header):
+    found = suggest(header.split(",")).mapping
+    assert found is not None and found.time.column == header.split(",")[0]
+    assert [*found.q.columns, *found.tau.columns] == HEADERS[header].split()
+
+
+BAD_MAPS = {
+    "no field": ("q: {columns: [a]}", "map.yaml"),
+    "unknown field": ("time: {column: t}\nq: {columns: [a]}\ntau: {columns: [b]}\nbogus: 1", "bogus"),
+    "unit": ("time: {column: t}\nq: {columns: [a], unit: furlong}\ntau: {columns: [b]}", "furlong"),
+    "count": ("time: {column: t}\nq: {columns: [a, c]}\ntau: {columns: [b]}", "1 columns, but q has 2"),
+    "sign": ("time: {column: t}\nq: {columns: [a], sign: 2}\ntau: {columns: [b]}", "sign must be"),
+    "both times": ("time: {column: t, rate: 3}\nq: {columns: [a]}\ntau: {columns: [b]}", "either column"),
+    "no yaml": ("time: {column: [", "map.yaml"),
+    "no column": (
+        "time: {column: t, unit: s}\nq: {columns: [zz], unit: rad}\ntau: {columns: [u], unit: N*m}",
+        "no column",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MAPS)
+def test_a_bad_map_is_told_in_a_line(tmp_path, log, capsys, case):
+    text, word = BAD_MAPS[case]
+    (tmp_path / "map.yaml").write_text(text)
+    path = rtde(tmp_path / "robot.csv", log)
+    error = refused(
+        ["convert", str(path), "--map", str(tmp_path / "map.yaml"), "--out", str(tmp_path / "o.csv")], capsys
+    )
+    assert word in error
+    assert not (tmp_path / "o.csv").exists()
+
+
+def test_sources_follow_each_other_as_runs(tmp_path, log):
+    rtde(tmp_path / "a.csv", log)
+    rtde(tmp_path / "b.csv", log)
+    found = convert([tmp_path / "a.csv", tmp_path / "b.csv"], answers=Answers(drive_gains=[10, 10, 10]))
+    assert [run.start for run in found.log.runs()] == [0, log.samples]
+    np.testing.assert_allclose(found.log.q[log.samples :], log.q, atol=1e-8)
+
+
+def test_faults_of_tables_name_the_place(tmp_path, log, capsys):
+    path = rtde(tmp_path / "robot.csv", log, ",")
+    lines = path.read_text().splitlines()
+    out = ["--out", str(tmp_path / "o.csv")]
+    cases = {
+        "cut.csv": ([*lines[:-1], lines[-1][:20]], "row 600 (line 601)"),
+        "text.csv": ([*lines[:9], lines[9].replace(",", ",x", 1), *lines[10:]], "row 9"),
+        "back.csv": ([*lines[:9], lines[5], *lines[10:]], "row 9"),
+        "none.csv": (lines[:1], "no rows"),
+        "numbers.csv": (lines[1:], "header"),
+    }
+    for name, (text, word) in cases.items():
+        (tmp_path / name).write_text("\n".join(text) + "\n")
+        assert word in refused(["convert", str(tmp_path / name), *out], capsys), name
+    assert "is one of the sources" in refused(["convert", str(path), "--out", str(path)], capsys)
+    assert path.read_text().splitlines() == lines
+
+
+@pytest.mark.measured
+def test_the_measured_bag_of_a_ur10(measured, tmp_path, capsys):
+    path, arm = measured / "ros2bag" / "ur10_exciting_trajectory.db3", measured / "ur10e" / "ur10e.urdf"
+    out = tmp_path / "ur10.parquet"
+    line = ["convert", str(path), "--arm", str(arm), "--out", str(out)]
+    assert "--tau-unit" in refused(line, capsys)
+    assert main([*line, "--tau-unit", "N*m", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["samples"] == 3441 and answer["joints"][0] == "shoulder_pan_joint"
+    log = read_log(out, joints=6)
+    assert len(log.runs()) == 1
+    np.testing.assert_allclose(log.period, 0.008, rtol=1e-6)
+    np.testing.assert_allclose(log.tau[0, 0], 8.3223478)
