@@ -27,7 +27,8 @@ def model_with(name: str) -> ReconstructedModel:
     arm = load_arm("three_axis")
     whole = name in ("payload", "gravity_tilt")
     added = AddedEffect(
-        effect(name, None if whole else 2), {k: Estimate(v, 0.0, "") for k, v in PARAMETERS[name].items()}
+        effect(name, None if whole else 2),
+        {k: Estimate(v, (0 * np.asarray(v)).tolist(), "") for k, v in PARAMETERS[name].items()},
     )
     terms = SparseTerms(2, np.array([[0, 2], [4, 10]]), np.array([[0.5, 0.0, 1.0], [0.0, 2.0, 0.3]]))
     body = RigidBody(np.concatenate([nominal_parameters(arm), [0.1, 0.2, 0.3]]), ("m1",), np.array([1.0]))

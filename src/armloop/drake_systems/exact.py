@@ -39,7 +39,10 @@ def exact_model(
     added = tuple(
         AddedEffect(
             e.build(),
-            {key: Estimate(np.asarray(value).tolist(), 0.0, "") for key, value in e.parameters.items()},
+            {
+                key: Estimate(np.asarray(value).tolist(), (0.0 * np.asarray(value)).tolist(), "")
+                for key, value in e.parameters.items()
+            },
         )
         for e in effects
     )
