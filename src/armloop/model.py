@@ -38,10 +38,14 @@ SCHEMA = "armloop/model/2"
 
 @dataclass(frozen=True)
 class AddedEffect:
-    """An effect that a diagnosis added, with its estimated parameters."""
+    """An effect that is not among the model's components, with its estimated parameters.
+
+    ``when`` is ``"always"`` where a reconstruction found it in the training data, None where a diagnosis added it.
+    """
 
     effect: Effect
     parameters: dict[str, Estimate]
+    when: str | None = None
 
     def torque(self, context: Context) -> Array:
         """(N, n) torque of the effect."""
@@ -67,6 +71,7 @@ class AddedEffect:
             "joint": self.effect.joint,
             **({"other_joint": self.effect.other_joint} if self.effect.pair_wise else {}),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+            **({"when": self.when} if self.when else {}),
         }
 
     @staticmethod
@@ -78,6 +83,7 @@ class AddedEffect:
                 key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
                 for key, e in data["parameters"].items()
             },
+            data.get("when"),
         )
 
 
@@ -101,7 +107,7 @@ class ReconstructedModel:
         baseline: what the model leaves on data of its own training runs that were not fitted:
             ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
             the parts of the torque that are explained, predictable but not explained, and noise.
-        effects: what a diagnosis added.
+        effects: laws of the catalogue that a reconstruction found beside the components, and what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
             empty where nobody computed them.

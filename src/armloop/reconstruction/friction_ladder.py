@@ -16,7 +16,7 @@ A user may restrict the ladder to some laws, by the names in :data:`armloop.libr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -82,12 +82,13 @@ class Climb:
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """The laws chosen, the prior of the shared coefficients, and what each rung brought."""
+    """The laws chosen, the prior of the shared coefficients, what each rung brought, and all that could be chosen."""
 
     laws: list[list[FrictionTerm]]
     prior: Prior | None
     climbs: list[Climb]
     notes: list[str]
+    candidates: list[list[FrictionTerm]] = field(default_factory=list)
 
 
 def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
@@ -202,7 +203,7 @@ def climb(
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
-    return Ladder(laws, state.prior, climbs, notes + _notes(climbs))
+    return Ladder(laws, state.prior, climbs, notes + _notes(climbs), candidates)
 
 
 def inner_folds(
