@@ -1,7 +1,7 @@
 """The command line: parse, call.
 
 Exit status: 0 done; 2 the input is at fault; 1 something else is (memory, a process killed); 130 Ctrl-C; 143 SIGTERM;
-with one line on standard error.
+with one line on standard error. 3 `armloop watch` has a new alarm.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from importlib import import_module
 from armloop import __version__
 from armloop.errors import InputError
 from armloop.outputs import guarding
+from armloop.voices import listening
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
 COMMANDS = (
@@ -30,8 +31,10 @@ COMMANDS = (
     "crossvalidate",
     "evaluate",
     "diagnose",
+    "export",
     "track",
     "tune",
+    "watch",
     "reproduce",
 )
 
@@ -54,10 +57,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal's encoding lacks is spelt out
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _ending_on_request():
+        with listening() as doubts, _ending_on_request():
             options = build_parser().parse_args(arguments)
             with guarding(options.command, _named_files(options), options.force):
-                options.run(options)
+                status = options.run(options)
+        for doubt in doubts:
+            print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
         return _fault(str(error), 2)
     except BrokenPipeError:
@@ -77,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault("interrupted", 130)
     except _Ended:
         return _fault("ended on request (SIGTERM)", 143)
-    return 0
+    return int(status or 0)
 
 
 def _fault(message: str, status: int) -> int:

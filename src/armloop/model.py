@@ -37,10 +37,14 @@ SCHEMA = "armloop/model/2"
 
 @dataclass(frozen=True)
 class AddedEffect:
-    """An effect that a diagnosis added, with its estimated parameters."""
+    """An effect that is not among the model's components, with its estimated parameters.
+
+    ``when`` is ``"always"`` where a reconstruction found it in the training data, None where a diagnosis added it.
+    """
 
     effect: Effect
     parameters: dict[str, Estimate]
+    when: str | None = None
 
     def torque(self, context: Context) -> Array:
         """(N, n) torque of the effect."""
@@ -57,6 +61,7 @@ class AddedEffect:
             "joint": self.effect.joint,
             **({"other_joint": self.effect.other_joint} if self.effect.pair_wise else {}),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+            **({"when": self.when} if self.when else {}),
         }
 
     @staticmethod
@@ -68,6 +73,7 @@ class AddedEffect:
                 key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
                 for key, e in data["parameters"].items()
             },
+            data.get("when"),
         )
 
 
@@ -91,7 +97,7 @@ class ReconstructedModel:
         baseline: what the model leaves on data of its own training runs that were not fitted:
             ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
             the parts of the torque that are explained, predictable but not explained, and noise.
-        effects: what a diagnosis added.
+        effects: laws of the catalogue that a reconstruction found beside the components, and what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
             empty where nobody computed them.
@@ -151,8 +157,7 @@ class ReconstructedModel:
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
-        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
-        return Context(self.arm, motion, inertial, period)
+        return Context(self.arm, motion, inertial, motion.period)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""

@@ -13,11 +13,12 @@ import numpy as np
 from armloop.arm import Arm, load_arm
 from armloop.errors import InputError, ModelError
 from armloop.files import strict
-from armloop.log import MotionLog, read_log
+from armloop.log import MotionLog, read_log, same_measurement
 from armloop.model import ReconstructedModel, load_model
 from armloop.outputs import take_file, take_folder
 from armloop.progress import Progress, silent
 from armloop.signals import condition
+from armloop.voices import said
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -29,8 +30,8 @@ def progress(options: argparse.Namespace) -> Progress:
 
 
 def print_json(value: Any) -> None:
-    """Print the answer of ``--json``, strict JSON."""
-    print(strict(value))
+    """Print the answer of ``--json``, strict JSON, with what is doubtful about the input as ``warnings``."""
+    print(strict({**value, "warnings": said()} if said() else value))
 
 
 def out_folder(path: str, names: Iterable[str] = ()) -> Path:
@@ -41,6 +42,20 @@ def out_folder(path: str, names: Iterable[str] = ()) -> Path:
 def out_file(path: str | None, option: str) -> None:
     """Check the place of an output file before any work is done; see :func:`armloop.outputs.take_file`."""
     take_file(path, option)
+
+
+def arm_of(options: argparse.Namespace) -> Arm:
+    """The arm of ``--arm`` (or ARM), with what ``--lock`` and ``--tip`` say; raises ``InputError``."""
+    lock = {}
+    for text in options.lock:
+        name, equals, value = text.rpartition("=")
+        try:
+            lock[name] = float(value)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise InputError(f"--lock {text}: give JOINT=VALUE, such as finger_joint=0.02")
+    return load_arm(options.arm, lock, options.tip)
 
 
 def drive_gains(text: str | None) -> list[float] | None:
@@ -84,7 +99,7 @@ TORQUE = {"unit": "N*m", "drive_gains": None}
 
 def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, list[MotionLog]]:
     """The model of a command line and the logs that are to be compared with it."""
-    arm: Arm | None = load_arm(options.arm) if options.arm else None
+    arm: Arm | None = arm_of(options) if options.arm else None
     model = load_model(options.model, arm)
     recorded = recorded_as(options, model.recorded)
     if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":
@@ -92,15 +107,18 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
     return model, read_logs(options.logs, model.arm.n, recorded)
 
 
-def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> list[MotionLog]:
+def held_out_logs(
+    options: argparse.Namespace, model: ReconstructedModel, fitted: list[MotionLog]
+) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
-    fitted = {Path(path).resolve() for path in options.logs}
-    for path in options.held_out:
-        if Path(path).resolve() in fitted:
-            raise InputError(
-                f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted"
-            )
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    for path, log in zip(options.held_out, logs, strict=True):
+        for other in fitted:
+            if same_measurement(log, other):
+                raise InputError(
+                    f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
+                    "--held-out takes runs that are not fitted"
+                )
     for log in logs:
         condition([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

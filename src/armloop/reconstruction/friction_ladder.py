@@ -16,7 +16,7 @@ A user may restrict the ladder to some laws, by the names in :data:`LAWS`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -30,6 +30,7 @@ from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion, Samples
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.pooled import Choice, Pooled, Prior
+from armloop.signals import at_least
 
 Array = NDArray[np.float64]
 
@@ -95,12 +96,13 @@ class Climb:
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """The laws chosen, the prior of the shared coefficients, and what each rung brought."""
+    """The laws chosen, the prior of the shared coefficients, what each rung brought, and all that could be chosen."""
 
     laws: list[list[FrictionTerm]]
     prior: Prior | None
     climbs: list[Climb]
     notes: list[str]
+    candidates: list[list[FrictionTerm]] = field(default_factory=list)
 
 
 def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
@@ -215,7 +217,7 @@ def climb(
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
-    return Ladder(laws, state.prior, climbs, notes + _notes(climbs))
+    return Ladder(laws, state.prior, climbs, notes + _notes(climbs), candidates)
 
 
 def inner_folds(
@@ -247,7 +249,7 @@ def _inside(motion: Motion, numbers: NDArray[np.intp], samples: Samples) -> NDAr
     """(N,) samples further than half a period of the filter from the borders of their block."""
     inside = np.ones(motion.samples, dtype=bool)
     if samples.cutoff_hz > 0:
-        reach = int(np.ceil(0.5 / (samples.cutoff_hz * samples.period)))
+        reach = at_least(0.5 / (samples.cutoff_hz * samples.period))
         border = np.flatnonzero(np.diff(numbers)) + 1
         near = (border[:, None] + np.arange(-reach, reach)).ravel()
         inside[near[(near >= 0) & (near < motion.samples)]] = False

@@ -13,6 +13,7 @@ from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.errors import InputError
 from armloop.goodness import Parts, merged
+from armloop.log import require_different
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.pieces import IN_MEMORY, LogSource
@@ -131,14 +132,17 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
 
+    large = sum(log.samples for log in logs) > in_memory
+    kept = [] if large and method == "stepwise" else [log.read() for log in logs]
+    require_different(kept)
+
     def attempt(library: str) -> Attempt:
         how = conditioning or default_conditioning(library)
         progress(f"conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
-        large = sum(log.samples for log in logs) > in_memory
         if large and method == "stepwise" and library == "double-feature-set":
             data = Data.streamed(logs, how, options, workers)
         else:
-            data = Data.of(condition([log.read() for log in logs], how), options)
+            data = Data.of(condition(kept or [log.read() for log in logs], how), options)
         check_recorded(arm, data.reference.samples)
         return Attempt(library, how, data, _found(arm, data, method, library, options, progress))
 
@@ -175,6 +179,7 @@ def _finished(
         arm=arm,
         components=tuple(found.components),
         friction=found.law,
+        effects=found.effects,
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
@@ -196,7 +201,10 @@ def _finished(
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
-        model = replace(model, components=components, friction=found.final.law, history=history)
+        final = found.final
+        model = replace(
+            model, components=components, friction=final.law, effects=final.effects, history=history
+        )
     if options.standard_errors:
         progress("standard errors of the coefficients")
         shared = tried.library in ("rigid-body", "lagrangian")
