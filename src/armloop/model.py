@@ -329,7 +329,11 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         uncertainty=_known(data["uncertainty"]),
     )
     for added in model.effects:
-        if not added.effect.plausible(arm, added.parameters):
+        try:
+            plausible = added.effect.plausible(arm, added.parameters)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ModelError(f"effect {added.effect.label()}: a parameter is misshapen: {error}") from error
+        if not plausible:
             values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
             raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
     half = np.full((1, arm.n), 0.5)
