@@ -58,7 +58,9 @@ def test_samples_that_are_no_series_and_too_few_keep_the_usual_corner() -> None:
     q = rng.uniform(-1, 1, (500, 3))
     drawn = MotionLog(np.arange(500) * 0.01, q, q[::-1], q, vdot=q)
     assert choose_bandwidth([drawn], three_axis(), TEN_HZ).cutoff_hz == 10.0
-    assert choose_bandwidth([run(seconds=3.0)], three_axis(), TEN_HZ).cutoff_hz == 10.0
+    assert choose_bandwidth([run(seconds=1.0)], three_axis(), TEN_HZ).cutoff_hz == 10.0
+    with_short = choose_bandwidth([run(noise=0.3), run(seconds=1.4)], three_axis(), TEN_HZ)
+    assert with_short.trials == choose_bandwidth([run(noise=0.3)], three_axis(), TEN_HZ).trials
 
 
 def test_the_model_keeps_the_corner_that_was_chosen(tmp_path: Path) -> None:

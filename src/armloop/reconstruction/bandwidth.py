@@ -74,6 +74,10 @@ def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> 
     highest = min(how.cutoff_hz, *(round(_OF_RATE / log.period, 3) for log in chosen))
     corners = [round(part * highest, 3) for part in _PARTS]
     corners[0] = highest
+    # every corner must see the same logs: those that are long enough for the lowest
+    chosen = [log for log in chosen if log.time[-1] - log.time[0] > 4 / min(corners)]
+    if not chosen:
+        return Bandwidth(highest)
     base = BaseParameters.of_arm(arm, rotors=True)
     tables = [_tables(chosen, arm, base, how, corner, corners) for corner in corners]
     if any(table is None for table in tables):
