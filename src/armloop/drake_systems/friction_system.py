@@ -10,7 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 
 
 @TemplateSystem.define("JointFrictionSystem_")
@@ -58,7 +58,7 @@ def JointFrictionSystem_(T: type) -> Any:
     return Impl
 
 
-JointFrictionSystem = JointFrictionSystem_[None]
+JointFrictionSystem = with_signature(JointFrictionSystem_[None])
 
 
 class Stop(NamedTuple):
@@ -138,7 +138,7 @@ def PreslidingFriction_(T: type) -> Any:
     return Impl
 
 
-PreslidingFriction = PreslidingFriction_[None]
+PreslidingFriction = with_signature(PreslidingFriction_[None])
 
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:
