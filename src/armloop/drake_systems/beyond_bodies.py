@@ -67,7 +67,7 @@ def BeyondBodies_(T: type) -> Any:
             state = self._state.Eval(context).tolist()
             q, v, still = state[:n], state[n:], [0.0] * n
             load = whole.load(q, v, still) if whole.load_matters else None
-            tau = whole.friction(v, load, context.get_time())
+            tau = whole.friction(v, load, context.get_time(), q)
             if self._bodies is not None:
                 more = zip(tau, whole.rigid(q, v, still), self._bodies.rigid(q, v, still), strict=True)
                 tau = [x + y - z for x, y, z in more]
