@@ -68,7 +68,7 @@ def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> 
 
     The highest corner stands where the data are too few, or do not move enough, to compare.
     """
-    chosen = _even_selection(logs)
+    chosen = even_selection(logs)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
     highest = min(how.cutoff_hz, *(round(_OF_RATE / log.period, 3) for log in chosen))
@@ -79,7 +79,7 @@ def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> 
     if not chosen:
         return Bandwidth(highest)
     base = BaseParameters.of_arm(arm, rotors=True)
-    tables = [_tables(chosen, arm, base, how, corner, corners) for corner in corners]
+    tables = [table_at(chosen, arm, base, how, corner, corners) for corner in corners]
     if any(table is None for table in tables):
         return Bandwidth(highest)
     made = [table for table in tables if table is not None]
@@ -99,7 +99,7 @@ def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> 
 
 def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
     """Raise `LogError` unless the corner lies below half the sample rate of the logs (a look at some of many)."""
-    for log in _even_selection(logs):
+    for log in even_selection(logs):
         if cutoff_hz >= (0.5 - 1e-6) / log.period:
             raise LogError(
                 f"{log.name}: a cutoff of {cutoff_hz:g} Hz is not below {0.5 / log.period:.4g} Hz, half of the "
@@ -107,7 +107,7 @@ def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
             )
 
 
-def _even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
+def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
     """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
     total = sum(log.samples for log in logs)
     count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
@@ -122,7 +122,7 @@ def _even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Table:
+class Table:
     """What is regressed at one corner: columns (N, n, p), torque (N, n), blocks (N,), and which samples slide (N, n)."""
 
     columns: Array
@@ -131,14 +131,14 @@ class _Table:
     moving: NDArray[np.bool_]
 
 
-def _tables(
+def table_at(
     logs: list[MotionLog],
     arm: Arm,
     base: BaseParameters,
     how: Conditioning,
     corner: float,
     corners: list[float],
-) -> _Table | None:
+) -> Table | None:
     """Columns at one corner, at the instants that all corners share; None where no run is long enough."""
     parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
     lowest, following = min(corners), 0
@@ -176,10 +176,10 @@ def _tables(
     if not parts:
         return None
     columns, tau, blocks, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return _Table(columns, tau, blocks, moving)
+    return Table(columns, tau, blocks, moving)
 
 
-def _held_out(table: _Table) -> Array:
+def _held_out(table: Table) -> Array:
     """(n,) rms of what a regression on every other block leaves on the blocks between, both ways round."""
     n = table.tau.shape[1]
     scale = np.array([np.sqrt(np.mean(np.square(table.tau[own, j]))) for j, own in enumerate(table.moving.T)])

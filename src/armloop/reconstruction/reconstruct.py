@@ -32,6 +32,7 @@ from armloop.reconstruction.rival import Attempt, better
 from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise_on
+from armloop.reconstruction.torque_checks import check_torques
 from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
 from armloop.workers import Workers
@@ -114,7 +115,7 @@ def reconstruct(
 
     Raises:
         InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
-            or too little excitation.
+            torques that cannot be those of the arm (:mod:`armloop.reconstruction.torque_checks`), or too little excitation.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
@@ -145,6 +146,7 @@ def reconstruct(
     else:
         bandwidth = Bandwidth(conditioning.cutoff_hz)
         check_nyquist(kept or logs, conditioning.cutoff_hz)
+    check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
     def attempt(library: str) -> Attempt:
         how = conditioning or bandwidth.suited(default_conditioning(library))

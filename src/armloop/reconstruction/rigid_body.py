@@ -70,7 +70,7 @@ def rigid_body(
     ladder, laws = fitting.with_laws(ladder, lambda theta: raw @ theta[: base.count])
     columns, load = fitting.columns, fitting.load
     mass = np.concatenate(
-        [_mass_columns(arm, base, postures(motion)), laws.mass(arm, postures(motion))], axis=3
+        [mass_columns(arm, base, postures(motion)), laws.mass(arm, postures(motion))], axis=3
     )
     r = base.count + laws.count
 
@@ -125,7 +125,7 @@ def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:
     return {f"links as in the URDF ± {kg:g} kg": Prior(precision / kg**2, centre) for kg in _SPREADS}
 
 
-def _mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
+def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     """(P, n, n, r) mass matrices at postures q (P, n) per unit of each base parameter."""
     repeated = np.repeat(q, arm.n, axis=0)
     still, unit = np.zeros_like(repeated), np.tile(np.eye(arm.n), (len(q), 1))
