@@ -90,7 +90,7 @@ def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> 
     errors = []
     for table in made:
         left = _held_out(replace(table, moving=rows, tau=made[0].tau))
-        size = [np.sqrt(np.mean(np.square(made[0].tau[own, j]))) for j, own in enumerate(rows.T)]
+        size = [root_mean_square(made[0].tau[own, j]) for j, own in enumerate(rows.T)]
         relative = [left[j] / max(float(size[j]), 1e-300) for j in np.flatnonzero(counted)]
         errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, 1e-12))))))
     good = [corner for corner, error in zip(corners, errors, strict=True) if error <= _AS_GOOD * min(errors)]
@@ -182,7 +182,7 @@ def table_at(
 def _held_out(table: Table) -> Array:
     """(n,) rms of what a regression on every other block leaves on the blocks between, both ways round."""
     n = table.tau.shape[1]
-    scale = np.array([np.sqrt(np.mean(np.square(table.tau[own, j]))) for j, own in enumerate(table.moving.T)])
+    scale = np.array([root_mean_square(table.tau[own, j]) for j, own in enumerate(table.moving.T)])
     for _ in range(2):  # joints weigh by their torques first, then by what is left of them
         left = np.zeros_like(table.tau)
         for parity in (0, 1):
@@ -201,3 +201,8 @@ def _held_out(table: Table) -> Array:
             ]
         )
     return scale
+
+
+def root_mean_square(x: Array) -> float:
+    """Root of the mean square; 0 where there is nothing."""
+    return float(np.sqrt(np.mean(np.square(x)))) if len(x) else 0.0

@@ -22,7 +22,7 @@ from armloop.library.rigid_body import BaseParameters
 from armloop.log import MotionLog, unchecked_log
 from armloop.pieces import LogSource
 from armloop.plausibility import is_time_series
-from armloop.reconstruction.bandwidth import Table, even_selection, table_at
+from armloop.reconstruction.bandwidth import Table, even_selection, root_mean_square, table_at
 from armloop.reconstruction.rigid_body import mass_columns
 from armloop.signals import Conditioning
 
@@ -120,7 +120,7 @@ class _Problem:
         table, n, r = self.table, len(signs), self.shared
         tau = signs * table.tau[:, order]
         rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
-        scale = np.array([np.sqrt(np.mean(np.square(tau[own, j]))) for j, own in enumerate(rows.T)])
+        scale = np.array([root_mean_square(tau[own, j]) for j, own in enumerate(rows.T)])
         size, theta = np.maximum(scale, 1e-12), np.zeros(table.columns.shape[2])
         error = np.zeros(n)
         for _ in range(2):
@@ -130,14 +130,14 @@ class _Problem:
             X = X / lengths
             theta = np.linalg.solve(X.T @ X + 1e-7 * np.eye(X.shape[1]), X.T @ y) / lengths
             left = tau - np.einsum("njp,p->nj", table.columns, theta)
-            error = np.array([np.sqrt(np.mean(np.square(left[own, j]))) for j, own in enumerate(rows.T)])
+            error = np.array([root_mean_square(left[own, j]) for j, own in enumerate(rows.T)])
             size = np.maximum(error, 1e-6 * np.maximum(scale, 1e-12))
         power = np.zeros(n)
         for j, own in enumerate(rows.T):
             columns = table.columns[own, j, r + 3 * j : r + 3 * j + 2]
             parts = columns * theta[r + 3 * j : r + 3 * j + 2]
             v = columns[:, 1]
-            if np.sqrt(np.mean(np.square(parts.sum(axis=1)))) > _FRICTION * scale[j]:
+            if root_mean_square(parts.sum(axis=1)) > _FRICTION * scale[j]:
                 power[j] = float((parts.sum(axis=1) * v).sum() / np.abs(parts * v[:, None]).sum())
         inertia = np.einsum("pjjr,r->j", self.mass, theta[:r]) / len(self.mass)
         return _Fit(error / np.maximum(scale, 1e-12), power, inertia)
