@@ -76,7 +76,7 @@ def run_watched(
     builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
     # what the monitor sees: the drives' torques with their noise, the state, and its derivative
     monitor = builder.AddNamedSystem("monitor", ResidualMonitor(model, learn=learn))
-    derivative = builder.AddSystem(DiscreteDerivative(n, 10 * step))
+    derivative = builder.AddSystem(DiscreteDerivative(n, step))
     speeds = builder.AddSystem(MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)])))
     builder.Connect(state, speeds.get_input_port())
     builder.Connect(speeds.get_output_port(), derivative.get_input_port())
