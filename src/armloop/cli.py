@@ -31,6 +31,7 @@ COMMANDS = (
     "crossvalidate",
     "evaluate",
     "diagnose",
+    "export",
     "track",
     "tune",
     "watch",

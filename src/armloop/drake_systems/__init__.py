@@ -5,6 +5,7 @@ the systems it is made of. Names that end in an underscore are templates, `Feedf
 """
 
 from armloop.drake_systems.adaptive_feedforward import AdaptiveFeedforward
+from armloop.drake_systems.beyond_bodies import BeyondBodies, BeyondBodies_, friction_systems
 from armloop.drake_systems.closed_loop import CONTROLLERS, ControlledArm, add_arm_with_controller
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque, ComputedTorque_
 from armloop.drake_systems.effect_system import EffectTorque, EffectTorque_, add_joint_forces
@@ -32,6 +33,8 @@ __all__ = [
     "AccelerationGains",
     "AdaptiveFeedforward",
     "ArmPlant",
+    "BeyondBodies",
+    "BeyondBodies_",
     "ComputedTorque",
     "ComputedTorque_",
     "ControlledArm",
@@ -58,6 +61,7 @@ __all__ = [
     "Stop",
     "add_arm_with_controller",
     "add_joint_forces",
+    "friction_systems",
     "model_equations",
     "presliding_of",
 ]

@@ -41,6 +41,7 @@ class _Taken:
     errors: tuple[float, ...] = ()
     without: float = float("nan")
     judge_at: float = np.inf
+    settle_at: float = np.inf
     refused: frozenset[object] = frozenset()
     given_back: int = 0
 
@@ -52,7 +53,8 @@ class AdaptiveFeedforward(LeafSystem):
 
     each the sum of the effects' torques at q_ref, v_ref, vdot_ref; nothing before the first name. A new revision is
     blended in from the one before. What the controller's integrator has learned of the change meanwhile is taken off
-    by the same ramp, as a constant, -(I(t_named) - I(t_change)), so that it need not unwind. `trial` seconds after the
+    by the same ramp, as a constant, -(I(t_named) - I(t_change)), so that it need not unwind, and once more after the ramp,
+    during which it went on learning. `trial` seconds after the
     ramp the mean absolute tracking error is compared with that of the `trial` seconds before the first name: where it
     has become more than a tenth worse the effect is given back by the same ramp, and what was named there is not taken
     again. Faults of sensors are not supplied.
@@ -124,6 +126,16 @@ class AdaptiveFeedforward(LeafSystem):
                     refused=refused,
                     given_back=taken.given_back + 1,
                 )
+        elif time >= taken.settle_at:
+            # the integrator went on learning during the ramp
+            taken = replace(
+                taken,
+                before=taken.now,
+                offset=_learned(taken, known.since, held),
+                offset_before=taken.offset,
+                since=time,
+                settle_at=np.inf,
+            )
         elif known.revision > taken.revision and time >= taken.since + self._ramp:
             effects = tuple(
                 added
@@ -135,12 +147,13 @@ class AdaptiveFeedforward(LeafSystem):
                 taken,
                 now=effects,
                 before=taken.now,
-                offset=_learned(taken, known.since, held) if first else taken.offset,
+                offset=_learned(taken, known.since, held) if effects else None,
                 offset_before=taken.offset,
                 since=time,
                 revision=known.revision,
                 without=float(np.mean(taken.errors)) if first else taken.without,
                 judge_at=time + self._ramp + self._trial if first else taken.judge_at,
+                settle_at=time + self._ramp if effects else np.inf,
             )
         state.get_mutable_abstract_state(int(self._memory)).set_value(taken)
 

@@ -22,6 +22,7 @@ from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
@@ -82,7 +83,11 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], fast)
     load = columns @ plain.solve(plain.everything).theta[: energy.count]
     ladder = climb(arm, samples, smoothed, rows, load, options, {})
-    mass = energy.mass(postures(motion))
+    fitting = Fitting(arm, samples, smoothed, rows, load, {}, options, progress)
+    ladder, laws = fitting.with_laws(ladder, lambda theta: columns @ theta[: energy.count])
+    smoothed, load = fitting.columns, fitting.load
+    mass = np.concatenate([energy.mass(postures(motion)), laws.mass(arm, postures(motion))], axis=3)
+    r = energy.count + laws.count
 
     def regressed(rows: Rows) -> Found:
         pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
@@ -99,7 +104,8 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
                 pass
         body = Lagrangian(energy, theta[: energy.count])
         history = {"friction_ladder": [rung.to_dict() for rung in ladder.climbs], **physics}
-        return Found(arm, [body], found_friction(ladder.laws, theta[energy.count :]), history=history)
+        effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
+        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
 
     found = regressed(rows)
     found.final = final = regressed(sliding_rows(samples))
@@ -116,7 +122,12 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         f"{energy.count} terms of the energies serve all joints and all steps: they were regressed together and "
         "the steps are told apart on prediction"
     ]
-    notes += [*ladder.notes, *physics_notes(final.history), *_warnings(found, final, samples, held_out)]
+    notes += [
+        *ladder.notes,
+        *laws.notes(final.effects),
+        *physics_notes(final.history),
+        *_warnings(found, final, samples, held_out),
+    ]
     found.reports, found.notes = reports, notes
     return found
 

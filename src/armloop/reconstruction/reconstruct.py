@@ -179,6 +179,7 @@ def _finished(
         arm=arm,
         components=tuple(found.components),
         friction=found.law,
+        effects=found.effects,
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
@@ -200,7 +201,10 @@ def _finished(
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
-        model = replace(model, components=components, friction=found.final.law, history=history)
+        final = found.final
+        model = replace(
+            model, components=components, friction=final.law, effects=final.effects, history=history
+        )
     if options.standard_errors:
         progress("standard errors of the coefficients")
         shared = tried.library in ("rigid-body", "lagrangian")

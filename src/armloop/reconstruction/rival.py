@@ -43,7 +43,11 @@ class Attempt:
     def tally(self, sorter: Sorter | None) -> Tally:
         """Errors on the held-out blocks, of the model that has not seen them; per condition where they are sorted."""
         model = ReconstructedModel(
-            self.found.arm, tuple(self.found.components), self.found.law, self.conditioning
+            self.found.arm,
+            tuple(self.found.components),
+            self.found.law,
+            self.conditioning,
+            effects=self.found.effects,
         )
         return self.data.sum(partial(Tally.of, model=model, sorter=sorter))
 
