@@ -166,8 +166,8 @@ class ArmPlant(Diagram):
         context = self.plant.GetMyMutableContextFromRoot(root_context)
         last = self.plant.GetBodyByName(f"link_{self.arm.n}")
         inertia = last.CalcSpatialInertiaInBodyFrame(context)
-        for mass, com in more.payloads:
-            inertia += _ball(mass, com)
+        for mass, com, own in more.payloads:
+            inertia += _payload(mass, com, own)
         last.SetSpatialInertiaInBodyFrame(context, inertia)
         damping = []
         for joint, viscous in zip(self.arm.joints, more.viscous, strict=True):
