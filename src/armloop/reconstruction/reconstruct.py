@@ -20,6 +20,7 @@ from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
+from armloop.reconstruction.fitted import in_memory as kept_in_memory
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
@@ -27,6 +28,8 @@ from armloop.reconstruction.judged import held_out_parts
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
+from armloop.reconstruction.ripple import find_ripple
+from armloop.reconstruction.ripple import notes as ripple_notes
 from armloop.reconstruction.rival import Attempt, better
 from armloop.reconstruction.shared import SHARED_CONDITIONING
 from armloop.reconstruction.sindy import sindy
@@ -175,6 +178,15 @@ def _finished(
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
     found, data = tried.found, tried.data
+    if method == "stepwise" and kept_in_memory(data):
+        bare = ReconstructedModel(
+            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
+        )
+        chunk = data.reference
+        ripple = find_ripple(bare, [log.read() for log in logs], chunk.samples, chunk.held_out)
+        found.notes += ripple_notes(ripple)
+        for one in (found, *([] if found.final is None else [found.final])):
+            one.effects = (*one.effects, *ripple)
     model = ReconstructedModel(
         arm=arm,
         components=tuple(found.components),
