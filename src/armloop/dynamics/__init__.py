@@ -1,7 +1,7 @@
 """A reconstructed model as equations of motion: mass matrix, bias, gravity, friction, forward dynamics."""
 
 from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
-from armloop.dynamics.effects import EffectLaw, contact_equations, effect_law
+from armloop.dynamics.effects import EffectLaw, effect_law
 from armloop.dynamics.model import ModelEquations
 from armloop.dynamics.rigid import nearest_rigid_body, with_mass_matrix
 
@@ -9,7 +9,6 @@ __all__ = [
     "Dynamics",
     "EffectLaw",
     "ModelEquations",
-    "contact_equations",
     "effect_law",
     "nearest_rigid_body",
     "require_mass_matrix",

@@ -256,7 +256,7 @@ def friction_torques(model: ReconstructedModel) -> tuple[Array, Array]:
     kept = tuple(a for a in model.effects if a.effect.name in _FRICTION_EFFECTS)
     equations = ModelEquations(replace(model, effects=kept), NUMPY)
     q, v, vdot = ([x[:, j] for j in range(model.arm.n)] for x in (motion.q, motion.v, motion.vdot))
-    friction = equations.friction(v, equations.load(q, v, vdot), _WARM)
+    friction = equations.friction(v, equations.load(q, v, vdot), _WARM, q)
     return motion.v, np.stack([np.broadcast_to(x, (motion.samples,)) for x in friction], axis=1)
 
 
