@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.components import Lagrangian
+from armloop.dynamics.physics import joint_limits
 from armloop.errors import ExcitationError
 from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
@@ -25,7 +26,7 @@ from armloop.progress import Progress
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.physical import physical_solution, physics_notes, postures
+from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
 from armloop.reconstruction.pooled import Pooled
 from armloop.reconstruction.shared import (
     FRICTION,
@@ -34,6 +35,7 @@ from armloop.reconstruction.shared import (
     check_rank,
     fast_rows,
     found_friction,
+    motion_range,
     sliding_rows,
 )
 from armloop.regression.moments import Moments
@@ -82,7 +84,8 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], fast)
     load = columns @ plain.solve(plain.everything).theta[: energy.count]
     ladder = climb(arm, samples, smoothed, rows, load, options, {})
-    mass = energy.mass(postures(motion))
+    none = np.zeros(energy.count, dtype=bool)
+    shape = Body(energy.mass, postures(motion), *joint_limits(arm, motion_range(motion)), none)
 
     def regressed(rows: Rows) -> Found:
         pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
@@ -90,9 +93,13 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, mass, ladder.laws, options.insist)
+                physical = physical_solution(solution, shape, ladder.laws, options.insist)
                 theta = physical.theta
-                physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
+                physics = {
+                    "constraints": physical.binding,
+                    "contradicted": physical.contradicted,
+                    "kept_positive": physical.where,
+                }
             except (
                 ExcitationError
             ):  # terms found in little data may leave no room for M; the notes then say so
@@ -116,7 +123,11 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         f"{energy.count} terms of the energies serve all joints and all steps: they were regressed together and "
         "the steps are told apart on prediction"
     ]
-    notes += [*ladder.notes, *physics_notes(final.history), *_warnings(found, final, samples, held_out)]
+    notes += [
+        *ladder.notes,
+        *physics_notes(final.history),
+        *_warnings(found, final, samples, held_out),
+    ]
     found.reports, found.notes = reports, notes
     return found
 
