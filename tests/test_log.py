@@ -341,6 +341,9 @@ def test_a_place_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.measured
 def test_measured_logs_are_read_as_they_are(measured: Path) -> None:
+    joints = {"panda": 7, "double_pendulum": 2}
     for path in sorted(measured.glob("*/*.csv")):
-        log = read_log(path, joints=7 if path.parent.name == "panda" else 6)
+        if path.name.endswith(".truth.csv"):
+            continue
+        log = read_log(path, joints=joints.get(path.parent.name, 6), quiet=True)
         assert log.runs() == [slice(0, log.samples)], path

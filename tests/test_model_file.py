@@ -89,7 +89,7 @@ def test_a_model_survives_a_round_trip_exactly(saved: Path) -> None:
 
 def test_the_file_can_be_read_by_a_person(saved: Path) -> None:
     data = json.loads(saved.read_text())
-    assert data["schema"] == "armloop/model/1"
+    assert data["schema"] == "armloop/model/2"
     assert data["formulas"][0].startswith("tau1 = ") and "sign(v1)" in data["formulas"][0]
     assert "cos(q1)" not in data["formulas"][0] and "sin(q2)" in data["formulas"][0]
 
@@ -154,12 +154,15 @@ NAN = float("nan")
 # the first component holds sparse terms, the second a rigid body
 TAMPERED: dict[str, tuple[Callable[[Data], None], str]] = {
     "another schema": (
-        at("schema")("armloop/model/2"),
-        r"schema is 'armloop/model/2', it must be 'armloop/model/1'",
+        at("schema")("armloop/model/3"),
+        r"schema is 'armloop/model/3', it must be 'armloop/model/2'",
     ),
     "no schema": (at("schema")(...), r"schema is None"),
     **{f"no {name}": (at(name)(...), f"field '{name}' is missing") for name in FIELDS},
-    **{f"{name} is null": (at(name)(None), "misshapen|incomplete|needed") for name in FIELDS},
+    **{
+        f"{name} is null": (at(name)(None), rf"{name} is None; it must be a (list|mapping)")
+        for name in FIELDS
+    },
     "a term of another arm": (
         at("components", 0, "joints", 0)({"sin(q7)*v1": 1.0}),
         r"unknown term 'sin\(q7\)\*v1': 'sin\(q7\)' is no function of 3 joints",
@@ -169,9 +172,15 @@ TAMPERED: dict[str, tuple[Callable[[Data], None], str]] = {
         r"unknown term ",
     ),
     "NaN in a term": (at("components", 0, "joints", 0)({"sin(q2)": NAN}), "not a finite number"),
-    "a word for a coefficient": (at("components", 0, "joints", 0)({"sin(q2)": "big"}), "misshapen"),
+    "a word for a coefficient": (
+        at("components", 0, "joints", 0)({"sin(q2)": "big"}),
+        r"sin\(q2\) is 'big'; it must be a finite number",
+    ),
     "terms for two joints": (at("components", 0, "joints")([{}, {}]), "2 joints, the arm has 3"),
-    "an unknown component": (at("components", 0, "kind")("magic"), "unknown component 'magic'"),
+    "an unknown component": (
+        at("components", 0, "kind")("magic"),
+        r"components\[1\]\.kind is 'magic'; there are: 'terms', 'rigid_body', 'lagrangian'",
+    ),
     "a rigid body of another size": (
         at("components", 1, "parameters")([1.0] * 7),
         "7 parameters, 3 links need",
@@ -180,29 +189,29 @@ TAMPERED: dict[str, tuple[Callable[[Data], None], str]] = {
     "an unknown friction term": (at("friction", 0, 0, "kind")("magic"), "unknown friction term 'magic'"),
     "infinite friction": (at("friction", 0, 0, "coefficient")(float("inf")), "not a finite number"),
     "a friction term without its width": (at("friction", 1, 1, "parameter")(0), "positive parameter"),
-    "friction of two joints": (at("friction")([[], []]), "friction has 2 joints, the arm has 3"),
+    "friction of two joints": (at("friction")([[], []]), "friction: 2 joints, the arm has 3"),
     "an unknown effect": (at("effects", 0, "effect")("magic"), "unknown effect 'magic'"),
     "a payload on a joint": (at("effects", 0, "joint")(2), "joint must be null"),
     "an offset on no joint": (at("effects", 1, "joint")(None), "joint must be a number"),
     "an effect on a joint that is not there": (at("effects", 1, "joint")(9), "joint 9|the arm has 3"),
     "a payload without mass": (at("effects", 0, "parameters", "mass")(...), "field 'mass' is missing"),
     "NaN in an effect": (at("effects", 1, "parameters", "offset", "value")(NAN), "not a finite number"),
-    "an arm without joints": (at("arm", "joints")(...), "arm description is incomplete"),
+    "an arm without joints": (at("arm", "joints")(...), "arm: field 'joints' is missing"),
     "an arm with a pose missing": (
         at("arm", "X_PF")([1.0, 2.0]),
-        "arm description is incomplete or misshapen",
+        r"arm\.X_PF\[1\] is 1.0; it must be a list",
     ),
-    "NaN in the arm": (at("arm", "com", 0, 0)(NAN), "not finite"),
+    "NaN in the arm": (at("arm", "com", 0, 0)(NAN), "not a finite number"),
     "an unknown kind of joint": (at("arm", "joints", 0, "kind")("ball"), "'ball'"),
     "a word for the corner": (at("conditioning", "cutoff_hz")("ten"), "cutoff_hz"),
     "a corner below zero": (at("conditioning", "cutoff_hz")(-1.0), "cutoff_hz"),
-    "NaN for the dead zone": (at("conditioning", "dead_zone")(NAN), "dead_zone"),
+    "NaN for the dead zone": (at("conditioning", "dead_zone")(-1.0), "dead_zone"),
     "an unknown setting": (at("conditioning", "magic")(1.0), "magic"),
     "an unknown unit": (at("recorded", "unit")("lbf"), "recorded|unit"),
     "no unit": (at("recorded", "unit")(...), "unit"),
     "gains of two joints": (at("recorded", "drive_gains")([1.0, 2.0]), "drive_gains"),
-    "a word for a gain": (at("recorded", "drive_gains")(["a", "b", "c"]), "misshapen"),
-    "a word in the baseline": (at("baseline", "rmse")(["a", 1.0, 1.0]), "misshapen"),
+    "a word for a gain": (at("recorded", "drive_gains")(["a", "b", "c"]), r"drive_gains\[1\] is 'a'"),
+    "a word in the baseline": (at("baseline", "rmse")(["a", 1.0, 1.0]), r"rmse\[1\] is 'a'"),
     "a baseline of two joints": (at("baseline", "rmse")([1.0, 1.0]), "rmse"),
 }
 
@@ -224,7 +233,7 @@ def test_a_file_that_was_tampered_with_is_refused(saved: Path, tmp_path: Path, f
     [
         (b"", r"not JSON \(line 1"),
         (b"tau1 = 3*q1\n", r"not JSON \(line 1"),
-        (b'{"schema": "armloop/model/1",\n', r"not JSON \(line 2"),
+        (b'{"schema": "armloop/model/2",\n', r"not JSON \(line 2"),
         (b"[1, 2]", r"schema is None"),
         (b"\xff\xfe\x00", r"cannot be read"),
     ],

@@ -14,9 +14,11 @@ def block_numbers(motion: Motion, seconds: float) -> NDArray[np.intp]:
     following = 0
     for run in motion.runs():
         elapsed = motion.time[run] - motion.time[run.start]
-        pieces = max(1, int(np.ceil((elapsed[-1] + 1e-9) / seconds)))
+        # A sample on the edge of two blocks lies in the later one, however the stamps are rounded.
+        rounding = max(1e-9, 4 * float(np.spacing(np.abs(motion.time[run][[0, -1]]).max())))
+        pieces = max(1, int(np.ceil((elapsed[-1] + rounding) / seconds)))
         length = max(float(elapsed[-1]), 1e-12) / pieces
-        numbers[run] = following + np.minimum((elapsed / length).astype(int), pieces - 1)
+        numbers[run] = following + np.minimum(((elapsed + rounding) / length).astype(int), pieces - 1)
         following += pieces
     return numbers
 

@@ -18,6 +18,7 @@ from importlib import import_module
 from armloop import __version__
 from armloop.errors import InputError
 from armloop.outputs import guarding
+from armloop.voices import listening
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
 COMMANDS = (
@@ -54,10 +55,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal's encoding lacks is spelt out
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _ending_on_request():
+        with listening() as doubts, _ending_on_request():
             options = build_parser().parse_args(arguments)
             with guarding(options.command, _named_files(options), options.force):
                 options.run(options)
+        for doubt in doubts:
+            print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
         return _fault(str(error), 2)
     except BrokenPipeError:

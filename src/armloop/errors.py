@@ -1,6 +1,6 @@
 """The exceptions a user can meet.
 
-All of them mean that the input is at fault. Their message is one line that names the file, the column or the
+All errors mean that the input is at fault. Their message is one line that names the file, the column or the
 row, says what is wrong and what would be right; the command line prints it and ends with status 2.
 """
 
@@ -30,3 +30,10 @@ class ScenarioError(InputError):
 
 class ExcitationError(InputError):
     """The data move too little to determine what was asked of them."""
+
+
+class InputWarning(UserWarning):
+    """The input is doubtful: one line that says what, with the numbers. The work goes on."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))

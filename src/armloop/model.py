@@ -7,7 +7,7 @@ what a log shows (``predict``), never what a controller supplies (``feedforward`
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,14 +25,14 @@ from armloop.errors import ArmError, ModelError
 from armloop.files import write_json
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.friction import FrictionLaw
-from armloop.log import TAU_UNITS
 from armloop.motion import Motion
 from armloop.pointwise import Drive, pointwise, stacked
+from armloop.reading import read_json
 from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
 
-SCHEMA = "armloop/model/1"
+SCHEMA = "armloop/model/2"
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,17 @@ class AddedEffect:
         return AddedEffect(
             effect(data["effect"], data["joint"], data.get("other_joint")),
             {
-                key: Estimate(e["value"], e["std_error"], str(e["unit"]))
+                key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
                 for key, e in data["parameters"].items()
             },
         )
+
+
+def _error(value: Any) -> Any:
+    """A standard error as it is read: null where nobody knows it."""
+    if isinstance(value, list):
+        return [_error(each) for each in value]
+    return math.nan if value is None else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,8 @@ class ReconstructedModel:
         conditioning: how the training logs were filtered; later logs are treated alike.
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
         baseline: what the model leaves on data of its own training runs that were not fitted:
-            ``rmse``, ``rms``, ``nrmse`` per joint, and ``worst``, the RMSE that one block in ten exceeds.
+            ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
+            the parts of the torque that are explained, predictable but not explained, and noise.
         effects: what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.uncertainty.standard_errors`);
@@ -143,8 +151,7 @@ class ReconstructedModel:
 
     def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
         inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
-        period = float(np.median(np.diff(motion.time))) if motion.samples > 1 else 0.0
-        return Context(self.arm, motion, inertial, period)
+        return Context(self.arm, motion, inertial, motion.period)
 
     def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
         """What effects may look at; inertial parameters only where an effect needs them."""
@@ -278,25 +285,17 @@ def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
         ModelError: unreadable, not JSON, another schema, or a field missing, misshapen or not finite.
         ArmError: the model belongs to another arm.
     """
-    path = Path(path)
+    data = read_json(path, ModelError, "a model written by `armloop reconstruct`")
+    # Here, for a command that only says what it can do should not wait for descriptions of files.
+    from armloop.schemas.model import model_data
+
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ModelError(f"{path}: no such file; give a model written by `armloop reconstruct`") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path}: cannot be read ({error})") from error
-    except json.JSONDecodeError as error:
-        raise ModelError(f"{path}: not JSON (line {error.lineno}: {error.msg}); give a model file") from error
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        found = data.get("schema") if isinstance(data, dict) else None
-        raise ModelError(f"{path}: schema is {found!r}, it must be {SCHEMA!r}")
-    try:
-        model = _from_dict(data)
+        model = _from_dict(model_data(data))
     except KeyError as error:
         raise ModelError(f"{path}: field {error} is missing") from error
     except (ModelError, ArmError) as error:
         raise type(error)(f"{path}: {error}") from error
-    except (TypeError, ValueError, AttributeError) as error:
+    except (TypeError, ValueError, AttributeError, OverflowError, IndexError) as error:
         raise ModelError(f"{path}: a field is misshapen: {error}") from error
     if arm is not None:
         model.arm.require_same(arm, str(path))
@@ -304,65 +303,39 @@ def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
 
 
 def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
+    """The model of a file whose fields have been checked one by one; what they mean together is checked here."""
     arm = Arm.from_dict(data["arm"])
-    components = []
-    for item in data["components"]:
-        if item.get("kind") not in COMPONENTS:
-            raise ModelError(f"unknown component {item.get('kind')!r}; there are: {', '.join(COMPONENTS)}")
-        components.append(COMPONENTS[item["kind"]].from_dict(item, arm))
-    friction = FrictionLaw.from_dict(data["friction"])
-    if len(friction.terms) != arm.n:
-        raise ModelError(f"friction has {len(friction.terms)} joints, the arm has {arm.n}")
     model = ReconstructedModel(
         arm=arm,
-        components=tuple(components),
-        friction=friction,
+        components=tuple(COMPONENTS[item["kind"]].from_dict(item, arm) for item in data["components"]),
+        friction=FrictionLaw.from_dict(data["friction"]),
         conditioning=Conditioning(**data["conditioning"]),
-        recorded=_recorded(data["recorded"], arm.n),
-        baseline=_baseline(data["baseline"], arm.n),
+        recorded=dict(data["recorded"]),
+        baseline=dict(data["baseline"]),
         effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
         history=dict(data["history"]),
-        uncertainty=_uncertainty(data.get("uncertainty", {}), arm.n),
+        uncertainty=_known(data["uncertainty"]),
     )
-    half = np.full((1, arm.n), 0.5)
     for added in model.effects:
-        for joint in (added.effect.joint, added.effect.other_joint):
-            if joint is not None and not 1 <= joint <= arm.n:
-                raise ModelError(
-                    f"effect {added.effect.name!r} is on joint {joint}; the arm has joints 1 to {arm.n}"
-                )
+        if not added.effect.plausible(arm, added.parameters):
+            values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
+            raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
+    half = np.full((1, arm.n), 0.5)
     probe = Motion(np.zeros(1), half, half, half, np.array([0]))
-    if not np.isfinite(model.predict(probe)).all():
-        raise ModelError("a coefficient is not a finite number")
+    with np.errstate(all="ignore"):  # the line below says it
+        tau = model.predict(probe)
+    if not np.isfinite(tau).all():
+        raise ModelError("a coefficient is not a finite number, or so large that the torque is none")
     return model
 
 
-def _recorded(data: dict[str, Any], n: int) -> dict[str, Any]:
-    if data["unit"] not in TAU_UNITS:
-        raise ModelError(
-            f"recorded: unit {data['unit']!r} is unknown; it must be one of {', '.join(TAU_UNITS)}"
-        )
-    gains = data["drive_gains"]
-    if gains is not None and (len(gains) != n or not all(0 < float(gain) < np.inf for gain in gains)):
-        raise ModelError(f"recorded: drive_gains must be null or {n} positive numbers of N*m/A, not {gains}")
-    return dict(data)
+def _known(value: Any) -> Any:
+    """Null, which stands for a standard error that nobody knows, as the number that is none."""
+    if isinstance(value, dict):
+        return {
+            key: math.nan if each is None and key in _ERRORS else _known(each) for key, each in value.items()
+        }
+    return [_known(each) for each in value] if isinstance(value, list) else value
 
 
-def _baseline(data: dict[str, Any], n: int) -> dict[str, Any]:
-    for key in {"rmse", "rms", "nrmse", "worst"} & set(data):
-        if len(data[key]) != n or not all(x is None or 0 <= float(x) < np.inf for x in data[key]):
-            raise ModelError(
-                f"baseline: {key} must be {n} numbers, null where there is none, not {data[key]}"
-            )
-    return dict(data)
-
-
-def _uncertainty(data: dict[str, Any], n: int) -> dict[str, Any]:
-    for key in {"joints", "friction", "stribeck"} & set(data):
-        if len(data[key]) != n:
-            raise ModelError(f"uncertainty: {key} has {len(data[key])} joints, the arm has {n}")
-    tables = [*data.get("joints", []), *data.get("friction", []), data.get("shared", {})]
-    for name, entry in (item for table in tables for item in table.items()):
-        if not all(0 <= float(entry[key]) < np.inf for key in ("std_error", "degrees_of_freedom")):
-            raise ModelError(f"uncertainty: {name}: std_error must be a number of at least 0, not {entry}")
-    return dict(data)
+_ERRORS = {"std_error", "degrees_of_freedom"}

@@ -47,6 +47,14 @@ class Motion:
         """The number of joints n."""
         return self.q.shape[1]
 
+    @property
+    def period(self) -> float:
+        """The usual time between samples in seconds, free of the stamps' rounding; 0 for a single sample."""
+        steps = np.diff(self.time)
+        median = np.median(steps) if len(steps) else 0.0
+        usual = np.abs(steps - median) <= 1e-2 * median
+        return float(steps[usual].mean()) if usual.any() else float(median)
+
     def runs(self) -> list[slice]:
         """Return the samples of each run as a slice, in order."""
         ends = [*self.starts[1:], self.samples]

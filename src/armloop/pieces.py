@@ -5,14 +5,17 @@ A piece is a run of its own to everything after it, so that no filter and no der
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from hashlib import file_digest
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from armloop.errors import LogError
 from armloop.log import MotionLog, check_header, read_log
 from armloop.tables import CSV, count_rows
 
@@ -69,13 +72,17 @@ class LogPiece:
         return self.path.stem
 
     def read(self) -> MotionLog:
-        """Read and check the rows; raises :class:`~armloop.errors.LogError`."""
+        """Read and check the rows; raises :class:`~armloop.errors.LogError`.
+
+        Only of a whole file it is said what is doubtful: pieces are read time and again, by other processes.
+        """
         return read_log(
             self.path,
             joints=self.joints,
             tau_unit=self.recorded["unit"],
             drive_gains=self.recorded["drive_gains"],
             rows=self.rows,
+            quiet=self.rows is not None,
         )
 
 
@@ -87,9 +94,10 @@ def log_sources(
     Only headers are read. A CSV, which has no index, is never cut.
 
     Raises:
-        LogError: a file is missing, or its header is not that of a log of so many joints.
+        LogError: a file is missing, or its header is not that of a log of so many joints, or a file is given twice.
     """
     files = [_whole(Path(path), joints, recorded) for path in paths]
+    _require_different_files(files)
     if sum(file.samples for file in files) <= in_memory:
         return files
     return [piece for file in files for piece in _cut(file)]
@@ -102,6 +110,20 @@ def _whole(path: Path, joints: int, recorded: dict[str, Any]) -> LogPiece:
         # A cell takes ten characters or more.
         rows = path.stat().st_size // (10 * (3 * joints + 1))
     return LogPiece(path, joints, rows, None, recorded)
+
+
+def _require_different_files(files: Sequence[LogPiece]) -> None:
+    """Raise `LogError` for files of the same bytes; logs in memory are compared row by row besides."""
+    seen: dict[tuple[int, bytes], Path] = {}
+    sizes = Counter(file.path.stat().st_size for file in files)
+    for file in files:
+        size = file.path.stat().st_size
+        if sizes[size] > 1:
+            with file.path.open("rb") as content:
+                key = (size, file_digest(content, "sha256").digest())
+            if key in seen:
+                raise LogError(f"{file.path}: holds the same as {seen[key]}; give each measurement once")
+            seen[key] = file.path
 
 
 def _cut(file: LogPiece) -> list[LogPiece]:

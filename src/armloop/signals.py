@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.errors import LogError
-from armloop.log import MotionLog
+from armloop.log import FEWEST_SAMPLES, MotionLog
 from armloop.motion import Motion, Samples
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class LowPass:
         if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period:
             return x
         sos = _sections(self.cutoff_hz, self.period)
-        pad = min(len(x) - 1, int(np.ceil(1.5 / (self.cutoff_hz * self.period))))
+        pad = min(len(x) - 1, at_least(1.5 / (self.cutoff_hz * self.period)))
         # Here, for scipy's signals take longer to import than a fault of the input to be told.
         from scipy.signal import sosfiltfilt
 
@@ -87,11 +87,16 @@ def _sections(cutoff_hz: float, period: float) -> Array:
 
 
 def uniform_period(time: Array) -> float:
-    """The sample period of a run, s: the median step, or the mean where stamps are jittered."""
-    steps = np.diff(time)
-    median = float(np.median(steps))
-    even = float(np.abs(steps - median).max()) < 1e-3 * median
-    return median if even else float(steps.mean())
+    """The mean sample period of a run of at least two samples, s.
+
+    A median of the steps would carry their rounding, which counts where stamps are seconds since 1970.
+    """
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def at_least(count: float) -> int:
+    """The whole number not below ``count``, but for rounding: periods come from stamps that were rounded."""
+    return int(np.ceil(count - 1e-6))
 
 
 def derivative(x: Array, period: float) -> Array:
@@ -134,7 +139,7 @@ def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None 
         )
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
-    period = float(np.median(np.diff(parts[0][0])))
+    period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
     return Samples(Motion(time, q, v, vdot, starts), tau, moving.astype(bool), period, how.cutoff_hz)
 
 
@@ -170,7 +175,7 @@ def smooth(samples: Samples, x: Array) -> Array:
 def independent_rows(samples: Samples) -> NDArray[np.bool_]:
     """(N,) every so many samples that four are left per period of the corner: more carry no more information."""
     rows = np.zeros(samples.motion.samples, dtype=bool)
-    stride = 1 if samples.cutoff_hz <= 0 else max(1, int(0.25 / (samples.cutoff_hz * samples.period)))
+    stride = 1 if samples.cutoff_hz <= 0 else max(1, int(0.25 / (samples.cutoff_hz * samples.period) + 1e-6))
     for run in samples.motion.runs():
         rows[run.start : run.stop : stride] = True
     return rows
@@ -180,26 +185,31 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import binary_dilation
 
-    period = uniform_period(log.time)
-    trim = int(np.ceil(0.5 / (how.cutoff_hz * period)))
-    if len(log.time) < 6 * trim:
+    if log.samples < FEWEST_SAMPLES:
         return None
-    grid = log.time[0] + period * np.arange(int(np.floor(np.ptp(log.time) / period + 1e-6)) + 1)
-    even = len(grid) == len(log.time) and bool(np.abs(grid - log.time).max() < 1e-3 * period)
+    period = uniform_period(log.time)
+    trim = at_least(0.5 / (how.cutoff_hz * period))
+    if log.samples < 6 * trim:
+        return None
+    # From the run's start: what stamps far from zero lose to rounding must not grow along the run.
+    elapsed = log.time - log.time[0]
+    grid = period * np.arange(log.samples)
+    resolution = 2 * float(np.spacing(np.abs(log.time[[0, -1]]).max()))
+    even = bool(np.abs(grid - elapsed).max() < 1e-3 * period + resolution)
 
     def on_grid(x: Array) -> Array:
-        return x if even else CubicSpline(log.time, x)(grid)
+        return x if even else CubicSpline(elapsed, x)(grid)
 
     low_pass = LowPass(how.cutoff_hz, period)
     q, v, tau = (low_pass(on_grid(x)) for x in (log.q, log.v, log.tau))
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(v) <= dead_zone
-    reach = int(np.ceil(how.smear / (how.cutoff_hz * period)))
+    reach = at_least(how.smear / (how.cutoff_hz * period))
     smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
     # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.
     stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period) + 1e-6))
     keep = slice(trim, len(grid) - trim, stride)
-    return grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
 
 
 def _as_they_are(logs: Sequence[MotionLog]) -> Samples:

@@ -49,7 +49,10 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     still[:, 1] = 0.3
     write_log(folder / "still.csv", replace(log, q=still, v=log.v * [1, 0, 1]))
     write_log(folder / "no_torque.csv", replace(log, tau=log.tau * [1, 1, 0]))
-    write_log(folder / "degrees.csv", replace(log, q=np.degrees(log.q), v=np.degrees(log.v)))
+    header, *rows = (folder / "good.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    table[:, 1:7] = np.degrees(table[:, 1:7])
+    np.savetxt(folder / "degrees.csv", table, delimiter=",", header=header, comments="")
     good_model().save(folder / "model.json")
     (folder / "a_file").write_text("here")
     return folder
@@ -334,7 +337,7 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
     ),
     "NaN for a coefficient": (
         ("evaluate", model_with(lambda m: m["friction"][0][0].update(coefficient=float("nan"))), GOOD),
-        r"bad\.json: a coefficient is not a finite number",
+        r"bad\.json: NaN is not a finite number",
     ),
     "a model of another arm to evaluate": (
         ("evaluate", MODEL, GOOD, "--arm", "scara"),

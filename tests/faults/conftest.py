@@ -42,7 +42,7 @@ def build(folder: Path) -> None:
     )
     model.save(folder / "model.json")
     (folder / "scenario.yaml").write_text(
-        "plant: three_axis\nreference: {kind: fourier, duration: 4.0}\nscore: [1.0, 4.0]\ncontrollers: [pid]\n"
+        "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\nscore: [1.0, 5.0]\ncontrollers: [pid]\n"
     )
 
 

@@ -162,7 +162,7 @@ def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: p
 
 def test_motion_that_tells_nothing_is_refused():
     motion = fourier_motion(40.0, 100.0, 1)
-    q, v = 0.3 + 1e-6 * motion.q, 0.1 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
+    q, v = 0.3 + 1e-6 * motion.q, 0.04 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     with pytest.raises(ExcitationError, match=r"\d+ of \d+ inertial parameters undetermined"):
         reconstruct([log], three_axis(), library="lagrangian")

@@ -106,7 +106,7 @@ def test_friction_never_drives_and_the_mass_matrix_is_positive(result: Reconstru
 def test_parameters_that_the_motion_leaves_open_are_said_to_be():
     # all joints creep around one posture: there is friction to see, and one load
     motion = fourier_motion(40.0, 100.0, 1)
-    q, v = 0.3 + 1e-6 * motion.q, 0.1 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
+    q, v = 0.3 + 1e-6 * motion.q, 0.04 * np.sign(motion.v) * (1 + 1e-3 * np.cos(motion.q))
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     found = reconstruct([log], three_axis(), library="rigid-body", options=Options(standard_errors=False))
     (note,) = [note for note in found.notes if "does not determine" in note]

@@ -6,12 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from synthetic import friction
 
 from armloop.diagnosis import Diagnosis, close
 from armloop.motion import Motion
 from armloop.reports import plots
 from armloop.reports.plots.style import thin, with_gaps
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
+from armloop.signals import smooth
 
 
 def drawn(figure: Figure) -> Figure:
@@ -45,7 +47,36 @@ def test_reconstruction_figures(loop: SimpleNamespace) -> None:
     assert len(drawn(plots.clusters_figure(loop.clusters)).axes) == 2
     assert plots.has_trials(loop.reconstruction.reports)
     drawn(plots.orders_figure(loop.reconstruction.reports, loop.baseline.reports))
-    assert len(drawn(plots.torque_figure(loop.reconstruction.model, loop.diagnosis.samples)).axes) == 3
+
+
+def test_a_residual_lies_under_every_torque(loop: SimpleNamespace) -> None:
+    model, samples = loop.reconstruction.model, loop.diagnosis.samples
+    figure = drawn(plots.torque_figure(model, samples))
+    assert len(figure.axes) == 6
+    for j in range(3):
+        torque, below = figure.axes[2 * j : 2 * j + 2]
+        measured = max((line for line in torque.lines), key=lambda line: line.get_linewidth())
+        left = next(line for line in below.lines if "residual" in str(line.get_label()))
+        whole = samples.tau[:, j] - smooth(samples, model.predict(samples.motion))[:, j]
+        shown = samples.motion.time <= samples.motion.time[0] + 20
+        assert np.ptp(left.get_ydata()) == pytest.approx(np.ptp(whole[shown]), rel=0.05)
+        assert np.ptp(measured.get_ydata()) == pytest.approx(np.ptp(samples.tau[shown, j]), rel=0.05)
+
+
+def test_friction_lies_among_the_points_of_the_data(loop: SimpleNamespace) -> None:
+    """The model is exact but for a spring on joint 2, so the dots of the others scatter about its curve by noise."""
+    model, samples = loop.reconstruction.model, loop.diagnosis.samples
+    figure = drawn(plots.friction_figure(model, samples))
+    assert len(figure.axes) == 3
+    for j, axes in enumerate(figure.axes):
+        backward, forward = axes.lines
+        for line in (backward, forward):
+            np.testing.assert_allclose(line.get_ydata(), friction(line.get_xdata()[:, None])[:, j], rtol=1e-9)
+        v, dots = np.asarray(axes.collections[0].get_offsets()).T
+        fast = np.abs(v) > 0.3
+        off = dots[fast] - friction(v[fast, None])[:, j]
+        level = 0.05 * np.sqrt(np.mean(samples.tau[:, j] ** 2))
+        assert (np.sqrt(np.mean(off**2)) < level) == (j != 1)
 
 
 def test_diagnosis_figures(loop: SimpleNamespace, clean: Diagnosis) -> None:

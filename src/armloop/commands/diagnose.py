@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
 
     folder = out_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
     model, logs = model_and_logs(options)
-    apart = held_out_logs(options, model)
+    apart = held_out_logs(options, model, logs)
     wanted = wish(options, model)
     result = run(model, logs, progress(options))
     closing = close(model, result.model, result.samples, apart)

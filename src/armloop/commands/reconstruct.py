@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
-    from armloop.reports.tables import formulas, libraries_table, score_table, steps_table
+    from armloop.reports.tables import formulas, libraries_table, parts_table, score_table, steps_table
     from armloop.signals import Conditioning
     from armloop.workers import Cluster, Processes
 
@@ -146,6 +146,8 @@ def run(options: argparse.Namespace) -> None:
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})
         return
+    for warning in result.warnings:
+        print(f"WARNING: {warning}")
     if len(result.libraries) > 1:
         print(libraries_table(result.libraries), end="\n\n")
     print(steps_table(result.reports))
@@ -159,6 +161,7 @@ def run(options: argparse.Namespace) -> None:
             print(table, end="\n\n") if table else None
         print(NOTE, end="\n\n")
     print(score_table(result.held_out, arm))
+    print(parts_table(result.parts, arm))
     for note in result.notes:
         print(f"note: {note}")
     print(f"model written to {options.out}")

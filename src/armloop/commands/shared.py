@@ -13,11 +13,12 @@ import numpy as np
 from armloop.arm import Arm, load_arm
 from armloop.errors import InputError, ModelError
 from armloop.files import strict
-from armloop.log import MotionLog, read_log
+from armloop.log import MotionLog, read_log, same_measurement
 from armloop.model import ReconstructedModel, load_model
 from armloop.outputs import take_file, take_folder
 from armloop.progress import Progress, silent
 from armloop.signals import condition
+from armloop.voices import said
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -29,8 +30,8 @@ def progress(options: argparse.Namespace) -> Progress:
 
 
 def print_json(value: Any) -> None:
-    """Print the answer of ``--json``, strict JSON."""
-    print(strict(value))
+    """Print the answer of ``--json``, strict JSON, with what is doubtful about the input as ``warnings``."""
+    print(strict({**value, "warnings": said()} if said() else value))
 
 
 def out_folder(path: str, names: Iterable[str] = ()) -> Path:
@@ -92,15 +93,18 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
     return model, read_logs(options.logs, model.arm.n, recorded)
 
 
-def held_out_logs(options: argparse.Namespace, model: ReconstructedModel) -> list[MotionLog]:
+def held_out_logs(
+    options: argparse.Namespace, model: ReconstructedModel, fitted: list[MotionLog]
+) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
-    fitted = {Path(path).resolve() for path in options.logs}
-    for path in options.held_out:
-        if Path(path).resolve() in fitted:
-            raise InputError(
-                f"{path}: is one of the logs diagnosed; --held-out takes runs that are not fitted"
-            )
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    for path, log in zip(options.held_out, logs, strict=True):
+        for other in fitted:
+            if same_measurement(log, other):
+                raise InputError(
+                    f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
+                    "--held-out takes runs that are not fitted"
+                )
     for log in logs:
         condition([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

@@ -16,7 +16,7 @@ from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording
 from armloop.convert.units import CURRENTS, FACTORS, canonical
 from armloop.errors import LogError
-from armloop.log import GAP_PERIODS, MotionLog
+from armloop.log import GAP_PERIODS, MotionLog, unchecked_log
 
 _OWN = re.compile(r"(q|v|tau|vdot)\d{1,3}|time")
 # A run that follows another starts so many sample periods later: clearly a gap.
@@ -74,7 +74,8 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         cells["v"] = _differences(time, cells["q"], starts)
         notes.append("v: central differences of q, for the source has no velocities")
     unit = "A" if mapping.tau.gains is None and canonical(_unit(mapping.tau, 0), "tau") in CURRENTS else "N*m"
-    log = MotionLog(time, cells["q"], cells["v"], cells["tau"], cells.get("vdot"), recording.path.stem, unit)
+    # Parts that follow one another without a gap may jump: they are checked once they are kept apart.
+    log = unchecked_log(time=time, **cells, name=recording.path.stem, tau_unit=unit)
     used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {
         mapping.time.column or ""
     }
@@ -111,14 +112,14 @@ def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
         clocks.append(time)
         last = float(time[-1])
     has_vdot = all(log.vdot is not None for log in logs)
-    log = MotionLog(
-        np.concatenate(clocks),
-        np.concatenate([one.q for one in logs]),
-        np.concatenate([one.v for one in logs]),
-        np.concatenate([one.tau for one in logs]),
-        np.concatenate([one.vdot for one in logs if one.vdot is not None]) if has_vdot else None,
-        logs[0].name,
-        logs[0].tau_unit,
+    log = unchecked_log(
+        time=np.concatenate(clocks),
+        q=np.concatenate([one.q for one in logs]),
+        v=np.concatenate([one.v for one in logs]),
+        tau=np.concatenate([one.tau for one in logs]),
+        vdot=np.concatenate([one.vdot for one in logs if one.vdot is not None]) if has_vdot else None,
+        name=logs[0].name,
+        tau_unit=logs[0].tau_unit,
     )
     names = dict.fromkeys(name for one in parts for name in one.extra)
     extra = {

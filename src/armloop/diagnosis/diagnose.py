@@ -21,7 +21,7 @@ from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.effects import hypotheses
 from armloop.errors import InputError
-from armloop.log import MotionLog
+from armloop.log import MotionLog, require_different
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
 from armloop.progress import Progress, silent
@@ -178,6 +178,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
             raise InputError(
                 f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
             )
+    require_different(logs)
     progress("conditioning the run like the model's training logs")
     samples = condition(logs, model.conditioning)
     for j in range(model.arm.n):

@@ -1,17 +1,18 @@
-"""YAML files read into the dataclasses of `scenario_data`: whatever is wrong is one line with file and field."""
+"""YAML files read into the descriptions of `scenario_data`: whatever is wrong is one line with file and field."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
-from pydrake.common.yaml import yaml_load_file, yaml_load_typed
 
 from armloop.errors import ScenarioError
+from armloop.reading import read_yaml
 from armloop.resources import find_scenario
+from armloop.schemas.checking import Misfit, checked
 
 T = TypeVar("T")
 
@@ -31,10 +32,7 @@ def per_joint(values: list[float], n: int, where: str, *, spread: bool = True) -
 
 def read(path: Path) -> Mapping[str, Any]:
     """Return the file as a mapping."""
-    try:
-        raw = yaml_load_file(str(path))
-    except Exception as error:  # the reader passes the YAML parser's own errors through
-        raise ScenarioError(f"{path}: unreadable YAML: {error}") from error
+    raw = read_yaml(path, ScenarioError, "a scenario's YAML file")
     if not isinstance(raw, Mapping):
         raise ScenarioError(f"{path}: a scenario must be a mapping of fields")
     return raw
@@ -56,7 +54,7 @@ def scenario_entry(spec: str | Path, schema: type[T]) -> tuple[Path, str, str, T
     """
     path, wanted = find_scenario(spec)
     raw = read(path)
-    fields = get_type_hints(schema)
+    fields = {field.name for field in msgspec.structs.fields(schema)}  # type: ignore[arg-type]
     several = raw and all(key not in fields and isinstance(value, Mapping) for key, value in raw.items())
     if not several:
         if wanted is not None:
@@ -70,37 +68,11 @@ def scenario_entry(spec: str | Path, schema: type[T]) -> tuple[Path, str, str, T
 
 
 def typed(path: Path, raw: Any, schema: type[T], name: str | None) -> T:
-    """Check fields and types, with messages a person understands; then let Drake's reader do its part."""
-    _check(raw, schema, f"{path}: {name}" if name else str(path))
+    """Return an entry as an object of its description; whatever is wrong is one line with file and field."""
+    where = f"{path}: {name}" if name else str(path)
+    if not isinstance(raw, Mapping):
+        raise ScenarioError(f"{where} is {raw!r:.60}; it must be a mapping of fields")
     try:
-        return yaml_load_typed(schema=schema, filename=str(path), child_name=name, defaults=schema())
-    except Exception as error:
-        raise ScenarioError(f"{path}: {name or 'scenario'}: {error}") from error
-
-
-def _check(raw: Any, schema: Any, where: str) -> None:
-    """Raise `ScenarioError` unless `raw` has the fields and types of `schema`."""
-    if get_origin(schema) is Union:
-        if raw is not None:
-            _check(raw, get_args(schema)[0], where)
-    elif get_origin(schema) is list:
-        if not isinstance(raw, list):
-            raise ScenarioError(f"{where} is {raw!r}; it must be a list")
-        for index, item in enumerate(raw):
-            _check(item, get_args(schema)[0], f"{where}[{index + 1}]")
-    elif dataclasses.is_dataclass(schema):
-        if not isinstance(raw, Mapping):
-            raise ScenarioError(f"{where} is {raw!r}; it must be a mapping of fields")
-        hints = get_type_hints(schema)
-        for key, value in raw.items():
-            if key not in hints:
-                raise ScenarioError(f"{where}: field {key!r} is unknown; there are: {', '.join(hints)}")
-            _check(value, hints[key], f"{where}: {key}")
-    elif schema is float:
-        if isinstance(raw, bool) or not isinstance(raw, int | float) or not np.isfinite(raw):
-            raise ScenarioError(f"{where} is {raw!r}; it must be a finite number")
-    elif schema is int:
-        if isinstance(raw, bool) or not isinstance(raw, int):
-            raise ScenarioError(f"{where} is {raw!r}; it must be a whole number")
-    elif not isinstance(raw, schema):
-        raise ScenarioError(f"{where} is {raw!r}; it must be a {schema.__name__}")
+        return checked(raw, schema)
+    except Misfit as misfit:
+        raise ScenarioError(f"{where}: {misfit}") from None

@@ -31,20 +31,8 @@ def reference_of(
     if data.kind == "paper":
         if arm.n != 3:
             raise ScenarioError(f"{where}: reference: the paper's is for 3 joints; {arm.name} has {arm.n}")
-        if not 1 <= data.periods <= LONGEST / 20:
-            raise ScenarioError(
-                f"{where}: reference.periods is {data.periods}; it must be 1 to {LONGEST / 20:g}"
-            )
-        if not 0 < data.unit <= 1:
-            raise ScenarioError(
-                f"{where}: reference.unit is {data.unit}; it must be above 0 and at most 1 rad"
-            )
         reference: Reference = paper_reference(data.unit, data.periods)
     elif data.kind == "fourier":
-        if not 5 <= data.duration <= LONGEST:
-            raise ScenarioError(
-                f"{where}: reference.duration is {data.duration}; it must be 5 to {LONGEST:g} s"
-            )
         reference = fourier_reference(ranges, data.duration, seed)
     elif data.kind == "csv":
         reference = _table(data.file, arm, path, where)
@@ -81,10 +69,6 @@ def _table(file: str, arm: Arm, path: Path, where: str) -> Reference:
 def _places(data: ReferenceData, n: int, ranges: MotionRanges, where: str) -> Reference:
     if len(data.places) < 2 or any(len(place) != n for place in data.places):
         raise ScenarioError(f"{where}: reference.places must be two or more places of {n} numbers each")
-    if not 0.01 <= data.dwell <= 60:
-        raise ScenarioError(f"{where}: reference.dwell is {data.dwell}; it must be 0.01 to 60 s")
-    if not 0.01 <= data.pace <= 10:
-        raise ScenarioError(f"{where}: reference.pace is {data.pace}; it must be 0.01 to 10")
     try:
         reference = places_reference(data.places, ranges, dwell=data.dwell, pace=data.pace)
     except ValueError as error:

@@ -30,6 +30,7 @@ from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion, Samples
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.pooled import Choice, Pooled, Prior
+from armloop.signals import at_least
 
 Array = NDArray[np.float64]
 
@@ -247,7 +248,7 @@ def _inside(motion: Motion, numbers: NDArray[np.intp], samples: Samples) -> NDAr
     """(N,) samples further than half a period of the filter from the borders of their block."""
     inside = np.ones(motion.samples, dtype=bool)
     if samples.cutoff_hz > 0:
-        reach = int(np.ceil(0.5 / (samples.cutoff_hz * samples.period)))
+        reach = at_least(0.5 / (samples.cutoff_hz * samples.period))
         border = np.flatnonzero(np.diff(numbers)) + 1
         near = (border[:, None] + np.arange(-reach, reach)).ravel()
         inside[near[(near >= 0) & (near < motion.samples)]] = False

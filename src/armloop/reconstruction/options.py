@@ -28,6 +28,7 @@ class Options:
             (:data:`armloop.reconstruction.friction_ladder.LAWS`); None for all. The double feature set has its own.
         insist: keep M(q) positive definite even then.
         standard_errors: estimate those of the coefficients, which takes longer than the coefficients do.
+        parts: tell what of the residual a flexible regression still predicts.
     """
 
     sparse: Sparse = field(default_factory=Sparse)
@@ -41,6 +42,7 @@ class Options:
     friction: tuple[str, ...] | None = None
     insist: bool = False
     standard_errors: bool = True
+    parts: bool = True
 
     @property
     def of_double_feature_set(self) -> bool:

@@ -13,6 +13,8 @@ from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.dynamics.physics import check_physics
 from armloop.errors import InputError
+from armloop.goodness import Parts, merged
+from armloop.log import require_different
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
 from armloop.pieces import IN_MEMORY, LogSource
@@ -23,6 +25,7 @@ from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
+from armloop.reconstruction.judged import held_out_parts
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.libraries import (
     LIBRARIES,
@@ -38,6 +41,7 @@ from armloop.reconstruction.rigid_body import rigid_body
 from armloop.reconstruction.shared import SHARED_CONDITIONING, motion_range
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise_on
+from armloop.reconstruction.tally import Part
 from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
 from armloop.workers import Workers
@@ -54,6 +58,8 @@ class Reconstruction:
         held_out: score on blocks that no step has seen, and that chose nothing: no term, no orders, no library.
         notes: what the user should know.
         libraries: those that were compared; the one taken alone where the user named it.
+        parts: how much of each joint's torque is explained, predictable but not explained, and noise, on the same
+            blocks; empty where nobody asked.
     """
 
     model: ReconstructedModel
@@ -61,6 +67,12 @@ class Reconstruction:
     held_out: Score
     notes: list[str]
     libraries: list[Contender] = field(default_factory=list)
+    parts: list[Parts] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What must be said before anything else: joints of which the model leaves much that is predictable."""
+        return [one.sentence() for one in self.parts if one.much_is_left]
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop reconstruct --json``, without the model's path."""
@@ -70,6 +82,8 @@ class Reconstruction:
             "library": self.model.history["library"],
             "libraries": [one.to_dict() for one in self.libraries],
             "physics": self.model.history["physics"],
+            "joints": merged(self.parts),
+            "warnings": self.warnings,
             "notes": self.notes,
         }
 
@@ -143,6 +157,8 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     large = sum(log.samples for log in logs) > in_memory
+    kept = [] if large and method == "stepwise" else [log.read() for log in logs]
+    require_different(kept)
     time_series = conditioning is None or conditioning.cutoff_hz > 0
     if library is None and (not time_series or (large and arm.n <= MOST_JOINTS)):
         library = candidates(arm, settings)[0]
@@ -156,7 +172,7 @@ def reconstruct(
             data = Data.streamed(logs, how, settings, workers)
             apart = apart or Apart(settings.block_seconds, 0.0, 0.0)
         else:
-            samples = condition([log.read() for log in logs], how)
+            samples = condition(kept or [log.read() for log in logs], how)
             check_recorded(arm, samples)
             apart = apart or independent_blocks(arm, samples, settings.block_seconds, settings.folds)
             settings = replace(settings, block_seconds=apart.seconds)
@@ -219,15 +235,18 @@ def _finished(
             **found.history,
         },
     )
-    tally = tried.tally(found.sorter, "test" if compared else "all")
-    model = replace(model, baseline=tally.baseline())
+    part: Part = "test" if compared else "all"
+    tally = tried.tally(found.sorter, part)
+    parts = []
+    if options.parts:
+        progress("what a flexible regression still finds in what the model leaves")
+        parts = held_out_parts(model, data, part)
+    model = replace(model, baseline={**tally.baseline(), "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
         model = replace(model, components=components, friction=found.final.law, history=history)
-    checks = next((one.checks for one in libraries if one.chosen and one.checks), None) or check_physics(
-        model
-    )
+    checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}
     if compared:
@@ -237,7 +256,7 @@ def _finished(
         progress("standard errors of the coefficients")
         shared = tried.library in ("rigid-body", "lagrangian")
         model = replace(model, uncertainty=uncertainty(model, data, found, shared))
-    return Reconstruction(model, found.reports, tally.score(), notes, libraries)
+    return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
 
 
 def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:

@@ -16,7 +16,7 @@ from armloop.library.friction import FrictionTerm
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.regression.determined import combination, told_apart
-from armloop.signals import Conditioning
+from armloop.signals import Conditioning, at_least
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def _steady(samples: Samples) -> NDArray[np.bool_]:
     steady = np.zeros(v.shape, dtype=bool)
     if samples.cutoff_hz <= 0:
         return steady
-    width = 2 * int(np.ceil(1 / (samples.cutoff_hz * samples.period))) + 1
+    width = 2 * at_least(1 / (samples.cutoff_hz * samples.period)) + 1
     for run in samples.motion.runs():
         low = minimum_filter1d(v[run], width, axis=0, mode="nearest")
         high = maximum_filter1d(v[run], width, axis=0, mode="nearest")

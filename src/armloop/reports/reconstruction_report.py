@@ -13,12 +13,13 @@ from armloop.motion import Motion, Samples
 from armloop.reconstruction import Reconstruction, StepReport
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots import clusters_figure, has_trials, orders_figure, torque_figure
+from armloop.reports.plots import clusters_figure, friction_figure, has_trials, orders_figure, torque_figure
 from armloop.reports.tables import (
     Table,
     formulas,
     libraries_table,
     make_table,
+    parts_table,
     score_table,
     steps_table,
 )
@@ -34,7 +35,17 @@ _ORDERS_WITH_BASELINE = " The last panel is the one-shot baseline, which keeps i
 _TORQUE = (
     "Measured and predicted torque over time. Step I knows gravity and dry friction, Step II adds what "
     "depends on velocity, Step III what depends on acceleration: the last curve should lie on the measured "
-    "one."
+    "one. Below each joint's torque, on a scale of its own: what the whole model leaves of it."
+)
+_FRICTION = (
+    "Friction over velocity. Dots: the measured torque without what the rest of the model explains; line: the "
+    "model's friction once the joint slides, the band where it depends on the load. Dots away from the line are "
+    "friction that the model lacks, or something else that it takes for friction."
+)
+_PARTS = (
+    "Of what the model leaves on held-out data, a flexible regression (ridge and boosted trees of the state, the "
+    "direction, the recent path and the load) still predicts a part on blocks left out, further apart than the "
+    "residual's memory: so much is known to be missing from the model. The rest is noise, as far as anyone can tell."
 )
 _CLUSTERS = (
     "Every dot is a sample; crosses are the cluster centres. The elbow of the within-cluster sum tells how "
@@ -67,8 +78,22 @@ def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionL
         sections.insert(0, conditions_section(sort_samples(samples.motion)))
     error = percent(mean_nrmse(reconstruction.held_out))
     lead = "From motion logs to a readable model of the joint torques, step by step."
+    if reconstruction.warnings:
+        lead = f"{'; '.join(reconstruction.warnings)}. {lead}"
     cards = [Card(error, "Prediction error", "nRMSE on data that no step has seen, mean of the joints")]
+    cards += _parts_card(reconstruction)
     return render(Report(f"Reconstruction of {model.arm.name}", lead, sections, cards))
+
+
+def _parts_card(reconstruction: Reconstruction) -> list[Card]:
+    """The joint of which most is left that could be predicted."""
+    known = [one for one in reconstruction.parts if one.predictable_left is not None]
+    if not known:
+        return []
+    worst = max(known, key=lambda one: one.predictable_left or 0.0)
+    text = f"of the energy of the torque of joint {worst.joint}, the joint with most of it"
+    tone = "bad" if reconstruction.warnings else "good"
+    return [Card(percent(worst.predictable_left), "Predictable, not explained", text, tone)]
 
 
 def _longest_run(samples: Samples) -> Samples:
@@ -96,6 +121,7 @@ def reconstruction_sections(
         pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_BASELINE if baseline else "")))
     if samples is not None:
         pictures.append(Picture(torque_figure(model, samples), _TORQUE))
+        pictures.append(Picture(friction_figure(model, samples), _FRICTION))
     tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
     if len(reconstruction.libraries) > 1:
         tables.insert(0, libraries_table(reconstruction.libraries))
@@ -108,6 +134,9 @@ def reconstruction_sections(
         f"is off by {percent(mean_nrmse(reconstruction.held_out))} of the measured torque (nRMSE of moving samples, "
         "mean of the joints).",
     ]
+    if reconstruction.parts:
+        tables.append(parts_table(reconstruction.parts, model.arm))
+        text = [*(f"{warning}." for warning in reconstruction.warnings), *text, _PARTS]
     if baseline is not None:
         tables.append(comparison(reconstruction, baseline))
         text.append(_against(reconstruction, baseline))

@@ -21,6 +21,7 @@ from armloop.reports.words import (
 if TYPE_CHECKING:  # what makes the results need not be loaded to print them
     from armloop.arm import Arm
     from armloop.drake_systems.tracking import TrackingResult
+    from armloop.goodness import Parts
     from armloop.model import ReconstructedModel
     from armloop.reconstruction import StepReport
     from armloop.reconstruction.libraries import Contender
@@ -177,6 +178,37 @@ def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") 
         )
     headers = ["joint", "unit", "RMS measured", "RMSE moving", "nRMSE moving", "RMSE at rest"]
     return make_table(headers, rows, title, left=(0, 1))
+
+
+def parts_table(
+    parts: Sequence[Parts], arm: Arm, title: str | None = "Parts of the torque's energy"
+) -> Table:
+    """What the model explains of each joint's torque on held-out data, what could be predicted besides, and noise."""
+    rows = [
+        [
+            f"{one.joint}  {joint.name}",
+            _exact_percent(one.explained),
+            percent(one.predictable_left),
+            percent(one.std_error),
+            percent(one.noise),
+            MISSING if one.correlation_time is None else f"{one.correlation_time:.2g} s",
+        ]
+        for one, joint in zip(parts, arm.joints, strict=False)
+    ]
+    headers = [
+        "joint",
+        "explained",
+        "predictable, not explained",
+        "± std error",
+        "noise",
+        "residual's memory",
+    ]
+    return make_table(headers, rows, title)
+
+
+def _exact_percent(x: float | None) -> str:
+    """A part that is nearly all, with as many nines as it has."""
+    return MISSING if x is None else f"{100 * x:.2f} %"
 
 
 def seconds_table(seconds: Mapping[str, float], title: str | None = "Time taken") -> Table:

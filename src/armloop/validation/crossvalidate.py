@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.errors import InputError
-from armloop.log import MotionLog
+from armloop.log import MotionLog, require_different
 from armloop.motion import Samples
 from armloop.progress import Progress, silent
 from armloop.reconstruction import Options, Reconstruction, reconstruct
@@ -99,8 +99,9 @@ def crossvalidate(
     leave_out = leave_out or ("file" if len(logs) > 1 else "blocks")
     if leave_out not in LEAVE_OUT:
         raise InputError(f"unknown --leave-out {leave_out!r}; there are: {', '.join(LEAVE_OUT)}")
+    require_different(logs)
     splits = by_file(logs) if leave_out == "file" else by_blocks(logs, block_seconds)
-    options = replace(options or Options(), standard_errors=False)
+    options = replace(options or Options(), standard_errors=False, parts=False)
     errors: list[list[_Judged]] = [[] for _ in logs]
     results = []
     for number, split in enumerate(splits, 1):

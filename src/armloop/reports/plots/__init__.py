@@ -2,6 +2,7 @@
 
 from armloop.reports.plots.conditions import clusters_figure
 from armloop.reports.plots.feedforward import feedforward_figure
+from armloop.reports.plots.friction import friction_figure
 from armloop.reports.plots.orders import has_trials, orders_figure
 from armloop.reports.plots.residual import residual_shape_figure, residual_time_figure
 from armloop.reports.plots.ring import Stage, ring_figure
@@ -14,6 +15,7 @@ __all__ = [
     "clusters_figure",
     "eta_figure",
     "feedforward_figure",
+    "friction_figure",
     "has_trials",
     "orders_figure",
     "residual_shape_figure",

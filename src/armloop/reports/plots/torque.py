@@ -1,4 +1,4 @@
-"""Measured torque and what the model predicts after each step, like Fig. 14 of the paper."""
+"""Measured torque and what the model predicts after each step, like Fig. 14 of the paper, with the residual below."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
-from armloop.reports.plots.style import MUTED, STEPS, figure, legend, panels, polish, thin
+from armloop.reports.plots.style import GRID, MUTED, STEPS, figure, legend, panels, polish, thin
 from armloop.reports.words import unit
 from armloop.signals import smooth
 
@@ -15,16 +15,16 @@ _ROMAN = {1: "I", 2: "II", 3: "III"}
 
 
 def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 20.0) -> Figure:
-    """One row per joint over the first ``seconds`` of the longest run: measured, Step I, II and III."""
+    """Two panels per joint over the first ``seconds`` of the longest run: measured, Step I, II and III; the residual."""
     run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
     time = samples.motion.time[run] - samples.motion.time[run.start]
     shown = slice(run.start, run.start + int(np.searchsorted(time, seconds)))
     time = time[: shown.stop - shown.start]
     predicted = {step: smooth(samples, model.predict(samples.motion, step)) for step in STEPS}
     n = model.arm.n
-    made = figure(10, 1.75 * n + 0.7)
-    column = panels(made, n, 1, sharex=True)[:, 0]
-    for j, (axes, joint) in enumerate(zip(column, model.arm.joints, strict=True)):
+    made = figure(10, 2.6 * n + 0.7)
+    column = panels(made, 2 * n, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, 1.0] * n})[:, 0]
+    for j, (axes, below, joint) in enumerate(zip(column[::2], column[1::2], model.arm.joints, strict=True)):
         axes.plot(
             *thin(time, samples.tau[shown, j]),
             color=MUTED,
@@ -43,9 +43,12 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
                 zorder=1 + step,
             )
         axes.margins(x=0.01)
-        what = "torque" if joint.kind == "revolute" else "force"
-        polish(
-            axes, "time [s]" if j == n - 1 else "", f"{what} [{unit(joint.torque_unit)}]", f"Joint {j + 1}"
-        )
-    legend(made, 4)
+        left = samples.tau[shown, j] - predicted[3][shown, j]
+        below.axhline(0.0, color=GRID, linewidth=1)
+        below.plot(*thin(time, left), color=STEPS[3], linewidth=0.9, label="residual")
+        below.margins(x=0.01)
+        what, of = "torque" if joint.kind == "revolute" else "force", unit(joint.torque_unit)
+        polish(axes, "", f"{what} [{of}]", f"Joint {j + 1}")
+        polish(below, "time [s]" if j == n - 1 else "", f"residual [{of}]")
+    legend(made, 5)
     return made

@@ -1,0 +1,134 @@
+"""The descriptions of what commands answer: diagnosis.json, tracking.json, loop.json."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from armloop.schemas.types import (
+    MOST_JOINTS,
+    Count,
+    Finite,
+    JointNumber,
+    Name,
+    NotNegative,
+    PerJoint,
+    Seconds,
+    Text,
+)
+
+_Share = Annotated[float, Meta(ge=-1e3, le=1e3, description="part of an energy; 1 is all of it")]
+_PerJoint = Annotated[list[NotNegative | None], Meta(min_length=1, max_length=MOST_JOINTS)]
+
+
+class AlternativeData(Struct):
+    """What this motion cannot tell from what was found."""
+
+    effect: Name
+    joint: JointNumber | None
+    why: Text = ""
+
+
+class FoundData(Struct):
+    """An effect that was found, or the law of a residual that no listed effect explains."""
+
+    effect: Name
+    joint: JointNumber | None
+    other_joint: JointNumber | None = None
+    share: _Share | None = None
+    alternatives: list[AlternativeData] = []
+    parameters: dict[str, Any] = {}
+    form: Text | UnsetType = UNSET
+    when: Name | UnsetType = UNSET
+    probability: Annotated[float, Meta(ge=0, le=1)] | UnsetType | None = UNSET
+
+
+class RemainsData(Struct):
+    """Error on data left out, before and after what was found, per joint, in ``unit``."""
+
+    metric: Name
+    held_out: bool
+    unit: list[Name]
+    before: _PerJoint
+    after: _PerJoint
+    noise_floor: _PerJoint | None = None
+
+
+class JointShareData(Struct):
+    """Parts of one joint's torque on data left out."""
+
+    joint: JointNumber
+    explained: _Share | None = None
+    predictable_left: _Share | None = None
+    noise: _Share | None = None
+    outside_trained_range: _Share | None = None
+
+
+class DiagnosisData(Struct):
+    """What a model lacks on a measured run, and which effects account for it, strongest first."""
+
+    schema: Literal["armloop/diagnosis/1", "armloop/diagnosis/2"]
+    verdict: Literal["no_effect", "effects_found", "unlisted_effect", "cannot_tell"]
+    effects: list[FoundData]
+    error: RemainsData
+    reasons: list[Text] = []
+    joints: list[JointShareData] = []
+    written_by: Name = ""
+
+
+class ControllerData(Struct):
+    """One controller's tracking errors per joint: deg, or mm for a prismatic joint."""
+
+    eta_deg: Annotated[list[NotNegative], Meta(description="mean absolute error; deg (mm)")]
+    rms: PerJoint | UnsetType = UNSET
+    max: PerJoint | UnsetType = UNSET
+
+
+class TrackingData(Struct):
+    """A closed-loop comparison of controllers."""
+
+    schema: Literal["armloop/tracking/1"]
+    controllers: dict[str, ControllerData]
+    scenario: Name = ""
+    arm: Name = ""
+    scored_s: list[Seconds] = []
+    unit: list[Name] = []
+    written_by: Name = ""
+
+
+class UndeclaredData(Struct):
+    """The effect that was put into the simulated arm, told after the verdict."""
+
+    effect: Name
+    joint: JointNumber | None
+    parameters: dict[str, Any]
+
+
+class EtaData(Struct):
+    """Mean absolute tracking error per joint, deg (mm)."""
+
+    eta_deg: list[NotNegative]
+
+
+class BeforeAfterData(Struct):
+    """Tracking of the arm with the effect, with the model as collected and with the augmented one."""
+
+    before: EtaData
+    after: EtaData
+
+
+class LoopData(Struct):
+    """The main job's results."""
+
+    schema: Literal["armloop/loop/1"]
+    seed: Count
+    reconstruct: dict[str, Any]
+    sindy: dict[str, Any] | None
+    tracking: TrackingData
+    diagnosis: DiagnosisData
+    undeclared: UndeclaredData
+    right: bool
+    tracking_with_effect: BeforeAfterData
+    seconds: dict[str, Finite]
+    written_by: Name = ""

@@ -1,0 +1,281 @@
+"""The description of a model file, ``armloop/model/2``, and what ``armloop/model/1`` lacks of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from armloop.errors import ModelError
+from armloop.schemas.checking import Misfit, checked
+from armloop.schemas.types import (
+    MOST_JOINTS,
+    MOST_TERMS,
+    Count,
+    Finite,
+    JointNumber,
+    Matrix3,
+    Name,
+    NotNegative,
+    PerJoint,
+    PerJointOrNull,
+    Pose,
+    Positive,
+    Seconds,
+    Step,
+    Text,
+    Vector3,
+)
+
+SCHEMA = "armloop/model/2"
+#: Hz; a filter of a lower corner would need hours of a log.
+LOWEST_CORNER = 1e-3
+_SUM = Annotated[float, Meta(ge=-1e12, le=1e12, description="SI units")]
+_Joints = Meta(min_length=1, max_length=MOST_JOINTS)
+_Terms = Meta(max_length=MOST_TERMS)
+
+
+class JointData(Struct):
+    """A moving joint; a limit that is not there is none."""
+
+    name: Name
+    kind: Literal["revolute", "prismatic"]
+    lower: Finite | UnsetType = UNSET  # rad (m)
+    upper: Finite | UnsetType = UNSET
+    velocity: NotNegative | UnsetType = UNSET  # rad/s (m/s)
+    effort: NotNegative | UnsetType = UNSET  # N·m (N)
+
+
+class ArmData(Struct):
+    """An arm's kinematics and nominal links, base to tip."""
+
+    name: Name
+    joints: Annotated[list[JointData], _Joints]
+    X_PF: Annotated[list[Pose], _Joints]
+    axis: Annotated[list[Vector3], _Joints]
+    mass: PerJoint
+    com: Annotated[list[Vector3], _Joints]
+    inertia: Annotated[list[Matrix3], _Joints]
+    X_tool: Pose
+    gravity: Vector3
+    fingerprint: Name = ""
+
+
+class TermsData(Struct, tag_field="kind", tag="terms"):
+    """Products of the joints' functions with a coefficient each, per joint, found in one step."""
+
+    step: Step
+    joints: Annotated[list[Annotated[dict[Name, _SUM], _Terms]], _Joints]
+
+
+class RigidBodyData(Struct, tag_field="kind", tag="rigid_body"):
+    """Base parameters, and full parameters that have them."""
+
+    base_parameters: Annotated[dict[Text, _SUM], _Terms]
+    parameters: Annotated[list[_SUM], Meta(max_length=11 * MOST_JOINTS)]
+
+
+class EnergyTermData(Struct):
+    """One term of the energies."""
+
+    term: Name
+    coefficient: _SUM
+    degrees: Annotated[list[Annotated[int, Meta(ge=-9, le=9)]], Meta(max_length=MOST_JOINTS)]
+    sine: Annotated[list[bool], Meta(max_length=MOST_JOINTS)] | bool
+    speeds: Annotated[list[Annotated[int, Meta(ge=0, le=MOST_JOINTS)]], Meta(max_length=4)]
+
+
+class LagrangianData(Struct, tag_field="kind", tag="lagrangian"):
+    """Kinetic and potential energy."""
+
+    terms: Annotated[list[EnergyTermData], _Terms]
+
+
+class FrictionTermData(Struct):
+    """One term of a joint's friction; ``parameter`` is a speed or a width, 0 where there is none."""
+
+    kind: Name
+    coefficient: Finite
+    parameter: NotNegative = 0.0
+    name: Name = ""
+
+
+class EstimateData(Struct):
+    """A physical parameter; vectors are lists; a standard error that nobody knows is null."""
+
+    value: Finite | Annotated[list[Finite], Meta(max_length=64)]
+    std_error: NotNegative | Annotated[list[NotNegative | None], Meta(max_length=64)] | None
+    unit: Name
+
+
+class EffectData(Struct):
+    """An effect that was added, on a joint, a pair, or none."""
+
+    effect: Name
+    joint: JointNumber | None
+    parameters: Annotated[dict[Name, EstimateData], Meta(max_length=64)]
+    other_joint: JointNumber | None = None
+
+
+class ConditioningData(Struct, forbid_unknown_fields=True):
+    """How logs are filtered; see ``armloop.signals.Conditioning``."""
+
+    cutoff_hz: Annotated[float, Meta(ge=0.0, le=1e4, description="Hz; 0 is no filter")]
+    oversampling: Annotated[float, Meta(gt=1.0, le=1e4)] = 25.0
+    dead_zone: Annotated[float, Meta(ge=0.0, le=1e3)] = 4.0
+    smear: Annotated[float, Meta(ge=0.0, le=1e3)] = 0.5
+
+
+class RecordedData(Struct):
+    """What the torque columns of the training logs held."""
+
+    unit: Literal["N*m", "A"]
+    drive_gains: Annotated[list[Positive], _Joints] | None
+
+
+class BaselineData(Struct):
+    """What the model leaves on left-out data of its own training runs, per joint."""
+
+    rmse: PerJointOrNull | None = None
+    rms: PerJointOrNull | None = None
+    nrmse: PerJointOrNull | None = None
+    worst: PerJointOrNull | None = None
+    samples: Count | None = None
+
+
+class HistoryData(Struct):
+    """How the model came about; what else stands there is kept as it is."""
+
+    method: Name | None = None
+    library: Name | None = None
+    logs: Annotated[list[Text], Meta(max_length=100_000)] = []
+    notes: Annotated[list[Text], Meta(max_length=10_000)] = []
+    range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | None = None
+    inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | None = None
+
+
+class ErrorData(Struct):
+    """A coefficient's standard error."""
+
+    std_error: NotNegative | None
+    degrees_of_freedom: NotNegative | None
+
+
+class UncertaintyData(Struct):
+    """Standard errors of the coefficients, by their terms' names."""
+
+    method: Text = ""
+    block_seconds: Seconds | None = None
+    correlation_seconds: Seconds | None = None
+    joints: Annotated[list[Annotated[dict[Text, ErrorData], _Terms]], Meta(max_length=MOST_JOINTS)] = []
+    friction: Annotated[list[Annotated[dict[Text, ErrorData], _Terms]], Meta(max_length=MOST_JOINTS)] = []
+    shared: Annotated[dict[Text, ErrorData], _Terms] = {}
+    stribeck: Annotated[list[dict[Name, Any]], Meta(max_length=MOST_JOINTS)] = []
+
+
+class ModelData(Struct):
+    """A reconstructed model of an arm's joint torques; SI units, joints base to tip."""
+
+    schema: Literal["armloop/model/2"]
+    arm: ArmData
+    components: Annotated[list[TermsData | RigidBodyData | LagrangianData], Meta(max_length=100)]
+    friction: Annotated[list[Annotated[list[FrictionTermData], Meta(max_length=1000)]], _Joints]
+    effects: Annotated[list[EffectData], Meta(max_length=1000)]
+    conditioning: ConditioningData
+    recorded: RecordedData
+    baseline: BaselineData
+    history: HistoryData
+    uncertainty: UncertaintyData
+    written_by: Name = ""
+    formulas: Annotated[list[str], Meta(max_length=MOST_JOINTS)] = []
+
+
+def _from_1(data: dict[str, Any]) -> dict[str, Any]:
+    """``armloop/model/1`` knew models without standard errors."""
+    return {"uncertainty": {}, **data, "schema": "armloop/model/2"}
+
+
+#: Schema: what makes the next one of it.
+_MIGRATIONS = {"armloop/model/1": _from_1}
+
+
+def model_data(data: Any) -> dict[str, Any]:
+    """Check what was read from a model file, of this schema or an earlier one; returned as one of this schema.
+
+    Raises:
+        ModelError: another schema, or a field is missing, misshapen, out of range, or does not go with the arm.
+    """
+    found = data.get("schema") if isinstance(data, dict) else None
+    while isinstance(found, str) and found in _MIGRATIONS:
+        data = _MIGRATIONS[found](data)
+        found = data["schema"]
+    if found != SCHEMA:
+        raise ModelError(f"schema is {found!r:.60}, it must be {SCHEMA!r}")
+    try:
+        model = checked(data, ModelData)
+    except Misfit as misfit:
+        raise ModelError(str(misfit)) from None
+    _agree(model)
+    whole: dict[str, Any] = data
+    return whole
+
+
+def _agree(model: ModelData) -> None:
+    """Raise ``ModelError`` where lengths do not go with the number of joints."""
+    arm, n = model.arm, len(model.arm.joints)
+    lengths: list[tuple[str, Any]] = [
+        *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
+        ("friction", model.friction),
+        ("recorded.drive_gains", model.recorded.drive_gains),
+        *((f"baseline.{key}", getattr(model.baseline, key)) for key in ("rmse", "rms", "nrmse", "worst")),
+        *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
+        *(
+            (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
+            for key in ("joints", "friction", "stribeck")
+        ),
+    ]
+    for part in model.components:
+        if isinstance(part, TermsData):
+            lengths.append((f"terms of step {part.step}", part.joints))
+        elif isinstance(part, RigidBodyData) and len(part.parameters) not in (10 * n, 11 * n):
+            raise ModelError(
+                f"rigid_body: {len(part.parameters)} parameters, {n} links need {10 * n} or {11 * n}"
+            )
+    for place, values in lengths:
+        if values is not None and len(values) != n:
+            raise ModelError(f"{place}: {len(values)} joints, the arm has {n}")
+    if 0 < model.conditioning.cutoff_hz < LOWEST_CORNER:
+        raise ModelError(
+            f"conditioning.cutoff_hz is {model.conditioning.cutoff_hz:g}; it must be 0, or at least {LOWEST_CORNER:g} Hz"
+        )
+    if any(x < 0 for row in (model.history.range or [])[:3] for x in row):
+        raise ModelError("history.range: half ranges, velocities and accelerations must not be negative")
+    inertial = model.history.inertial
+    if inertial is not None and len(inertial) != 10 * n:
+        raise ModelError(f"history.inertial: {len(inertial)} parameters, {n} links have {10 * n}")
+    for k, axis in enumerate(arm.axis):
+        if abs(sum(x * x for x in axis) - 1.0) > 1e-6:
+            raise ModelError(f"arm.axis[{k + 1}] is {axis}; an axis must have the length 1")
+    for k, mass in enumerate(arm.mass):
+        if mass < 0:
+            raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
+    for joint in arm.joints:
+        low = float("-inf") if joint.lower is UNSET else joint.lower
+        high = float("inf") if joint.upper is UNSET else joint.upper
+        if not low < high:
+            raise ModelError(
+                f"arm: joint {joint.name!r:.60} goes from {low:g} to {high:g}; give lower below upper"
+            )
+    for k, effect in enumerate(model.effects):
+        for joint_number in (effect.joint, effect.other_joint):
+            if joint_number is not None and joint_number > n:
+                raise ModelError(
+                    f"effects[{k + 1}]: effect {effect.effect!r:.60} is on joint {joint_number}; the arm has "
+                    f"joints 1 to {n}"
+                )
+        for name, each in effect.parameters.items():
+            sizes = {
+                len(x) if isinstance(x, list) else 0 for x in (each.value, each.std_error) if x is not None
+            }
+            if len(sizes) > 1:
+                raise ModelError(f"effects[{k + 1}]: {name}: value and std_error are not of one length")
