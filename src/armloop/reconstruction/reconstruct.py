@@ -168,15 +168,13 @@ def reconstruct(
         nonlocal apart, settings
         how = conditioning or default_conditioning(library)
         progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        if apart is None:
+            apart = independent_blocks(arm, kept or logs, how, settings.block_seconds, settings.folds)
+            settings = replace(settings, block_seconds=apart.seconds)
         if large and method == "stepwise" and library == "double-feature-set":
             data = Data.streamed(logs, how, settings, workers)
-            apart = apart or Apart(settings.block_seconds, 0.0, 0.0)
         else:
-            samples = condition(kept or [log.read() for log in logs], how)
-            check_recorded(arm, samples)
-            apart = apart or independent_blocks(arm, samples, settings.block_seconds, settings.folds)
-            settings = replace(settings, block_seconds=apart.seconds)
-            data = Data.of(samples, settings)
+            data = Data.of(condition(kept or [log.read() for log in logs], how), settings)
         check_recorded(arm, data.reference.samples)
         return Attempt(
             library, how, data, _found(arm, data, method, library, settings, progress), apart.margin
