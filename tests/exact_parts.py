@@ -76,7 +76,10 @@ def model_of(
         FrictionLaw((friction,) * arm.n),
         history={"range": [[1.0] * arm.n] * 3 + [[0.0] * arm.n]},
         effects=tuple(
-            AddedEffect(effect(name, joint), {k: Estimate(x, 0.0, "") for k, x in parameters.items()})
+            AddedEffect(
+                effect(name, joint),
+                {k: Estimate(x, np.zeros_like(x, float).tolist(), "") for k, x in parameters.items()},
+            )
             for name, joint, parameters in effects
         ),
     )

@@ -11,6 +11,7 @@ import hashlib
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from armloop.errors import ArmError
 from armloop.resources import urdf_names, urdf_path
+from armloop.urdf import base_links, read_urdf, serial_chain
 
 Array = NDArray[np.float64]
 
@@ -169,26 +171,34 @@ def _rounded(values: Array) -> Any:
     return (np.round(values, 6) + 0.0).tolist()
 
 
-def load_arm(spec: str | Path) -> Arm:
+def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str | None = None) -> Arm:
     """Load a built-in arm by name, or any serial arm from the path of a URDF.
 
+    Args:
+        lock: positions (rad, m) of moving joints that are to be fixed there, such as those of a gripper.
+        tip: name of the arm's last link, or of one fixed to it; moving joints off the way to it are fixed at zero.
+
+    What is doubtful about the URDF is said as :class:`~armloop.errors.InputWarning`.
+
     Raises:
-        ArmError: the name is unknown, the file cannot be read or parsed, or the mechanism is not a
-            single chain of revolute, continuous and prismatic joints.
+        ArmError: the name is unknown, the file cannot be read or parsed or describes what cannot be, or the
+            mechanism is not a single chain of revolute, continuous and prismatic joints.
     """
     text_spec = str(spec)
     path = urdf_path(text_spec) if text_spec in urdf_names() else Path(text_spec)
-    if not path.is_file():
+    try:
+        found = path.is_file()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ArmError(f"{text_spec[:200]}: cannot be read ({reason}); give the path of a URDF") from error
+    if not found:
         hint = "" if "/" in text_spec or text_spec.endswith(".urdf") else " and no built-in arm"
         known = ", ".join(urdf_names())
-        raise ArmError(f"{text_spec}: no such file{hint}; give the path of a URDF or one of: {known}")
-    try:
-        urdf = path.read_text(encoding="utf-8")
-        root = ElementTree.fromstring(urdf)
-    except (OSError, UnicodeDecodeError, ElementTree.ParseError) as error:
-        raise ArmError(f"{path}: unreadable URDF: {error}") from error
-    if root.tag != "robot":
-        raise ArmError(f"{path}: unreadable URDF: the root element is <{root.tag}>, it must be <robot>")
+        raise ArmError(f"{text_spec[:200]}: no such file{hint}; give the path of a URDF or one of: {known}")
+    root = read_urdf(path)
+    root = serial_chain(root, path, lock or {}, tip)
+    changed = bool(lock) or tip is not None
+    urdf = ElementTree.tostring(root, encoding="unicode") if changed else path.read_text(encoding="utf-8")
     return _from_urdf(root, urdf, path)
 
 
@@ -222,7 +232,7 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
         if base != "world":
             plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
         plant.Finalize()
-    except RuntimeError as error:
+    except (RuntimeError, ValueError) as error:
         raise ArmError(f"{path}: unreadable URDF: {_one_line(str(error))}") from error
 
     moving = []
@@ -277,11 +287,7 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
 
 def _base_link(root: ElementTree.Element, path: Path) -> str:
     """Name of the link that is no joint's child."""
-    links = [link.get("name", "") for link in root.findall("link")]
-    children = {child.get("link") for joint in root.findall("joint") for child in joint.findall("child")}
-    roots = [name for name in links if name not in children]
-    if not links:
-        raise ArmError(f"{path}: the URDF has no <link>")
+    roots = list(base_links(root))
     if len(roots) != 1:
         found = ", ".join(roots) or "none (a loop)"
         raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(roots)}: {found}")
@@ -299,7 +305,7 @@ def _ordered_chain(plant: Any, moving: list[Any], path: Path) -> list[Any]:
             names = ", ".join(joint.name() for joint in following) or "none"
             raise ArmError(
                 f"{path}: not a serial arm: {len(following)} moving joints follow link {tip.name()!r} ({names}); "
-                "give the URDF of one arm without gripper fingers"
+                "lock a gripper's joints (--lock JOINT=VALUE) or name the arm's last link (--tip LINK)"
             )
         ordered.append(following[0])
         tip = following[0].child_body()
@@ -311,10 +317,7 @@ def _effort_limit(root: ElementTree.Element, name: str) -> float:
     for joint in root.findall("joint"):
         limit = joint.find("limit")
         if joint.get("name") == name and limit is not None and limit.get("effort"):
-            try:
-                effort = float(limit.get("effort", ""))
-            except ValueError:
-                return np.inf
+            effort = float(limit.get("effort", ""))
             return effort if effort > 0 else np.inf
     return np.inf
 

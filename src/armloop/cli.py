@@ -1,7 +1,7 @@
 """The command line: parse, call.
 
 Exit status: 0 done; 2 the input is at fault; 1 something else is (memory, a process killed); 130 Ctrl-C; 143 SIGTERM;
-with one line on standard error.
+with one line on standard error. 3 `armloop watch` has a new alarm.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ COMMANDS = (
     "crossvalidate",
     "evaluate",
     "diagnose",
+    "export",
     "track",
     "tune",
+    "watch",
     "reproduce",
 )
 
@@ -58,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with listening() as doubts, _ending_on_request():
             options = build_parser().parse_args(arguments)
             with guarding(options.command, _named_files(options), options.force):
-                options.run(options)
+                status = options.run(options)
         for doubt in doubts:
             print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
@@ -80,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault("interrupted", 130)
     except _Ended:
         return _fault("ended on request (SIGTERM)", 143)
-    return 0
+    return int(status or 0)
 
 
 def _fault(message: str, status: int) -> int:

@@ -32,15 +32,18 @@ def read_bytes(path: str | Path, most: int, error: type[InputError], what: str =
     try:
         # Without blocking: a pipe that nobody writes to would be waited for.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        with os.fdopen(descriptor, "rb") as file:
-            found = os.fstat(file.fileno())
+        try:
+            found = os.fstat(descriptor)
             if stat.S_ISDIR(found.st_mode):
                 raise error(f"{path}: cannot be read (is a folder); give {what}")
             if not stat.S_ISREG(found.st_mode):
                 raise error(f"{path}: is a device or a pipe; give {what}")
             if found.st_size > most:
                 raise error(f"{path}: has {found.st_size} bytes; {what} has at most {most}")
-            content = file.read(most + 1)
+            with os.fdopen(descriptor, "rb", closefd=False) as file:
+                content = file.read(most)
+        finally:
+            os.close(descriptor)
     except FileNotFoundError as fault:
         raise error(f"{path}: no such file; give {what}") from fault
     except (OSError, ValueError) as fault:
@@ -123,8 +126,9 @@ def read_yaml(path: str | Path, error: type[InputError], what: str, most: int = 
     import yaml
 
     text = read_text(path, most, error, what)
-    loader = _loader()(text)
+    loader = None
     try:
+        loader = _loader()(text)
         node = loader.get_single_node()
         if node is None:
             return None
@@ -141,7 +145,8 @@ def read_yaml(path: str | Path, error: type[InputError], what: str, most: int = 
     except ValueError as fault:
         raise error(f"{path}: unreadable YAML: {fault}") from fault
     finally:
-        loader.dispose()
+        if loader is not None:
+            loader.dispose()
 
 
 def _size(node: Any, known: dict[int, int], level: int) -> int:

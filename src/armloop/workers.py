@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from functools import reduce
 from multiprocessing import get_context
 from operator import add
+from threading import Thread
 from typing import Any, Protocol, TypeVar
 
 from armloop.errors import InputError
@@ -153,9 +154,12 @@ class Cluster:
                 "--scheduler needs Dask, which is not installed; install the extra: armloop[dask]"
             ) from error
         _somebody_listens(address)
+        # Dask waits without end for one that accepts a connection and says nothing.
+        connecting: Future[Any] = Future()
+        thread = Thread(target=_connect, args=(Client, address, connecting), daemon=True)
+        thread.start()
         try:
-            with _quiet("distributed"):
-                self.client = Client(address, timeout=PATIENCE, set_as_default=False)
+            self.client = connecting.result(PATIENCE + 1)
         except (OSError, TimeoutError, ValueError) as error:
             raise InputError(_nobody(address)) from error
         if not self.client.scheduler_info()["workers"]:
@@ -196,6 +200,14 @@ def _somebody_listens(address: str) -> None:
         socket.create_connection((found[1].strip("[]"), int(found[2])), _CONNECTED).close()
     except (OSError, UnicodeError) as error:
         raise InputError(_nobody(address)) from error
+
+
+def _connect(client: Any, address: str, answer: Future[Any]) -> None:
+    try:
+        with _quiet("distributed"):
+            answer.set_result(client(address, timeout=PATIENCE, set_as_default=False))
+    except BaseException as error:
+        answer.set_exception(error)
 
 
 @contextmanager

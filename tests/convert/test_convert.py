@@ -324,7 +324,7 @@ def test_faults_of_tables_name_the_place(tmp_path, log, capsys):
     for name, (text, word) in cases.items():
         (tmp_path / name).write_text("\n".join(text) + "\n")
         assert word in refused(["convert", str(tmp_path / name), *out], capsys), name
-    assert "is one of the sources" in refused(["convert", str(path), "--out", str(path)], capsys)
+    assert "is read by this command" in refused(["convert", str(path), "--out", str(path)], capsys)
     assert path.read_text().splitlines() == lines
 
 

@@ -35,6 +35,7 @@ from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import EFFECTS, Context
 from armloop.errors import ModelError
 from armloop.functions import MATH
+from armloop.library.friction import Sliding, torque_along
 
 ARM, SCARA = load_arm("three_axis"), load_arm("scara")
 PARAMETERS = {
@@ -171,7 +172,7 @@ def test_a_diagram_with_it_can_be_cloned(name):
 def test_every_effect_but_the_sensors_has_a_system():
     acting = {name for name, kind in EFFECTS.items() if not kind.sensor}
     assert acting <= set(PARAMETERS)
-    with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
+    with pytest.raises(ModelError, match="effect torque_offset: falsifies the record"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
 
 
@@ -201,7 +202,9 @@ def test_an_effect_says_what_its_columns_say(name):
         q, v, vdot = (x[k].tolist() for x in (motion.q, motion.v, motion.vdot))
         tau = law.equations.torque(q, v, vdot) if law.equations else [0.0] * 3
         if law.friction is not None:
-            tau[law.joint] += law.friction(v[law.joint], np.sign(v[law.joint]), 0.0, motion.time[k])
+            along, terms = law.friction
+            x = Sliding(along.of(q), along.of(v), np.sign(along.of(v)), motion.time[k] - motion.time[0])
+            along.add(tau, torque_along(terms, x, 0.0, MATH))
         assert_allclose(tau, expected[k], atol=1e-12)
 
 

@@ -91,7 +91,12 @@ LAWS: dict[str, tuple[Law, dict[str, float], float]] = {
         9.0,
     ),
     "presliding_hysteresis": (
-        on_joint_2(lambda m: 0.3 * stop_operator(m.q[:, 1], 0.02) + 0.1 * np.sign(m.v[:, 1])),
+        # the run begins while the joint slides
+        on_joint_2(
+            lambda m: (
+                0.3 * stop_operator(m.q[:, 1], 0.02, initial=np.sign(m.v[:1, 1])) + 0.1 * np.sign(m.v[:, 1])
+            )
+        ),
         {"level": 0.3, "width": 0.02, "level_change": 0.1},
         0.02,
     ),

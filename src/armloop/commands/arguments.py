@@ -13,6 +13,23 @@ def add_logs(p: argparse.ArgumentParser) -> None:
     p.add_argument("logs", nargs="+", metavar="LOG", help=_LOG_HELP)
 
 
+def add_chain(p: argparse.ArgumentParser) -> None:
+    """How a URDF with a gripper or branches becomes a serial arm."""
+    p.add_argument(
+        "--lock",
+        action="append",
+        default=[],
+        metavar="JOINT=VALUE",
+        help="fix this joint of the URDF at a position (rad, m), such as a gripper's; may be given several times",
+    )
+    p.add_argument(
+        "--tip",
+        default=None,
+        metavar="LINK",
+        help="the arm's last link: moving joints off the way to it are fixed at zero, their links keep their masses",
+    )
+
+
 def add_recorded(p: argparse.ArgumentParser, default: str) -> None:
     """What the torque columns of the logs hold."""
     p.add_argument(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import ARM_HELP, add_json
+from armloop.commands.arguments import ARM_HELP, add_chain, add_json
 
 HELP = (
     "turn other programs' logs (ROS bags, RTDE, libfranka, LeRobot, .mat, .npz, any table) into a motion log"
@@ -27,6 +27,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--out", default=None, metavar="LOG", help="the log to write, .parquet or .csv")
     p.add_argument("--arm", default=None, help=f"match the joints by name with those of {ARM_HELP}")
+    add_chain(p)
     p.add_argument(
         "--map",
         default=None,
@@ -64,13 +65,12 @@ def run(options: argparse.Namespace) -> None:
     """Convert, or suggest a map."""
     from pathlib import Path
 
-    from armloop.arm import load_arm
-    from armloop.commands.shared import drive_gains, out_file, print_json
+    from armloop.commands.shared import arm_of, drive_gains, out_file, print_json
     from armloop.convert import Answers, convert, read_map
     from armloop.errors import InputError
     from armloop.tables import write_columns
 
-    arm = load_arm(options.arm) if options.arm else None
+    arm = arm_of(options) if options.arm else None
     if options.suggest:
         _suggest(options, arm)
         return
@@ -80,7 +80,6 @@ def run(options: argparse.Namespace) -> None:
     out_file(options.out, "--out")
     if out.suffix not in (".csv", ".parquet"):
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; --out must end in .parquet or .csv")
-    _spare(out, options.sources)
     mapping = read_map(options.map) if options.map else None
     answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)
     found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
@@ -107,9 +106,11 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     else:
         place = None
     if place is not None:
+        if place.exists() and not options.force:
+            raise InputError(
+                f"{place}: exists; --suggest writes a new map, give another name with --map, or add --force"
+            )
         out_file(str(place), "--map")
-        if place.exists():
-            raise InputError(f"{place}: exists; --suggest writes a new map, give another name with --map")
     recording = read_sources(options.sources[:1], arm, options.topic)[0]  # type: ignore[arg-type]
     mapping, unsure = suggested(recording, arm)  # type: ignore[arg-type]
     text = written(mapping, unsure, recording)
@@ -125,16 +126,6 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     print(
         f"wrote {place}; complete it, then: armloop convert {recording.path} --map {place} --out LOG.parquet"
     )
-
-
-def _spare(out: object, sources: list[str]) -> None:
-    from pathlib import Path
-
-    from armloop.errors import InputError
-
-    for source in sources:
-        if Path(source).resolve() == Path(str(out)).resolve():
-            raise InputError(f"{out}: is one of the sources; --out must name another file")
 
 
 def _answer(found: object, out: object) -> dict[str, object]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import ARM_HELP, add_json, add_logs, add_recorded
+from armloop.commands.arguments import ARM_HELP, add_chain, add_json, add_logs, add_recorded
 
 HELP = "reconstruct with each log, or alternating blocks, left out in turn, and score what was left out"
 EXAMPLE = "armloop crossvalidate run1.csv run2.csv run3.csv --arm arm.urdf"
@@ -14,6 +14,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_logs(p)
     p.add_argument("--arm", required=True, help=ARM_HELP)
+    add_chain(p)
     p.add_argument(
         "--leave-out",
         choices=("file", "blocks"),
@@ -49,8 +50,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Reconstruct with part of the logs left out, in turn, and score what was left out."""
-    from armloop.arm import load_arm
-    from armloop.commands.shared import TORQUE, print_json, progress, read_logs, recorded_as
+    from armloop.commands.shared import TORQUE, arm_of, print_json, progress, read_logs, recorded_as
     from armloop.errors import InputError
     from armloop.reconstruction import Options
     from armloop.reports.crossvalidation import (
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
-    arm = load_arm(options.arm)
+    arm = arm_of(options)
     logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
     how = {
         "leave_out": options.leave_out,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import add_json, add_logs, add_recorded
+from armloop.commands.arguments import add_chain, add_json, add_logs, add_recorded
 from armloop.commands.next_run import add_next_run
 
 HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
@@ -27,6 +27,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="further runs of the arm as it is now, never fitted: error before and after on each of them",
     )
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
+    add_chain(p)
     add_recorded(p, "as the model's training logs")
     add_next_run(p)
     add_json(p)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import add_json, add_logs, add_recorded
+from armloop.commands.arguments import add_chain, add_json, add_logs, add_recorded
 
 HELP = (
     "compare a model's prediction with logs: RMSE and nRMSE (RMSE over RMS of the measured signal) per joint"
@@ -17,6 +17,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("model", metavar="MODEL.json")
     add_logs(p)
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
+    add_chain(p)
     add_recorded(p, "as the model's training logs")
     add_json(p)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import ARM_HELP, add_json, seed
+from armloop.commands.arguments import ARM_HELP, add_chain, add_json, seed
 from armloop.commands.ranges import add_ranges, numbers, read_ranges
 
 HELP = "design an exciting reference within an arm's limits, optimised for the library that will be regressed"
@@ -14,6 +14,7 @@ EXAMPLE = "armloop excite three_axis --out reference.csv --compare --report refe
 def arguments(p: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     p.add_argument("arm", help=ARM_HELP)
+    add_chain(p)
     p.add_argument(
         "--out",
         required=True,
@@ -80,8 +81,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Design an exciting reference and write it."""
-    from armloop.arm import load_arm
-    from armloop.commands.shared import out_file, print_json, progress
+    from armloop.commands.shared import arm_of, out_file, print_json, progress
     from armloop.design import Settings, excite
     from armloop.errors import InputError
     from armloop.excitation import write_reference
@@ -99,7 +99,7 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--rate {options.rate:g}: give 1 to 10000 rows per second")
     if options.starts is not None and not 1 <= options.starts <= 1000:
         raise InputError(f"--starts {options.starts}: give 1 to 1000")
-    arm = load_arm(options.arm)
+    arm = arm_of(options)
     library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None
     noise = numbers(options.noise, "--noise", arm)

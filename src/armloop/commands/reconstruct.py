@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from armloop.commands.arguments import ARM_HELP, add_json, add_logs, add_recorded
+from armloop.commands.arguments import ARM_HELP, add_chain, add_json, add_logs, add_recorded
 
 HELP = "reconstruct a readable model of the joint torques from logs"
 EXAMPLE = "armloop reconstruct out/logs/*.csv --arm three_axis --out model.json"
@@ -15,6 +15,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_logs(p)
     p.add_argument("--arm", required=True, help=ARM_HELP)
+    add_chain(p)
     p.add_argument("--out", required=True, help="the model file, JSON")
     p.add_argument(
         "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
@@ -88,8 +89,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Reconstruct a model and write it."""
-    from armloop.arm import load_arm
-    from armloop.commands.shared import TORQUE, out_file, print_json, progress, recorded_as
+    from armloop.commands.shared import TORQUE, arm_of, out_file, print_json, progress, recorded_as
     from armloop.errors import InputError
     from armloop.files import write_text
     from armloop.pieces import IN_MEMORY, first_samples, log_sources
@@ -113,7 +113,7 @@ def run(options: argparse.Namespace) -> None:
     _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
-    arm = load_arm(options.arm)
+    arm = arm_of(options)
     recorded = recorded_as(options, TORQUE)
     logs = log_sources(options.logs, arm.n, recorded, 0 if options.scheduler else IN_MEMORY)
     workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)

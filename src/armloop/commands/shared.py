@@ -44,6 +44,20 @@ def out_file(path: str | None, option: str) -> None:
     take_file(path, option)
 
 
+def arm_of(options: argparse.Namespace) -> Arm:
+    """The arm of ``--arm`` (or ARM), with what ``--lock`` and ``--tip`` say; raises ``InputError``."""
+    lock = {}
+    for text in options.lock:
+        name, equals, value = text.rpartition("=")
+        try:
+            lock[name] = float(value)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise InputError(f"--lock {text}: give JOINT=VALUE, such as finger_joint=0.02")
+    return load_arm(options.arm, lock, options.tip)
+
+
 def drive_gains(text: str | None) -> list[float] | None:
     """The numbers of ``--drive-gains``; raises ``InputError`` for anything else."""
     if text is None:
@@ -85,7 +99,7 @@ TORQUE = {"unit": "N*m", "drive_gains": None}
 
 def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, list[MotionLog]]:
     """The model of a command line and the logs that are to be compared with it."""
-    arm: Arm | None = load_arm(options.arm) if options.arm else None
+    arm: Arm | None = arm_of(options) if options.arm else None
     model = load_model(options.model, arm)
     recorded = recorded_as(options, model.recorded)
     if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":

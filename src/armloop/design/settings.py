@@ -13,6 +13,8 @@ LIBRARIES = ("rigid-body", "double-feature-set")
 #: s of rigid-body, and of the double feature set up to three joints and beyond: it has several times as many columns
 #: (94 at three joints, 156 at four, N1 = 1), and one short curve cannot tell them apart.
 _DURATION, _DURATIONS = 20.0, (60.0, 120.0)
+#: Random references that a comparison may take.
+_MOST_RANDOM = 10_000
 _LONGEST_PERIOD, _LONGEST = 120.0, 3600.0
 #: Hz that the default number of harmonics reaches, about the band of the random trajectories.
 _TOP = 0.4
@@ -73,9 +75,10 @@ class Settings:
             )
         if not 0 <= self.reserve < 1:
             raise InputError(f"reserve {self.reserve:g}: give a part of the effort limits, from 0 to below 1")
-        if self.random < 3:
+        if not 3 <= self.random <= _MOST_RANDOM:
             raise InputError(
-                f"random {self.random}: at least 3 random references are needed for a comparison"
+                f"random {self.random}: at least 3 random references are needed for a comparison, and at most "
+                f"{_MOST_RANDOM}"
             )
         duration = self.duration
         if duration is None:

@@ -4,6 +4,7 @@ The only room that imports pydrake's systems. A diagram of one's own starts with
 the systems it is made of. Names that end in an underscore are templates, `Feedforward_[AutoDiffXd]` for instance.
 """
 
+from armloop.drake_systems.beyond_bodies import BeyondBodies, BeyondBodies_, friction_systems
 from armloop.drake_systems.closed_loop import CONTROLLERS, ControlledArm, add_arm_with_controller
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque, ComputedTorque_
 from armloop.drake_systems.effect_system import EffectTorque, EffectTorque_, add_joint_forces
@@ -29,6 +30,8 @@ __all__ = [
     "CONTROLLERS",
     "AccelerationGains",
     "ArmPlant",
+    "BeyondBodies",
+    "BeyondBodies_",
     "ComputedTorque",
     "ComputedTorque_",
     "ControlledArm",
@@ -54,6 +57,7 @@ __all__ = [
     "Stop",
     "add_arm_with_controller",
     "add_joint_forces",
+    "friction_systems",
     "model_equations",
     "presliding_of",
 ]

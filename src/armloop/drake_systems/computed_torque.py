@@ -167,7 +167,7 @@ def ComputedTorque_(T: type) -> Any:
                 return tau
             equations = self._equations
             load = equations.load(q, v, vdot) if equations.load_matters else None
-            friction = equations.friction(sliding, load)
+            friction = equations.friction(sliding, load, q=q)
             return vector(T, [x + y for x, y in zip(equations.rigid(q, v, vdot), friction, strict=True)])
 
         def _integral(self, context: Any) -> np.ndarray:

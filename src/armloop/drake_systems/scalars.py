@@ -12,11 +12,18 @@ from pydrake.symbolic import Expression, if_then_else
 
 from armloop.functions import MATH, Functions
 
+
+def _clip(x: Any, lower: Any, upper: Any) -> Any:
+    return drake_math.max(drake_math.min(x, upper), lower)
+
+
 _COMMON = (drake_math.sin, drake_math.cos, drake_math.exp, drake_math.tanh, drake_math.sqrt)
 _FUNCTIONS: dict[type, Functions] = {
     float: MATH,
-    AutoDiffXd: Functions(*_COMMON, lambda x: float(x > 0.0) - float(x < 0.0)),
-    Expression: Functions(*_COMMON, lambda x: if_then_else(x > 0.0, 1.0, if_then_else(x < 0.0, -1.0, 0.0))),
+    AutoDiffXd: Functions(*_COMMON, lambda x: float(x > 0.0) - float(x < 0.0), _clip),
+    Expression: Functions(
+        *_COMMON, lambda x: if_then_else(x > 0.0, 1.0, if_then_else(x < 0.0, -1.0, 0.0)), _clip
+    ),
 }
 
 

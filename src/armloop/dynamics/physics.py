@@ -166,11 +166,11 @@ def joint_limits(arm: Arm, trained: Any = None) -> tuple[Array, Array]:
 
 
 def mass_matrix(model: ReconstructedModel, q: Array) -> Array:
-    """(P, n, n) mass matrix of a model's rigid body at postures q (P, n): torques of unit accelerations at rest."""
+    """(P, n, n) mass matrix of a model with its effects at postures q (P, n): torques of unit accelerations at rest."""
     P, n = q.shape
     repeated = np.repeat(q, n + 1, axis=0)
     vdot = np.tile(np.vstack([np.eye(n), np.zeros(n)]), (P, 1))
-    tau = model.rigid_body(_samples(repeated, np.zeros_like(repeated), vdot)).reshape(P, n + 1, n)
+    tau = _torque(model, repeated, np.zeros_like(repeated), vdot).reshape(P, n + 1, n)
     return (tau[:, :n] - tau[:, n:]).transpose(0, 2, 1)
 
 
@@ -236,19 +236,14 @@ def _yaw(model: ReconstructedModel, low: Array, high: Array, rng: np.random.Gene
     v, vdot = rng.uniform(-1, 1, (2, _MOTIONS, n)) * size[1:3, None]
     turned = q.copy()
     turned[:, 0] = rng.uniform(low[0], high[0], _MOTIONS)
-    here, there = (model.rigid_body(_samples(x, v, vdot)) for x in (q, turned))
+    here, there = (_torque(model, x, v, vdot) for x in (q, turned))
     return float(np.sqrt(np.mean((here - there) ** 2) / max(float(np.mean(here**2)), 1e-300)))
 
 
 def _torque(model: ReconstructedModel, q: Array, v: Array, vdot: Array) -> Array:
-    motion = _samples(q, v, vdot)
-    rigid = model.rigid_body(motion)
-    return rigid + model.friction.torque(motion, load=rigid)
-
-
-def _samples(q: Array, v: Array, vdot: Array) -> Motion:
-    """Samples that have nothing to do with each other: each is a run of its own."""
-    return Motion(np.arange(float(len(q))), q, v, vdot, np.arange(len(q)))
+    """(N, n) torques of samples that have nothing to do with each other: each is a run of its own."""
+    motion = Motion(np.arange(float(len(q))), q, v, vdot, np.arange(len(q)))
+    return model.predict(motion, sensors=False)
 
 
 def _tuple(x: Array) -> tuple[float, ...]:

@@ -10,6 +10,7 @@ from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.shared import sliding_rows
 from armloop.reconstruction.sorter import Sorter
+from armloop.signals import smooth
 from armloop.uncertainty import Fitted, standard_errors
 
 
@@ -27,6 +28,10 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     if not in_memory(data):
         # a selection cannot be filtered; its columns are taken as they are
         samples = replace(samples, cutoff_hz=0.0)
+    if model.effects:
+        # taken as given, like the terms: their own errors stand beside their parameters
+        bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
+        samples = replace(samples, tau=samples.tau - smooth(samples, bare))
     return standard_errors(model, samples, fitted_rows(data, found, shared))
 
 

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.components import Component
+from armloop.effects import Context
 from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect
 from armloop.motion import Motion
 from armloop.reconstruction.options import StepReport
 from armloop.reconstruction.sorter import Sorter
@@ -22,6 +24,7 @@ Array = NDArray[np.float64]
 class Found:
     """Components, friction terms per joint, one report per step, and notes for the user.
 
+    ``effects`` are laws of the catalogue fitted together with the rest.
     ``history`` is kept in the model file; ``sorter`` is set where the samples were sorted, ``together`` where the
     terms of all steps were regressed on all samples nevertheless. ``final`` is
     what becomes the model, where a method regresses its terms once more on all data after the held-out ones
@@ -34,6 +37,7 @@ class Found:
     reports: list[StepReport] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     history: dict[str, Any] = field(default_factory=dict)
+    effects: tuple[AddedEffect, ...] = ()
     sorter: Sorter | None = None
     together: bool = False
     final: Found | None = None
@@ -55,5 +59,10 @@ class Found:
 
     def torque(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far."""
-        rigid = self.rigid(motion)
-        return rigid + self.law.torque(motion, load=rigid)
+        rigid = load = self.rigid(motion)
+        context = Context(self.arm, motion)
+        for added in self.effects:
+            torque = added.torque(context)
+            rigid = rigid + torque
+            load = load + torque if added.effect.load else load
+        return rigid + self.law.torque(motion, load=load)

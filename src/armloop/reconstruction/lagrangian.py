@@ -23,6 +23,7 @@ from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
@@ -84,8 +85,16 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], fast)
     load = columns @ plain.solve(plain.everything).theta[: energy.count]
     ladder = climb(arm, samples, smoothed, rows, load, options, {})
-    none = np.zeros(energy.count, dtype=bool)
-    shape = Body(energy.mass, postures(motion), *joint_limits(arm, motion_range(motion)), none)
+    fitting = Fitting(arm, samples, smoothed, rows, load, {}, options, progress)
+    ladder, laws = fitting.with_laws(ladder, lambda theta: columns @ theta[: energy.count])
+    smoothed, load = fitting.columns, fitting.load
+    r = energy.count + laws.count
+    shape = Body(
+        lambda q: np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.zeros(r, dtype=bool),
+    )
 
     def regressed(rows: Rows) -> Found:
         pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
@@ -106,7 +115,8 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
                 pass
         body = Lagrangian(energy, theta[: energy.count])
         history = {"friction_ladder": [rung.to_dict() for rung in ladder.climbs], **physics}
-        return Found(arm, [body], found_friction(ladder.laws, theta[energy.count :]), history=history)
+        effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
+        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
 
     found = regressed(rows)
     found.final = final = regressed(sliding_rows(samples))
@@ -125,6 +135,7 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     ]
     notes += [
         *ladder.notes,
+        *laws.notes(final.effects),
         *physics_notes(final.history),
         *_warnings(found, final, samples, held_out),
     ]

@@ -53,21 +53,25 @@ class Attempt:
 
     def tally(self, sorter: Sorter | None, part: Part) -> Tally:
         """Errors on blocks that the model has not seen; per condition where they are sorted."""
-        model = ReconstructedModel(
-            self.found.arm, tuple(self.found.components), self.found.law, self.conditioning
-        )
+        model = self.model()
         return self.data.sum(partial(Tally.of, model=model, sorter=sorter, part=part, margin=self.margin))
 
     def model(self) -> ReconstructedModel:
         """What was fitted without the held-out blocks: a model that has seen those that judge must choose nothing."""
         found, history = self.found, {"range": motion_range(self.data.reference.samples.motion)}
         return ReconstructedModel(
-            found.arm, tuple(found.components), found.law, self.conditioning, history=history
+            found.arm,
+            tuple(found.components),
+            found.law,
+            self.conditioning,
+            effects=found.effects,
+            history=history,
         )
 
     def coefficients(self) -> int:
         """Number of coefficients; those that serve all joints count once."""
-        return sum(map(len, self.found.friction)) + sum(map(_size, self.found.components))
+        own = sum(len(added.parameters) for added in self.found.effects)
+        return own + sum(map(len, self.found.friction)) + sum(map(_size, self.found.components))
 
 
 def _size(component: object) -> int:

@@ -222,6 +222,7 @@ def _finished(
         arm=arm,
         components=tuple(found.components),
         friction=found.law,
+        effects=found.effects,
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
@@ -243,7 +244,10 @@ def _finished(
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
-        model = replace(model, components=components, friction=found.final.law, history=history)
+        last = found.final
+        model = replace(
+            model, components=components, friction=last.law, effects=last.effects, history=history
+        )
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}

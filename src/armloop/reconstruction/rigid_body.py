@@ -19,6 +19,7 @@ from armloop.kinematics import nominal_parameters
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
+from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
@@ -66,12 +67,17 @@ def rigid_body(
     load = raw @ plain.solve(plain.everything).theta[: base.count]
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
     progress(f"rigid body: {base.count} base parameters; choosing each joint's friction on held-out data")
-    ladder = climb(arm, samples, columns, rows, load, options, _priors(arm, base, nominal))
+    priors = _priors(arm, base, nominal)
+    ladder = climb(arm, samples, columns, rows, load, options, priors)
+    fitting = Fitting(arm, samples, columns, rows, load, priors, options, progress)
+    ladder, laws = fitting.with_laws(ladder, lambda theta: raw @ theta[: base.count])
+    columns, load = fitting.columns, fitting.load
+    r = base.count + laws.count
     shape = Body(
-        lambda q: _mass_columns(arm, base, q),
+        lambda q: np.concatenate([_mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
         postures(motion),
         *joint_limits(arm, motion_range(motion)),
-        base.positive,
+        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
     )
 
     def regressed(rows: NDArray[np.bool_]) -> Found:
@@ -98,7 +104,8 @@ def rigid_body(
             "friction_ladder": [rung.to_dict() for rung in ladder.climbs],
             **physics,
         }
-        return Found(arm, [body], found_friction(ladder.laws, theta[base.count :]), history=history)
+        effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))
+        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
 
     found = regressed(rows)
     found.final = final = regressed(sliding)
@@ -113,6 +120,7 @@ def rigid_body(
         "the held-out blocks judged a model without them; the model itself was then regressed on all data",
         *unknown,
         *ladder.notes,
+        *laws.notes(final.effects),
     ]
     found.notes += physics_notes(final.history)
     return found

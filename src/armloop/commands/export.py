@@ -1,0 +1,87 @@
+"""Write a model for other tools, read back and compared."""
+
+from __future__ import annotations
+
+import argparse
+
+from armloop.commands.arguments import add_json
+
+HELP = "write a model as URDF, SDFormat, MJCF (MuJoCo), a Drake program or C, read it back and compare the torques"
+EXAMPLE = (
+    "armloop export model.json --to mjcf --out arm.xml\n"
+    "  armloop export model.json --to c --out arm.c\n"
+    "  armloop export model.json --to drake --out arm_in_drake"
+)
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    p.add_argument("model", metavar="MODEL.json")
+    p.add_argument(
+        "--to",
+        required=True,
+        choices=("urdf", "sdf", "mjcf", "drake", "c"),
+        help="urdf and sdf: link inertias, rotors, damping; mjcf: dry friction and springs too; drake: a folder with the "
+        "arm and a program that has all of the model; c: one C99 file with the torques",
+    )
+    p.add_argument("--out", required=True, metavar="PATH", help="the file to write (drake: the folder)")
+    p.add_argument(
+        "--log",
+        action="append",
+        default=[],
+        metavar="LOG",
+        help="compare on this log's motion (may be repeated) instead of random states within the training range",
+    )
+    p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
+    add_json(p)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Export."""
+    from armloop.arm import load_arm
+    from armloop.commands.shared import out_file, out_folder, print_json, read_logs
+    from armloop.export import export, states_of
+    from armloop.model import load_model
+    from armloop.signals import condition
+
+    if options.to == "drake":
+        out_folder(options.out)
+    else:
+        out_file(options.out, "--out")
+    model = load_model(options.model, load_arm(options.arm) if options.arm else None)
+    motion = None
+    if options.log:
+        samples = condition(read_logs(options.log, model.arm.n, model.recorded), model.conditioning)
+        motion = states_of(samples.motion, samples.moving)
+    found = export(model, options.to, options.out, motion)
+    if options.json:
+        print_json(found.to_dict())
+        return
+    _tell(found, model, bool(options.log))
+
+
+def _tell(found: object, model: object, by_log: bool) -> None:
+    from armloop.export import Exported
+    from armloop.model import ReconstructedModel
+    from armloop.reports.tables import table
+
+    assert isinstance(found, Exported) and isinstance(model, ReconstructedModel)
+    states = "states of the log" if by_log else "random states within the training range"
+    if found.difference is not None and found.unsaid is not None:
+        print(f"read back by {found.consumer}, on {states}; largest difference of torque:")
+        in_amperes = model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None
+        rows = []
+        for j, joint in enumerate(model.arm.joints):
+            unit = "A" if in_amperes else joint.torque_unit
+            values = (found.rms[j], found.difference[j], found.unsaid[j])
+            rows.append([j + 1, joint.name, unit, *(f"{x:.3g}" for x in values)])
+        heads = ["joint", "name", "unit", "RMS of the model", "of what it can say", "of the whole model"]
+        print(table(heads, rows))
+    if found.missing:
+        print("what it cannot say:")
+        for line in found.missing:
+            print(f"  {line}")
+    for line in found.notes:
+        print(f"  {line}")
+    for path in found.files:
+        print(f"wrote {path}")

@@ -1,0 +1,77 @@
+"""What an export gave, and the states it is compared at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.model import ReconstructedModel
+from armloop.motion import Motion
+
+Array = NDArray[np.float64]
+
+_MOST = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """What was written and how it reads back.
+
+    Attributes:
+        target: one of ``armloop.export.TARGETS``.
+        files: what was written.
+        consumer: who read it back; empty where nobody could, which ``notes`` say.
+        rms: (n,) RMS of the model's torque over the states compared.
+        difference: (n,) largest difference between the torque read back and what the target can say of the model.
+        unsaid: (n,) largest difference between the torque read back and the whole model's.
+        missing: what the target cannot say, one line each.
+        notes: what else the user should know.
+    """
+
+    target: str
+    files: list[Path]
+    consumer: str
+    rms: Array
+    difference: Array | None
+    unsaid: Array | None
+    missing: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return {
+            "target": self.target,
+            "files": [str(path) for path in self.files],
+            "read_back_by": self.consumer or None,
+            "rms": self.rms.tolist(),
+            "difference": None if self.difference is None else self.difference.tolist(),
+            "difference_from_model": None if self.unsaid is None else self.unsaid.tolist(),
+            "cannot_say": self.missing,
+            "notes": self.notes,
+        }
+
+
+def whole_torque(model: ReconstructedModel, motion: Motion) -> Array:
+    """(N, n) torques of the whole model as a controller supplies them."""
+    return np.array([model.feedforward(*row) for row in zip(motion.q, motion.v, motion.vdot, strict=True)])
+
+
+def rms_of(tau: Array) -> Array:
+    """(n,) root mean square."""
+    return np.asarray(np.sqrt(np.mean(tau**2, axis=0)))
+
+
+def states_of(motion: Motion, moving: NDArray[np.bool_], most: int = _MOST) -> Motion:
+    """At most so many states of a log in which every joint slides, evenly over it.
+
+    At rest dry friction is not determined, so that nothing could be compared. Where all joints never slide at once,
+    those at rest count as the log has them.
+    """
+    rows = np.flatnonzero(moving.all(axis=1))
+    rows = rows if len(rows) >= 20 else np.arange(motion.samples)
+    rows = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
+    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))

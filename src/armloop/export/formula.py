@@ -1,0 +1,142 @@
+"""A model's inverse dynamics as formulas of traced numbers, with and without the memory of its friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armloop.arm import Arm
+from armloop.dynamics import ModelEquations
+from armloop.effects.base import number
+from armloop.effects.listed import EFFECTS
+from armloop.export.tracing import Graph, Node
+from armloop.library.friction import FrictionLaw
+from armloop.model import AddedEffect, ReconstructedModel
+
+#: Later than any joint has cooled down: what is left of friction that fades.
+_LATE = 1e300
+_ROUNDING = 4e-16
+_MEMORY = ("hysteresis", "load_hysteresis")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One elasto-plastic element: its joint (from 0) and the stretch at which it yields, rad (m)."""
+
+    joint: int
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Formula:
+    """Torques as formulas.
+
+    Attributes:
+        torque: (n,) as a controller supplies it: friction with memory as if fully slid, fading friction gone.
+        remembered: (n,) with the elements' states ``z[k]`` in [-1, 1] and the time ``t`` of the joints' start.
+        stops: the elements, in the order of their states.
+        fades: whether time matters.
+        left_out: what of the model is not in the formulas, one line each.
+    """
+
+    torque: list[Node]
+    remembered: list[Node]
+    stops: list[Stop]
+    fades: bool
+    left_out: list[str]
+
+    @property
+    def has_memory(self) -> bool:
+        """Whether the two differ."""
+        return bool(self.stops) or self.fades
+
+
+def formula(model: ReconstructedModel) -> Formula:
+    """Run a model's equations on traced numbers: inputs ``q[j]``, ``v[j]``, ``vdot[j]``, ``z[k]``, ``t``.
+
+    Raises:
+        ModelError: an effect has no law of q, v and vdot.
+    """
+    n = model.arm.n
+    model = replace(model, arm=_exact_quarters(model.arm))
+    graph = Graph(n)
+    q = [graph.input(f"q[{j}]", j if model.arm.revolute[j] else None) for j in range(n)]
+    v = [graph.input(f"v[{j}]") for j in range(n)]
+    vdot = [graph.input(f"vdot[{j}]") for j in range(n)]
+    plain, left_out = _split(model)
+    stops: list[Stop] = []
+
+    def torques(kept: ReconstructedModel, t: Node) -> tuple[list[Node], list[Node]]:
+        equations = ModelEquations(kept, graph.functions())
+        load = equations.load(q, v, vdot)
+        tau = [
+            graph.node(x) + y
+            for x, y in zip(equations.rigid(q, v, vdot), equations.friction(v, load, t, q), strict=True)
+        ]
+        return tau, [graph.node(x) for x in load]
+
+    late = graph.constant(_LATE)
+    torque, _ = torques(plain, late)
+    slid, elements = _without_memory(plain)
+    if not elements and not any(a.effect.name == "friction_drift" for a in plain.effects):
+        return Formula(torque, torque, [], False, left_out)
+    fades = any(a.effect.name == "friction_drift" for a in plain.effects)
+    remembered, load = torques(slid, graph.input("t") if fades else late)
+    for k, (joint, width, level, by_load) in enumerate(elements):
+        stops.append(Stop(joint, width))
+        z = level * graph.input(f"z[{k}]")
+        remembered[joint] = remembered[joint] + (z * abs(load[joint]) if by_load else z)
+    return Formula(torque, remembered, stops, fades, left_out)
+
+
+def _exact_quarters(arm: Arm) -> Arm:
+    """The arm with what is zero but for the rounding of a quarter turn as zero: half of all products go with it."""
+    X_PF, axis = arm.X_PF.copy(), arm.axis.copy()
+    for values in (X_PF[:, :3, :3], axis):
+        values[np.abs(values) < _ROUNDING] = 0.0
+    return replace(arm, X_PF=X_PF, axis=axis)
+
+
+def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[str]]:
+    """The model without what is no law of its own state, and what was left out."""
+    kept, left_out = [], []
+    for added in model.effects:
+        effect = added.effect
+        if effect.sensor:
+            left_out.append(f"{effect.label()}: a fault of the record, which no controller supplies")
+        elif not effect.searched:
+            left_out.append(f"{effect.label()}: an event of one run")
+        elif effect.name not in EFFECTS and added.placed() is None:
+            left_out.append(f"{effect.label()}: a law in Python, not one that can be written out")
+        else:
+            kept.append(added)
+    return replace(model, effects=tuple(kept)), left_out
+
+
+def _without_memory(
+    model: ReconstructedModel,
+) -> tuple[ReconstructedModel, list[tuple[int, float, float, bool]]]:
+    """The model without its elasto-plastic elements, and these: joint, width, level, whether per unit of load."""
+    elements: list[tuple[int, float, float, bool]] = []
+    terms = []
+    for j, joint in enumerate(model.friction.terms):
+        terms.append(tuple(term for term in joint if term.kind not in _MEMORY))
+        elements += [
+            (j, float(t.parameter), float(t.coefficient), t.kind == "load_hysteresis")
+            for t in joint
+            if t.kind in _MEMORY
+        ]
+    effects = []
+    for added in model.effects:
+        if added.effect.name != "presliding_hysteresis":
+            effects.append(added)
+            continue
+        assert added.effect.joint is not None
+        values = {key: number(e.value) for key, e in added.parameters.items()}
+        elements.append((added.effect.joint - 1, values["width"], values["level"], False))
+        if values.get("level_change"):
+            # what a model that had learned the step has to take back stays a step
+            change = replace(added.parameters["level"], value=0.0)
+            effects.append(AddedEffect(added.effect, {**added.parameters, "level": change}))
+    return replace(model, friction=FrictionLaw(tuple(terms)), effects=tuple(effects)), elements

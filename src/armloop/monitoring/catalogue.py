@@ -1,0 +1,150 @@
+"""The catalogue's columns of a motion: the effects' torques per unit of each free parameter, linearised at zero.
+
+The score test of a nested model needs no more: at a parameter's zero, its column is the derivative of the torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.effects import Effect, effect, hypotheses
+from armloop.model import ReconstructedModel
+from armloop.motion import Motion, Samples
+
+Array = NDArray[np.float64]
+
+#: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
+#: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.
+_SPECTRUM = 40
+
+
+@dataclass(frozen=True)
+class Column:
+    """One free parameter of one effect at one place.
+
+    Attributes:
+        name, joint, other_joint: the effect, as in ``diagnosis.json``.
+        part: index of the free parameter.
+        shape: value of the nonlinear parameter that the column was computed with.
+    """
+
+    name: str
+    joint: int | None
+    other_joint: int | None
+    part: int
+    shape: float = 0.0
+
+    @property
+    def key(self) -> str:
+        """The column as one word, such as ``viscous_friction:2::0:0``."""
+        places = ["" if j is None else str(j) for j in (self.joint, self.other_joint)]
+        return ":".join([self.name, *places, str(self.part), repr(float(self.shape))])
+
+    @staticmethod
+    def of(key: str) -> Column:
+        """Rebuild from :attr:`key`."""
+        name, joint, other, part, shape = key.rsplit(":", 4)
+        return Column(
+            name, int(joint) if joint else None, int(other) if other else None, int(part), float(shape)
+        )
+
+    @property
+    def place(self) -> tuple[str, int | None, int | None]:
+        """Effect and joints."""
+        return self.name, self.joint, self.other_joint
+
+    @cached_property
+    def effect(self) -> Effect:
+        """The effect itself."""
+        return effect(self.name, self.joint, self.other_joint)
+
+    def concerns(self, joints: int) -> NDArray[np.bool_]:
+        """(n,) joints whose torque the parameter is measured against."""
+        if self.joint is None:
+            return np.ones(joints, dtype=bool)
+        own = {self.joint, self.other_joint}
+        return np.array([j + 1 in own for j in range(joints)])
+
+
+@lru_cache(maxsize=8)
+def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
+    """The effects whose columns are kept, each with one value of its nonlinear parameter.
+
+    They are those of a diagnosis that depend on the state alone. Left out are effects with memory (their columns need
+    the whole path), spectra, and couplings of joints that are not neighbours. The nonlinear parameter is the middle one
+    of those tried on a motion that fills the ranges the model was fitted on: it must not depend on the log, or sums of
+    different logs would not add.
+    """
+    n = model.arm.n
+    kept = [
+        e
+        for e in hypotheses(model.arm)
+        if not e.memory
+        and not (e.pair_wise and e.joint and e.other_joint and abs(e.joint - e.other_joint) > 1)
+    ]
+    rng = np.random.default_rng(0)
+    size = np.array(model.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+    q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
+    cutoff = model.conditioning.cutoff_hz
+    period = 0.25 / cutoff if cutoff > 0 else 0.01
+    motion = Motion(period * np.arange(400.0), q + size[3], v, vdot, np.array([0]))
+    known = replace(model.context(motion, kept), period=period)
+    shapes = [(e, list(e.shapes(known))) for e in kept]
+    return tuple((e, float(s[len(s) // 2])) for e, s in shapes if len(s) <= _SPECTRUM)
+
+
+def catalogue(model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp]) -> Catalogue:
+    """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`."""
+    motion, period = samples.motion, samples.period
+    if samples.cutoff_hz > 0:
+        period = max(period, 0.25 / samples.cutoff_hz)
+    effects = watched(model)
+    whole = model.context(motion, [e for e, _ in effects])
+    assert whole.load is not None and whole.predicted is not None
+    thin = replace(
+        whole,
+        motion=motion_of(samples, rows),
+        period=period,
+        load=whole.load[rows],
+        predicted=whole.predicted[rows],
+    )
+    columns: list[Column] = []
+    parts: list[Array] = []
+    for e, shape in effects:
+        values = e.full_columns(thin, shape)
+        J = e.embed(e.start(np.zeros(values.shape[2])))[1]
+        linear = values @ J
+        columns += [Column(*e.place, k, shape) for k in range(linear.shape[2])]
+        parts.append(linear)
+    return Catalogue(tuple(columns), np.concatenate(parts, axis=2), whole.load[rows], whole.predicted)
+
+
+def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
+    """The motion at some samples, in the runs that they lie in."""
+    motion = samples.motion
+    run = np.searchsorted(motion.starts, rows, side="right")
+    starts = np.flatnonzero(np.diff(run, prepend=-1))
+    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """Columns (K, n, p) with what each is, the load (K, n) on the joints, and the prediction (N, n) of all samples."""
+
+    columns: tuple[Column, ...]
+    values: Array
+    load: Array
+    predicted: Array
+
+
+def groups(columns: Sequence[Column]) -> dict[tuple[str, int | None, int | None], NDArray[np.intp]]:
+    """Indices of the columns of each effect at each place."""
+    found: dict[tuple[str, int | None, int | None], list[int]] = {}
+    for index, column in enumerate(columns):
+        found.setdefault(column.place, []).append(index)
+    return {place: np.array(indices, dtype=np.intp) for place, indices in found.items()}

@@ -1,0 +1,186 @@
+"""Naming a change from sums alone: forward selection of effects on normal equations, judged on units left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.arm import Arm
+from armloop.effects import Estimate
+from armloop.monitoring.catalogue import Column, groups
+
+Array = NDArray[np.float64]
+Place = tuple[str, int | None, int | None]
+
+#: Ridge on columns of unit length: of what the model leaves on healthy units only the strong directions are taken.
+_RIDGE, _HEALTHY_RIDGE = 1e-8, 1e-3
+#: An effect must explain twice its standard error over the units, a further one this part of what the others do.
+_WORTH = 0.02
+_MOST = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations of U units: gram (U, p, p), moment (U, p), and the residual's energy (U,)."""
+
+    gram: Array
+    moment: Array
+    energy: Array
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that appeared.
+
+    Attributes:
+        place: effect and joints.
+        parameters: named, with standard errors from leaving one unit out at a time (jackknife).
+        share: of the energy that the effects together explain on units left out.
+        words: a sentence.
+        alternatives: what explains as much to within a standard error.
+    """
+
+    place: Place
+    parameters: dict[str, Estimate]
+    share: float
+    words: str
+    alternatives: tuple[Place, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values, as an entry of ``diagnosis.json``."""
+        name, joint, other = self.place
+        return {
+            "effect": name,
+            "joint": joint,
+            **({"other_joint": other} if other is not None else {}),
+            "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+            "share": self.share,
+            "words": self.words,
+            "alternatives": [
+                {"effect": n, "joint": j, **({"other_joint": o} if o is not None else {})}
+                for n, j, o in self.alternatives
+            ],
+        }
+
+
+def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, window: Normal) -> list[Named]:
+    """The effects that a window shows and the healthy units before it do not, strongest first; empty if none does.
+
+    What the model leaves on healthy units is expressed in the columns and taken out of the window first: it was there
+    before, whatever it is.
+    """
+    moment, energy = window.moment.copy(), window.energy.copy()
+    if healthy is not None and len(healthy.gram):
+        old = _ridge(healthy.gram.sum(axis=0), healthy.moment.sum(axis=0), _HEALTHY_RIDGE)
+        explained = np.einsum("upq,q->up", window.gram, old)
+        energy = energy - 2 * (moment @ old) + explained @ old
+        moment = moment - explained
+    rest = Normal(window.gram, moment, energy)
+    places = groups(columns)
+    chosen: list[Place] = []
+    rivals: list[tuple[Place, ...]] = []
+    gains: list[float] = []
+    last = np.zeros(len(moment))
+    while len(chosen) < _MOST:
+        held = {
+            place: _held_out(rest, np.concatenate([*(places[c] for c in chosen), index]))
+            for place, index in places.items()
+            if place not in chosen
+        }
+        if not held:
+            break
+        gain = {place: float((value - last).sum()) for place, value in held.items()}
+        best = max(gain, key=lambda place: gain[place])
+        error = np.sqrt(len(last)) * float(np.std(held[best] - last, ddof=min(1, len(last) - 1)))
+        if gain[best] <= max(2.0 * error, _WORTH * sum(gains)):
+            break
+        equals = [
+            place
+            for place in gain
+            if _as_good(held[best], held[place]) and _possible(arm, columns, rest, chosen, place)
+        ]
+        if not equals:
+            equals = [best]
+        # of those that explain as much, the fewest parameters
+        pick = min(equals, key=lambda place: (len(places[place]), -gain[place]))
+        chosen.append(pick)
+        rivals.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
+        gains.append(gain[pick])
+        last = held[pick]
+    whole = sum(gains)
+    return [
+        _named(arm, columns, rest, chosen, place, gain / whole if whole > 0 else 0.0, others)
+        for place, gain, others in zip(chosen, gains, rivals, strict=True)
+    ]
+
+
+def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
+    """(U,) energy that columns explain on each unit, fitted on all others (on itself if it is alone)."""
+    G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
+    G_all, b_all = G.sum(axis=0), b.sum(axis=0)
+    out = np.empty(len(b))
+    for u in range(len(b)):
+        beta = _ridge(G_all, b_all) if len(b) == 1 else _ridge(G_all - G[u], b_all - b[u])
+        out[u] = 2 * float(beta @ b[u]) - float(beta @ G[u] @ beta)
+    return out
+
+
+def _as_good(best: Array, other: Array) -> bool:
+    """Whether another explanation is not worse by more than a standard error over the units, or a fiftieth."""
+    less = best - other
+    error = np.sqrt(len(less)) * float(np.std(less, ddof=1)) if len(less) > 1 else 0.0
+    return float(less.sum()) <= min(error, 0.1 * abs(float(best.sum()))) or float(
+        less.sum()
+    ) <= _WORTH * float(best.sum())
+
+
+def _solved(
+    rest: Normal, columns: Sequence[Column], chosen: Sequence[Place], place: Place
+) -> tuple[Array, Array, float]:
+    """Free parameters of one effect among the chosen, their jackknife covariance, and its nonlinear parameter."""
+    places = groups(columns)
+    index = np.concatenate([places[c] for c in chosen])
+    first = sum(len(places[c]) for c in chosen[: list(chosen).index(place)])
+    own = slice(first, first + len(places[place]))
+    G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
+    G_all, b_all, U = G.sum(axis=0), b.sum(axis=0), len(b)
+    beta = _ridge(G_all, b_all)[own]
+    if U == 1:
+        return beta, np.zeros((len(beta), len(beta))), columns[places[place][0]].shape
+    left = np.array([_ridge(G_all - G[u], b_all - b[u])[own] for u in range(U)])
+    spread = left - left.mean(axis=0)
+    return beta, (U - 1) / U * (spread.T @ spread), columns[places[place][0]].shape
+
+
+def _possible(
+    arm: Arm, columns: Sequence[Column], rest: Normal, chosen: Sequence[Place], place: Place
+) -> bool:
+    x, covariance, shape = _solved(rest, columns, [*chosen, place], place)
+    effect = Column(*place, 0, shape).effect
+    return effect.plausible(arm, effect.estimates(arm, x, covariance, shape))
+
+
+def _named(
+    arm: Arm,
+    columns: Sequence[Column],
+    rest: Normal,
+    chosen: Sequence[Place],
+    place: Place,
+    share: float,
+    others: tuple[Place, ...],
+) -> Named:
+    x, covariance, shape = _solved(rest, columns, chosen, place)
+    effect = Column(*place, 0, shape).effect
+    parameters = effect.estimates(arm, x, covariance, shape)
+    return Named(place, parameters, share, effect.sentence(parameters), others)
+
+
+def _ridge(G: Array, b: Array, ridge: float = _RIDGE) -> Array:
+    size = np.diag(G)
+    scale = np.where(size > 1e-20 * size.max(initial=0.0), 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
+    scaled = G * np.outer(scale, scale) + ridge * np.eye(len(G))
+    return np.asarray(scale * np.linalg.solve(scaled, scale * b))

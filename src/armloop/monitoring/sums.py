@@ -1,0 +1,160 @@
+"""Sufficient statistics of a log's residual, block by block: normal equations with the catalogue's columns.
+
+They add over blocks, logs and months: whatever window is asked about later, its least-squares problem is the sum of
+its blocks', and the samples are needed no more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_numbers
+from armloop.errors import LogError
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.monitoring.catalogue import Column, catalogue
+from armloop.motion import Samples
+from armloop.signals import condition, independent_rows, smooth
+
+Array = NDArray[np.float64]
+
+#: Longest block, s.
+BLOCK_SECONDS = 30.0
+#: Fewer sliding samples than this say nothing of a joint.
+FEWEST_ROWS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class LogSums:
+    """What is kept of a log of n joints in B blocks, with p columns.
+
+    Attributes:
+        columns: what the p columns are.
+        start, seconds: (B,) begin of each block on the log's clock, and its length, s.
+        rows: (B, n) samples that count: the joint slides.
+        mean, energy, lagged: (B, n) sums of u, u² and u_i u_(i+1) of the residual u in units of the model's own
+            on its baseline: the whitened residual.
+        torque, speed, load: (B, n) sums of squares of the torque (in the same units), of v, and of the load on the joints.
+        gram: (B, p, p) Σ x xᵀ over the rows of all joints, x in the same units.
+        moment: (B, p) Σ x u.
+        temperature: (B, n) mean, °C; NaN where it is not known.
+        since_start: (B,) mean time since the arm was started, s; NaN where it is not known.
+    """
+
+    columns: tuple[Column, ...]
+    start: Array
+    seconds: Array
+    rows: Array
+    mean: Array
+    energy: Array
+    lagged: Array
+    torque: Array
+    speed: Array
+    load: Array
+    gram: Array
+    moment: Array
+    temperature: Array
+    since_start: Array
+
+    @property
+    def blocks(self) -> int:
+        """The number of blocks B."""
+        return len(self.start)
+
+
+def residual_scale(model: ReconstructedModel, samples: Samples | None = None) -> Array:
+    """(n,) RMSE that the model leaves on held-out data of its own training runs; a hundredth of the torque without it."""
+    n = model.arm.n
+    scale = np.resize([float(x) if x else np.nan for x in model.baseline.get("rmse", [])] or [np.nan], n)
+    rms = np.resize([float(x) if x else np.nan for x in model.baseline.get("rms", [])] or [np.nan], n)
+    if samples is not None:
+        rms = np.where(np.isfinite(rms), rms, np.sqrt(np.mean(samples.tau**2, axis=0)))
+    least = 1e-3 * np.where(np.isfinite(rms), rms, 1.0) + 1e-12
+    return np.where(np.isfinite(scale), np.maximum(scale, least), 10 * least)
+
+
+def log_sums(model: ReconstructedModel, log: MotionLog, extra: Mapping[str, Array] | None = None) -> LogSums:
+    """The sums of one log.
+
+    Args:
+        extra: further columns of the log, (N,) or (N, n) each: ``temperature`` °C, ``since_start`` s.
+
+    Raises:
+        LogError: the log is not of the model's arm, too short for the filter, or no joint slides long enough.
+    """
+    n = model.arm.n
+    if log.joints != n:
+        raise LogError(f"{log.name}: {log.joints} joints; the model's arm {model.arm.name} has {n}")
+    samples = condition([log], model.conditioning)
+    motion = samples.motion
+    # two samples per period of the corner: what lies closer is not told apart by the filter
+    kept = np.flatnonzero(independent_rows(samples))[::2]
+    slides = samples.moving[kept]
+    if not (slides.sum(axis=0) >= FEWEST_ROWS).any():
+        raise LogError(
+            f"{log.name}: no joint slides for {FEWEST_ROWS} samples; a log says something only where joints move"
+        )
+    known = catalogue(model, samples, kept)
+    predicted = known.predicted if not model.effects else model.predict(motion)
+    scale = residual_scale(model, samples)
+    u = (samples.tau - smooth(samples, predicted))[kept] / scale
+    x = known.values / scale[:, None]
+    number = block_numbers(motion, BLOCK_SECONDS)
+    present, block = np.unique(number[kept], return_inverse=True)
+    edges = np.searchsorted(block, np.arange(len(present) + 1))
+    B, p = len(present), x.shape[2]
+    sums = {key: np.zeros((B, n)) for key in ("mean", "energy", "lagged", "torque", "speed", "load", "rows")}
+    gram, moment = np.zeros((B, p, p)), np.zeros((B, p))
+    start, seconds = np.zeros(B), np.zeros(B)
+    for b, (first, last) in enumerate(pairwise(edges.tolist())):
+        here, on = slice(first, last), slides[first:last]
+        count = on.astype(float)
+        ub = u[here] * count
+        sums["rows"][b], sums["mean"][b] = count.sum(axis=0), ub.sum(axis=0)
+        sums["energy"][b], sums["lagged"][b] = (ub**2).sum(axis=0), (ub[1:] * ub[:-1]).sum(axis=0)
+        sums["torque"][b] = ((samples.tau[kept[here]] / scale * count) ** 2).sum(axis=0)
+        sums["speed"][b] = (motion.v[kept[here]] ** 2 * count).sum(axis=0)
+        sums["load"][b] = (known.load[here] ** 2 * count).sum(axis=0)
+        for j in range(n):
+            X = x[here, j][on[:, j]]
+            used = np.flatnonzero(X.any(axis=0))
+            gram[b][np.ix_(used, used)] += X[:, used].T @ X[:, used]
+            moment[b, used] += X[:, used].T @ ub[on[:, j], j]
+        times = motion.time[number == present[b]]
+        start[b], seconds[b] = times[0], times[-1] - times[0]
+    temperature, since = _known(log, motion.time[kept], edges, dict(extra or {}), n)
+    return LogSums(
+        columns=known.columns,
+        start=start,
+        seconds=seconds,
+        gram=gram,
+        moment=moment,
+        temperature=temperature,
+        since_start=since,
+        **sums,
+    )
+
+
+def _known(
+    log: MotionLog, time: Array, edges: NDArray[np.intp], extra: dict[str, Array], n: int
+) -> tuple[Array, Array]:
+    """Block means of temperature (B, n) and of the time since start (B,); NaN where they were not recorded."""
+    B = len(edges) - 1
+    temperature, since = np.full((B, n), np.nan), np.full(B, np.nan)
+    for name in ("temperature", "since_start"):
+        if name not in extra:
+            continue
+        values = extra[name].reshape(len(log.time), -1)
+        near = np.clip(np.searchsorted(log.time, time), 0, len(log.time) - 1)
+        for b, (first, last) in enumerate(pairwise(edges.tolist())):
+            mean = values[near[first:last]].mean(axis=0)
+            if name == "temperature":
+                temperature[b] = np.resize(mean, n)
+            else:
+                since[b] = mean[0]
+    return temperature, since

@@ -1,0 +1,104 @@
+"""Evidence of a fleet at a glance, and one arm's scores over time with its alarms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
+
+Array = NDArray[np.float64]
+
+#: More arms than this are not legible on one page: those with the most evidence are shown.
+MOST_ARMS = 60
+_INCHES_PER_LETTER = 0.085
+
+
+def heat_figure(
+    arms: Sequence[str], places: Sequence[str], evidence: Array, limit: Array, alarmed: Array
+) -> Figure:
+    """Arms × effects, coloured by the evidence as a part of the threshold.
+
+    Args:
+        evidence: (A, E) natural logarithm; NaN where there is none.
+        limit: (A,) threshold of each arm; alarmed: (A, E) true where an alarm was traced to the effect.
+    """
+    left = 0.4 + _INCHES_PER_LETTER * max([len(name) for name in arms], default=0)
+    bottom = 0.4 + 0.066 * max([len(name) for name in places], default=0)
+    made = figure(max(6.0, left + 0.9 + 0.26 * len(places)), 0.5 + bottom + 0.26 * max(1, len(arms)))
+    width, height = made.get_size_inches()
+    axes = made.add_axes(
+        (left / width, bottom / height, 1 - (left + 0.9) / width, 1 - (bottom + 0.4) / height)
+    )
+    part = np.clip(np.nan_to_num(evidence, nan=0.0) / limit[:, None], 0.0, 1.0)
+    image = axes.imshow(part, cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest")
+    for a, e in np.argwhere(alarmed):
+        axes.plot(e, a, "o", color=INK, markersize=5)
+    polish(axes, grid="both")
+    axes.grid(False)
+    axes.set_yticks(range(len(arms)), list(arms))
+    axes.set_xticks(range(len(places)), list(places), rotation=90)
+    axes.tick_params(labelsize=8.5, labelcolor=INK)
+    bar = made.colorbar(
+        image,
+        cax=made.add_axes((1 - 0.7 / width, bottom / height, 0.14 / width, 1 - (bottom + 0.4) / height)),
+    )
+    bar.set_ticks([0.0, 0.5, 1.0], labels=["0", "half", "alarm"])
+    bar.ax.tick_params(labelsize=8.5, labelcolor=MUTED, length=0)
+    bar.outline.set_visible(False)
+    return made
+
+
+def trend_figure(
+    when: Array,
+    shown: Sequence[tuple[str, Array, Array]],
+    limit: float,
+    alarms: Sequence[dict[str, Any]],
+) -> Figure:
+    """Scores of some streams over time with the healthy band, and below each the evidence up to the threshold.
+
+    Args:
+        when: (U,) s since 1970.
+        shown: (name, scores (U,), log evidence (U,)) per stream.
+        alarms: with ``since`` and ``when``.
+    """
+    made = figure(10.0, 0.9 + 2.7 * len(shown))
+    axes = panels(made, 2 * len(shown), 1, left=1.0, sharex=True, height_ratios=[2, 1] * len(shown))[:, 0]
+    days = [datetime.fromtimestamp(t, UTC) for t in when]
+    first = min((alarm["since"] for alarm in alarms), default=np.inf)
+    healthy = when < first
+    for k, (name, values, evidence) in enumerate(shown):
+        top, under = axes[2 * k], axes[2 * k + 1]
+        known = values[healthy & np.isfinite(values)]
+        if len(known) >= 3:
+            low, high = np.quantile(known, [0.05, 0.95])
+            top.axhspan(low, high, color=BLUE, alpha=0.14, lw=0, label="nine in ten healthy logs")
+        top.plot(days, values, ".", color=BLUE, markersize=5, label="one log")
+        under.fill_between(
+            days, 0.0, np.maximum(np.nan_to_num(evidence, neginf=0.0), 0.0), color=GREY, alpha=0.6, lw=0
+        )
+        under.axhline(limit, color=ORANGE, lw=1.2, label="threshold")
+        for alarm in alarms:
+            for panel in (top, under):
+                panel.axvline(
+                    datetime.fromtimestamp(alarm["since"], UTC),
+                    color=GREEN,
+                    lw=1.2,
+                    ls="--",
+                    label="change began",
+                )
+                panel.axvline(datetime.fromtimestamp(alarm["when"], UTC), color=ORANGE, lw=1.4, label="alarm")
+        polish(top, "", "score", name)
+        polish(under, "", "log evidence", "")
+        under.set_ylim(0, 1.25 * limit)
+    locator = AutoDateLocator()
+    axes[-1].xaxis.set_major_locator(locator)
+    axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    legend(made, 5)
+    return made

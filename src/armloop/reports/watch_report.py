@@ -1,0 +1,200 @@
+"""One page on a watched fleet: evidence at a glance, one arm's trends, what is behind each alarm, what was set aside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.reports.html import Card, Picture, Report, Section, render
+from armloop.reports.plots.watch import MOST_ARMS, heat_figure, trend_figure
+from armloop.reports.tables import make_table
+from armloop.reports.watch_tables import (
+    alarm_words,
+    alarms_table,
+    aside_table,
+    course_words,
+    delay_words,
+    moment,
+    named,
+    place,
+)
+from armloop.reports.words import counted, number
+from armloop.watch import Options, Outcome
+from armloop.watch.fleet import find_models, model_and_digest, model_for
+from armloop.watch.store import Store
+from armloop.watch.verdicts import Tested, examine
+
+_HEAT = (
+    "Each row is an arm, each column an effect. Colour: the most evidence there ever was for it, as a part of what raises "
+    "an alarm (logarithmic scale). Dots: effects that an alarm was traced to. An effect shows itself in related columns, "
+    "too; the alarm's own section says which of them explains the others."
+)
+_TREND = (
+    "Each dot is the coefficient that the effect alone would be given by one log (or the logarithm of the residual's "
+    "mean square). The band holds nine in ten of the logs before the first change. Below: the evidence for a change."
+)
+_SHOWN, _STREAMS = 4, 60
+
+
+def watch_report(
+    outcome: Outcome, models: str | Path, store: str | Path, arm: str | None, how: Options
+) -> str:
+    """The page of what a call came to.
+
+    Args:
+        arm: whose trends are shown; None takes that of the newest alarm, else the one with the most evidence.
+
+    Raises:
+        InputError: models or store cannot be read.
+    """
+    sections = [_overview(outcome)]
+    if outcome.arms:
+        sections.insert(0, _heat(outcome))
+        one = _chosen(outcome, arm)
+        path = model_for(find_models(models), one["arm"])
+        if path is not None:
+            history = Store(store).history(one["arm"], one["model"])
+            if model_and_digest(path)[1] == one["model"]:
+                sections.append(_trends(outcome, one["arm"], examine(history, how.hours, how.healthy)))
+    sections += [_alarm(alarm, alarm["id"] in outcome.new) for alarm in reversed(outcome.alarms)]
+    if outcome.aside:
+        sections.append(
+            Section(
+                "What was set aside",
+                [f"{counted(len(outcome.aside), 'log')} could not be used."],
+                [],
+                [aside_table(outcome.aside)],
+            )
+        )
+    return render(
+        Report(
+            "Arms under watch",
+            f"A mean time of at least {outcome.hours:g} h of operation between false alarms of one whole arm, all joints "
+            "and effects together, as long as its healthy logs of one programme are interchangeable.",
+            sections,
+            _cards(outcome),
+        )
+    )
+
+
+def _cards(outcome: Outcome) -> list[Card]:
+    hours = sum(arm["hours"] for arm in outcome.arms)
+    return [
+        Card(str(len(outcome.arms)), "arms", f"{number(hours)} h of operation"),
+        Card(
+            str(len(outcome.new)),
+            "new alarms",
+            f"{len(outcome.alarms)} in all",
+            "bad" if outcome.new else "good",
+        ),
+        Card(str(outcome.counts.read), "new logs", f"{outcome.counts.known} known before"),
+        Card(str(len(outcome.aside)), "set aside", "broken, or of an unknown arm"),
+    ]
+
+
+def _heat(outcome: Outcome) -> Section:
+    def most(arm: dict[str, Any]) -> float:
+        return max((item["log_evidence"] or 0.0 for item in arm["evidence"]), default=0.0) / arm["limit"]
+
+    arms = sorted(outcome.arms, key=most, reverse=True)[:MOST_ARMS]
+    strength: dict[str, float] = {}
+    for arm in arms:
+        for item in arm["evidence"]:
+            name = place(item)
+            strength[name] = max(strength.get(name, 0.0), (item["log_evidence"] or 0.0) / arm["limit"])
+    order = list(strength)
+    kept = sorted(sorted(order, key=lambda name: -strength[name])[:_STREAMS], key=order.index)
+    evidence = np.full((len(arms), len(kept)), np.nan)
+    alarmed = np.zeros(evidence.shape, dtype=bool)
+    found = {(alarm["arm"], place(item)) for alarm in outcome.alarms for item in alarm["effects"]}
+    for a, arm in enumerate(arms):
+        for item in arm["evidence"]:
+            name = place(item)
+            if name in kept and item["log_evidence"] is not None:
+                evidence[a, kept.index(name)] = item["log_evidence"]
+        alarmed[a] = [(arm["arm"], name) in found for name in kept]
+    limit = np.array([arm["limit"] for arm in arms])
+    picture = Picture(heat_figure([arm["arm"] for arm in arms], kept, evidence, limit, alarmed), _HEAT)
+    notes = [f"{arm['arm']}: {note}" for arm in outcome.arms for note in arm["notes"]]
+    if len(outcome.arms) > len(arms):
+        notes.append(f"The {len(arms)} arms with the most evidence, of {len(outcome.arms)}.")
+    return Section("Evidence", [], [picture], [], [], notes)
+
+
+def _overview(outcome: Outcome) -> Section:
+    if not outcome.alarms:
+        return Section("Alarms", ["No arm has changed."])
+    return Section("Alarms", [], [], [alarms_table(list(reversed(outcome.alarms)))])
+
+
+def _chosen(outcome: Outcome, arm: str | None) -> dict[str, Any]:
+    by_name = {item["arm"]: item for item in outcome.arms}
+    if arm in by_name:
+        return by_name[arm]
+    alarms = [alarm for alarm in outcome.alarms if alarm["arm"] in by_name]
+    if alarms:
+        return by_name[max(alarms, key=lambda alarm: float(alarm["when"]))["arm"]]
+    return max(
+        outcome.arms, key=lambda item: max((e["log_evidence"] or 0.0 for e in item["evidence"]), default=0.0)
+    )
+
+
+def _trends(outcome: Outcome, arm: str, tested: Tested) -> Section:
+    alarms = [alarm for alarm in outcome.alarms if alarm["arm"] == arm]
+    wanted = {place(item) for alarm in alarms for item in alarm["effects"]}
+    most = tested.watched.evidence.max(axis=0)
+    order = sorted(range(len(most)), key=lambda s: (place(_item(tested, s)) not in wanted, -most[s]))
+    chosen: list[int] = []
+    for s in order:
+        if (
+            place(_item(tested, s)) not in {place(_item(tested, c)) for c in chosen}
+            and np.isfinite(tested.adjusted.values[:, s]).any()
+        ):
+            chosen.append(s)
+        if len(chosen) == _SHOWN:
+            break
+    shown = [
+        (place(_item(tested, s)), tested.adjusted.values[:, s], tested.watched.evidence[:, s]) for s in chosen
+    ]
+    made = trend_figure(tested.history.units.when, shown, tested.watched.limit, alarms)
+    return Section(f"Trends of {arm}", [], [Picture(made, _TREND)], [], [], list(tested.notes))
+
+
+def _item(tested: Tested, s: int) -> dict[str, Any]:
+    stream = tested.listed[s]
+    return {"effect": stream.name, "joint": stream.joint, "other_joint": stream.other_joint}
+
+
+def _alarm(alarm: dict[str, Any], new: bool) -> Section:
+    rows: list[list[object]] = []
+    for effect in alarm["effects"]:
+        for k, (key, e) in enumerate(effect["parameters"].items()):
+            value, error = (np.atleast_1d(e[part]) for part in ("value", "std_error"))
+            text = ", ".join(f"{v:.4g} ± {s:.2g}" for v, s in zip(value, error, strict=True))
+            rows.append(
+                [
+                    place(effect) if k == 0 else "",
+                    key.replace("_", " "),
+                    text,
+                    e["unit"],
+                    effect["share"] if k == 0 else "",
+                ]
+            )
+    tables = (
+        [
+            make_table(
+                ["effect", "parameter", "value ± std. error", "unit", "share"], rows, None, left=(0, 1, 3)
+            )
+        ]
+        if rows
+        else []
+    )
+    paragraphs = [
+        f"{'New. ' if new else ''}Began about {moment(alarm['since'])} (log {alarm['since_log']}), found "
+        f"{moment(alarm['when'])} after {delay_words(alarm)}. {course_words(alarm).capitalize()} of "
+        f"{alarm['course']['of']}. Log evidence {alarm['log_evidence']:.1f}, threshold {alarm['limit']:.1f}.",
+        *alarm_words(alarm),
+    ]
+    return Section(f"{alarm['arm']}: {named(alarm)} ({moment(alarm['when'])})", paragraphs, [], tables)

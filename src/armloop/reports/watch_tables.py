@@ -1,0 +1,127 @@
+"""What a call of watch came to, in words and tables for a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from armloop.reports.tables import Table, make_table
+from armloop.reports.words import counted
+
+if TYPE_CHECKING:
+    from armloop.watch import Outcome
+
+
+def place(item: dict[str, Any]) -> str:
+    """An effect and where it is, such as ``viscous friction, joint 2``."""
+    joints = [str(j) for j in (item.get("joint"), item.get("other_joint")) if j is not None]
+    words = str(item["effect"]).replace("_", " ")
+    return f"{words}, joint {' and '.join(joints)}" if joints else words
+
+
+def moment(when: float) -> str:
+    """A time, UTC, to the minute."""
+    return datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d %H:%M")
+
+
+def course_words(alarm: dict[str, Any]) -> str:
+    """Step or drift, with its size."""
+    how = alarm["course"]
+    words = {"step": "a step", "drift": "a drift", "cannot_tell": "step or drift: cannot tell yet"}[
+        how["form"]
+    ]
+    rate = "" if how["per_day"] is None else f" of {how['per_day']:.3g} per day"
+    return words + rate
+
+
+def delay_words(alarm: dict[str, Any]) -> str:
+    """How long it took."""
+    delay = alarm["delay"]
+    return f"{counted(delay['units'], 'log')}, {60 * delay['operation_hours']:.3g} min of operation"
+
+
+def named(alarm: dict[str, Any]) -> str:
+    """The effect that an alarm was traced to; what showed it where it was traced to none."""
+    if alarm["effects"]:
+        return place(alarm["effects"][0])
+    return f"not named (shown by {place(alarm['shown_by'])})"
+
+
+def alarms_table(alarms: list[dict[str, Any]], title: str | None = None) -> Table:
+    """Alarms with what they were traced to."""
+    rows = [
+        [
+            alarm["arm"],
+            moment(alarm["since"]),
+            moment(alarm["when"]),
+            named(alarm),
+            course_words(alarm),
+            delay_words(alarm),
+        ]
+        for alarm in alarms
+    ]
+    headers = ["arm", "since", "alarm", "what", "how", "found after"]
+    return make_table(headers, rows, title, left=(0, 1, 2, 3, 4, 5))
+
+
+def aside_table(aside: list[dict[str, Any]], title: str | None = None) -> Table:
+    """Logs that were set aside and why."""
+    rows = [[item["arm"] or None, item["reason"]] for item in aside]
+    return make_table(["arm", "why"], rows, title, left=(0, 1))
+
+
+def alarm_words(alarm: dict[str, Any]) -> list[str]:
+    """What one alarm means, in sentences."""
+    lines = [effect["words"] for effect in alarm["effects"]] or [
+        "no single listed effect accounts for it; "
+        + f"{place(alarm['shown_by'])} {alarm['shown_by']['direction']}"
+    ]
+    lines += [
+        f"or {item['effect'].replace('_', ' ')} (joint {item['joint']}): {item['why']}"
+        for item in alarm["alternatives"]
+    ]
+    others = [place(item) for effect in alarm["effects"] for item in effect["alternatives"]]
+    if others:
+        lines.append("as good from these sums: " + "; ".join(others[:4]))
+    if alarm["continues"]:
+        lines.append("the same effect as in this arm's alarm before: it goes on")
+    lines += alarm["notes"]
+    verdict = alarm.get("diagnosis")
+    if verdict is not None:
+        if "verdict" in verdict:
+            found = "; ".join(item.get("words", place(item)) for item in verdict["effects"])
+            words = verdict["verdict"].replace("_", " ") + (f": {found}" if found else "")
+            logs = ", ".join(verdict["logs"])
+            lines.append(f"diagnosis of {logs} by themselves, without the arm's history: {words}")
+        else:
+            lines.append(f"diagnosis: {verdict['reason']}")
+    return lines
+
+
+def watch_words(outcome: Outcome) -> str:
+    """The whole answer for a terminal."""
+    counts = outcome.counts
+    lines = [
+        f"{counted(counts.read, 'new log')} read, {counts.known} known before, {counts.aside} set aside; "
+        f"{counted(len(outcome.arms), 'arm')}, {sum(a['hours'] for a in outcome.arms):.3g} h of operation in the store"
+    ]
+    new = [alarm for alarm in outcome.alarms if alarm["id"] in outcome.new]
+    if new:
+        lines.append("\n" + str(alarms_table(new, "New alarms")))
+        for alarm in new:
+            lines.append(f"\n{alarm['arm']}:")
+            lines += [
+                textwrap.fill(text, 110, initial_indent="  ", subsequent_indent="    ")
+                for text in alarm_words(alarm)
+            ]
+    else:
+        lines.append("no new alarm")
+    if outcome.aside:
+        lines.append("\n" + str(aside_table(outcome.aside[:10], "Set aside")))
+        if len(outcome.aside) > 10:
+            lines.append(f"… and {len(outcome.aside) - 10} more (STORE/aside)")
+    lines.append(
+        f"\npromise: a mean time of at least {outcome.hours:g} h of operation between false alarms of one whole arm"
+    )
+    return "\n".join(lines)

@@ -1,0 +1,139 @@
+"""Watching: new logs into the store, every arm tested, every alarm explained."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from armloop.progress import Progress, paced, silent
+from armloop.watch.fleet import find_models, model_and_digest, model_for
+from armloop.watch.ingest import Counts, ingest
+from armloop.watch.sources import LogFile
+from armloop.watch.store import Store
+from armloop.watch.verdicts import Task, test_arm
+from armloop.workers import Cluster, Processes, Serial, Workers
+
+SCHEMA = "armloop/watch/1"
+
+
+@dataclass(frozen=True)
+class Options:
+    """How arms are watched.
+
+    Attributes:
+        hours: mean time between false alarms of one whole arm that is promised, h of its operation.
+        healthy: first logs of an arm in which it is known to be healthy.
+        full: whether an alarm's window is diagnosed from its logs, too, where they are still there.
+        scheduler: address of a Dask scheduler, or None.
+        jobs: processes of this machine; 1 does all in this one.
+    """
+
+    hours: float = 1000.0
+    healthy: int = 20
+    full: bool = True
+    scheduler: str | None = None
+    jobs: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a call came to.
+
+    Attributes:
+        counts: of the logs that were given.
+        arms: what the tests of each arm came to (``tested/arm=A.json``).
+        alarms: all alarms in the store, by time.
+        new: identifiers of those that were never told.
+        aside: logs set aside, with their reasons.
+    """
+
+    counts: Counts
+    arms: list[dict[str, Any]]
+    alarms: list[dict[str, Any]]
+    new: list[str]
+    aside: list[dict[str, Any]]
+    hours: float
+    notes: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of ``--json``."""
+        return {
+            "schema": SCHEMA,
+            "logs": {"read": self.counts.read, "known": self.counts.known, "set_aside": self.counts.aside},
+            "arms": [
+                {
+                    key: arm[key]
+                    for key in ("arm", "logs", "units", "hours", "limit", "warmth", "alarms", "notes")
+                }
+                for arm in self.arms
+            ],
+            "operation_hours": sum(arm["hours"] for arm in self.arms),
+            "promise": {
+                "false_alarm_hours": self.hours,
+                "of": "one whole arm, all joints and effects together",
+            },
+            "new": [alarm for alarm in self.alarms if alarm["id"] in self.new],
+            "alarms": [alarm["id"] for alarm in self.alarms],
+            "set_aside": self.aside,
+        }
+
+
+def watch(
+    models: str | Path,
+    files: Sequence[LogFile],
+    store: str | Path,
+    options: Options | None = None,
+    progress: Progress = silent,
+) -> Outcome:
+    """Bring logs into the store, test every arm that has new ones, and say what changed.
+
+    The caller tells the new alarms and then calls :meth:`armloop.watch.store.Store.announce`: a call that is killed
+    before that tells them again.
+
+    Raises:
+        InputError: models or store cannot be used, or no scheduler answers.
+    """
+    options = options or Options()
+    known, folder = find_models(models), Store(store)
+    with _workers(options) as workers, folder.locked(options.scheduler is not None):
+        counts, places = ingest(folder, known, files, workers, progress)
+        stored = {log for log, _ in folder.known()}
+        places = {log: path.resolve() for log, path in places.items() if log in stored}
+        tasks = []
+        for arm in folder.arms():
+            path = model_for(known, arm)
+            if path is None:
+                continue
+            digest = model_and_digest(path)[1]
+            own = {file.stem.partition("-")[0] for file in folder.files(arm, digest)}
+            if own:
+                mine = {log: place for log, place in places.items() if log in own}
+                tasks.append(
+                    Task(folder.folder, arm, path, options.hours, options.healthy, mine, options.full)
+                )
+        tell, arms = paced(progress), []
+        for answer in workers.map(test_arm, tasks) if tasks else ():
+            arms.append(answer)
+            tell(f"tested {len(arms)} of {len(tasks)} arms")
+        alarms = folder.alarms()
+        told = folder.announced()
+        new = [alarm["id"] for alarm in alarms if alarm["id"] not in told]
+        return Outcome(counts, arms, alarms, new, folder.aside(), options.hours)
+
+
+@contextlib.contextmanager
+def _workers(options: Options) -> Iterator[Workers]:
+    workers: Workers
+    if options.scheduler is not None:
+        workers = Cluster(options.scheduler)
+    elif options.jobs != 1:
+        workers = Processes(options.jobs)
+    else:
+        workers = Serial()
+    try:
+        yield workers
+    finally:
+        workers.close()

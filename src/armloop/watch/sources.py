@@ -1,0 +1,192 @@
+"""Logs as they come: which arm and programme each belongs to, when it was recorded, and what else it tells."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.errors import InputError, LogError
+from armloop.log import MotionLog, read_log
+from armloop.model import ReconstructedModel
+from armloop.tables import CSV, PARQUET, read_columns, read_header
+
+Array = NDArray[np.float64]
+
+_DATE = re.compile(
+    r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T _-]?([0-2]\d)[-_.:hH]?([0-5]\d)(?:[-_.:mM]?([0-5]\d))?)?(?!\d)"
+)
+#: A clock that shows more than this counts seconds since 1970 (2001-09-09), not since the log began.
+_EPOCH = 1e9
+_TEMPERATURES = re.compile(r"temperature(\d{0,3})")
+_SINCE = ("since_start", "time_since_start")
+
+
+@dataclass(frozen=True)
+class LogFile:
+    """A log that is to be watched.
+
+    Attributes:
+        path: of the CSV or Parquet file.
+        arm: the arm it is of, by its folder; empty if only a column can tell.
+        programme: the programme that the arm ran, by the folders below the arm's; may be empty.
+    """
+
+    path: Path
+    arm: str
+    programme: str
+
+    def digest(self) -> str:
+        """32 hexadecimal digits of the SHA-256 of the content.
+
+        Raises:
+            LogError: it cannot be read.
+        """
+        try:
+            with self.path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()[:32]
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be read ({error.strerror or error})") from error
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a log file holds: the motion, further columns, and when it began (s since 1970)."""
+
+    log: MotionLog
+    extra: dict[str, Array]
+    when: float
+
+
+def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
+    """The logs in folders, DIR/ARM/[PROGRAMME/]FILE, and single files, whose arm is their folder; sorted by path.
+
+    Raises:
+        InputError: a place does not exist.
+    """
+    found: dict[Path, LogFile] = {}
+    for place in map(Path, places):
+        if place.is_dir():
+            for path in sorted(place.rglob("*")):
+                if path.suffix in (CSV, PARQUET) and path.is_file() and not path.name.startswith("."):
+                    inside = path.relative_to(place).parts[:-1]
+                    found[path] = LogFile(path, inside[0] if inside else "", _programme(inside[1:]))
+        elif place.is_file():
+            found[place] = LogFile(place, place.resolve().parent.name, "")
+        else:
+            raise InputError(
+                f"{place}: no such file or folder; --logs takes DIR/ARM/*.csv, files, or - for a list"
+            )
+    return [found[path] for path in sorted(found)]
+
+
+def _programme(folders: Sequence[str]) -> str:
+    """The folders below the arm's, those that are dates left out."""
+    return "/".join(name for name in folders if not _DATE.fullmatch(name))
+
+
+def arm_in(path: Path) -> tuple[str, str]:
+    """Arm and programme by the columns ``arm`` and ``programme``, empty where there are none.
+
+    Raises:
+        LogError: the file cannot be read, or is of more than one arm or programme.
+    """
+    header = read_header(path)
+    answer = []
+    for name in ("arm", "programme"):
+        values = _words(path, name) if name in header else []
+        if len(values) > 1:
+            raise LogError(
+                f"{path}: column {name} holds {values[0]!r} and {values[1]!r}; a log is of one {name}"
+            )
+        answer.append(values[0] if values else "")
+    return answer[0], answer[1]
+
+
+def _words(path: Path, name: str) -> list[str]:
+    import pyarrow
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    try:
+        if path.suffix == PARQUET:
+            column = pyarrow.parquet.read_table(path, columns=[name])[name]
+        else:
+            convert = pyarrow.csv.ConvertOptions(
+                include_columns=[name], column_types={name: pyarrow.string()}
+            )
+            column = pyarrow.csv.read_csv(path, convert_options=convert)[name]
+    except pyarrow.ArrowException as error:
+        raise LogError(f"{path}: column {name} cannot be read ({error})") from error
+    return [str(value) for value in column.unique().to_pylist()[:2]]
+
+
+def read_recording(file: LogFile, model: ReconstructedModel) -> Recording:
+    """Read a log as the model's training logs were recorded, with temperature and time since start where it has them.
+
+    Raises:
+        LogError: it is not a log of the model's arm.
+    """
+    recorded = model.recorded
+    log = read_log(
+        file.path, joints=model.arm.n, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"]
+    )
+    return Recording(log, _extra(file.path, model.arm.n), recorded_at(file.path, float(log.time[0])))
+
+
+def _extra(path: Path, n: int) -> dict[str, Array]:
+    header = read_header(path)
+    extra: dict[str, Array] = {}
+    numbered = [f"temperature{j}" for j in range(1, n + 1)]
+    named = [name for name in header if _TEMPERATURES.fullmatch(name)]
+    if set(numbered) <= set(header):
+        table = read_columns(path, numbered)
+        extra["temperature"] = np.column_stack([table[name] for name in numbered])
+    elif "temperature" in header:
+        extra["temperature"] = read_columns(path, ["temperature"])["temperature"]
+    elif named:
+        raise LogError(
+            f"{path}: {', '.join(named)} stand alone; give temperature, or one column for each joint"
+        )
+    for name in _SINCE:
+        if name in header:
+            extra["since_start"] = read_columns(path, [name])[name]
+            break
+    return extra
+
+
+def recorded_at(path: Path, first: float) -> float:
+    """When a log began, s since 1970: by its clock, else by a date in its name or its folders', else by the file's own.
+
+    Args:
+        first: the log's first time, s.
+    """
+    if first > _EPOCH:
+        return first
+    for name in (path.name, *(parent.name for parent in path.parents)):
+        for match in _DATE.finditer(name):
+            parts = [int(part) if part else 0 for part in match.groups()]
+            try:
+                year, month, day, hour, minute, second = parts
+                return datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
+            except ValueError:
+                continue
+    return float(int(path.stat().st_mtime))
+
+
+def day_of(when: float) -> str:
+    """The day, UTC, as 2026-11-22."""
+    return datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d")
+
+
+def lines(stream: Iterator[str]) -> Iterator[str]:
+    """The paths that come line by line, blank ones left out."""
+    for line in stream:
+        if line.strip():
+            yield line.strip()

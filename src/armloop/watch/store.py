@@ -1,0 +1,318 @@
+"""The store: a Parquet dataset partitioned by arm and day, one file per log, named by content and renamed into place.
+
+    STORE/store.json                         what this folder is
+    STORE/sums/arm=A/day=D/LOG-MODEL.parquet  sums of one log against one model, one row per block
+    STORE/aside/LOG-MODEL.json               a log that could not be used, and why
+    STORE/tested/arm=A.json                  what the tests have come to
+    STORE/alarms/arm=A/ID.json               what was found
+    STORE/announced.json                     which of these have been told
+
+LOG and MODEL are digests of the contents. Every file is written beside its place and renamed (atomic write), and its
+bytes depend on what went in alone: a call that was killed at any moment is made good by the next one, to the byte.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import secrets
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.errors import InputError
+from armloop.monitoring.catalogue import Column
+from armloop.monitoring.naming import Normal
+from armloop.monitoring.sums import LogSums
+from armloop.monitoring.units import Units, unit_edges
+
+Array = NDArray[np.float64]
+
+SCHEMA = "armloop/watch/1"
+_PER_JOINT = ("rows", "mean", "energy", "lagged", "torque", "speed", "load", "temperature")
+_PER_BLOCK = ("start", "seconds", "since_start")
+#: A draft older than this belongs to nobody, s.
+_STALE = 900.0
+
+
+class Store:
+    """The folder of a store.
+
+    Raises:
+        InputError: the folder is something else, or another process is at work in it.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        mark = self.folder / "store.json"
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"{self.folder}: is a file; --store must name a folder")
+        if mark.exists():
+            found = _read_json(mark).get("schema")
+            if found != SCHEMA:
+                raise InputError(f"{mark}: schema is {found!r}, it must be {SCHEMA!r}")
+        elif self.folder.exists() and any(
+            p.name != ".lock" and not p.name.endswith(".part") for p in self.folder.iterdir()
+        ):
+            raise InputError(
+                f"{self.folder}: is neither empty nor a store of armloop watch; name another folder"
+            )
+        else:
+            _write(mark, json.dumps({"schema": SCHEMA}) + "\n")
+
+    @contextmanager
+    def locked(self, shared_drafts: bool = False) -> Iterator[None]:
+        """Hold the store for one coordinator; the lock goes with the process, however it ends.
+
+        Args:
+            shared_drafts: workers of a cluster may still be writing: leave their recent drafts alone.
+        """
+        with (self.folder / ".lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise InputError(
+                    f"{self.folder}: another armloop watch is at work here; wait for it to end"
+                ) from error
+            limit = time.time() - (_STALE if shared_drafts else 0.0)
+            for draft in self.folder.rglob(".*.part"):
+                if draft.stat().st_mtime <= limit:
+                    draft.unlink(missing_ok=True)
+            yield
+
+    # -- logs -------------------------------------------------------------------------------------------------------
+
+    def known(self) -> set[tuple[str, str]]:
+        """(log, model) digests of all logs that are stored."""
+        return {_digests(path) for path in self.folder.glob("sums/*/*/*.parquet")}
+
+    def known_aside(self) -> set[tuple[str, str]]:
+        """(log, model) digests of all logs that are set aside."""
+        return {_digests(path) for path in self.folder.glob("aside/*.json")}
+
+    def add(self, arm: str, day: str, log: str, model: str, sums: LogSums, about: dict[str, Any]) -> None:
+        """Append the sums of one log.
+
+        Args:
+            log, model: digests.
+            about: ``name`` of the log, ``programme``, and ``when`` it began, s since 1970.
+        """
+        import pyarrow
+        import pyarrow.parquet
+
+        p = len(sums.columns)
+        upper = np.triu_indices(p)
+        table: dict[str, Any] = {name: pyarrow.array(getattr(sums, name)) for name in _PER_BLOCK}
+        for name in _PER_JOINT:
+            table[name] = _lists(getattr(sums, name))
+        table["moment"] = _lists(sums.moment)
+        table["size"] = _lists(np.einsum("bpp->bp", sums.gram))
+        table["gram"] = _lists(sums.gram[:, upper[0], upper[1]])
+        about = {**about, "columns": [column.key for column in sums.columns]}
+        written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
+        path = self.folder / "sums" / _partition(arm) / f"day={day}" / f"{log}-{model}.parquet"
+        with _placing(path) as draft:
+            pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
+        for aside in self.folder.glob(f"aside/{log}-*.json"):
+            aside.unlink(missing_ok=True)
+
+    def set_aside(self, log: str, model: str, about: dict[str, Any]) -> None:
+        """Remember why a log was not used."""
+        _write(self.folder / "aside" / f"{log}-{model}.json", json.dumps(about, sort_keys=True) + "\n")
+
+    def aside(self) -> list[dict[str, Any]]:
+        """What was set aside, in the order of the names."""
+        found = [_read_json(path) for path in sorted(self.folder.glob("aside/*.json"))]
+        return sorted(found, key=lambda item: (item["arm"], item["log"]))
+
+    # -- arms -------------------------------------------------------------------------------------------------------
+
+    def arms(self) -> list[str]:
+        """The arms that have logs, sorted."""
+        return sorted(unquote(path.name.removeprefix("arm=")) for path in self.folder.glob("sums/arm=*"))
+
+    def history(self, arm: str, model: str) -> History:
+        """All that is stored of an arm against one model."""
+        return History.read(self.files(arm, model))
+
+    def files(self, arm: str, model: str) -> list[Path]:
+        """The files of an arm's logs against one model."""
+        return sorted((self.folder / "sums" / _partition(arm)).glob(f"day=*/*-{model}.parquet"))
+
+    def tested(self, arm: str) -> dict[str, Any] | None:
+        """What the tests of an arm came to when they were last made."""
+        path = self.folder / "tested" / f"{_partition(arm)}.json"
+        return _read_json(path) if path.exists() else None
+
+    def set_tested(self, arm: str, answer: dict[str, Any]) -> None:
+        """Keep what the tests of an arm came to."""
+        path = self.folder / "tested" / f"{_partition(arm)}.json"
+        _write(path, json.dumps(answer, sort_keys=True) + "\n")
+
+    def alarm(self, arm: str, name: str) -> dict[str, Any] | None:
+        """An alarm by its identifier."""
+        path = self.folder / "alarms" / _partition(arm) / f"{name}.json"
+        return _read_json(path) if path.exists() else None
+
+    def add_alarm(self, arm: str, name: str, alarm: dict[str, Any]) -> None:
+        """Keep an alarm."""
+        path = self.folder / "alarms" / _partition(arm) / f"{name}.json"
+        _write(path, json.dumps(alarm, sort_keys=True) + "\n")
+
+    def alarms(self) -> list[dict[str, Any]]:
+        """All alarms, by time and arm."""
+        found = [_read_json(path) for path in self.folder.glob("alarms/*/*.json")]
+        return sorted(found, key=lambda alarm: (alarm["when"], alarm["arm"], alarm["id"]))
+
+    def announced(self) -> set[str]:
+        """Identifiers of the alarms that were told."""
+        path = self.folder / "announced.json"
+        return set(_read_json(path)["alarms"]) if path.exists() else set()
+
+    def announce(self, names: Sequence[str]) -> None:
+        """Remember that alarms were told, after they were: a call killed before tells them again."""
+        every = sorted(self.announced() | set(names))
+        _write(self.folder / "announced.json", json.dumps({"alarms": every}) + "\n")
+
+
+class History:
+    """The logs of one arm against one model, in the order in which they were recorded.
+
+    Attributes:
+        files: of the store.
+        logs: digests; names, programmes: per log.
+        units: their sums without the normal equations' off-diagonal entries.
+    """
+
+    def __init__(
+        self, files: list[Path], about: list[dict[str, Any]], units: Units, pieces: list[tuple[int, slice]]
+    ) -> None:
+        self.files, self.units, self._pieces = files, units, pieces
+        self.logs = [_digests(path)[0] for path in files]
+        self.names = [item["name"] for item in about]
+        self.programmes = [item["programme"] for item in about]
+
+    @staticmethod
+    def read(files: Sequence[Path]) -> History:
+        """Read what the tests need of these files (at least one)."""
+        import pyarrow.parquet
+
+        names = [*_PER_BLOCK, *_PER_JOINT, "moment", "size"]
+        tables = []
+        for path in files:
+            table = pyarrow.parquet.read_table(path, columns=names, use_threads=False, partitioning=None)
+            tables.append((json.loads(table.schema.metadata[b"armloop"]), table, path))
+        tables.sort(key=lambda item: (item[0]["when"], item[0]["name"], item[2].name))
+        about = [item[0] for item in tables]
+        number = {name: k for k, name in enumerate(sorted({item["programme"] for item in about}))}
+        rows: dict[str, list[Any]] = {}
+        pieces: list[tuple[int, slice]] = []
+        for index, (item, table, _) in enumerate(tables):
+            seconds = table["seconds"].to_numpy()
+            start = table["start"].to_numpy()
+            values = {name: _matrix(table[name]) for name in (*_PER_JOINT, "moment", "size")}
+            since = table["since_start"].to_numpy()
+            for piece in unit_edges(seconds):
+                pieces.append((index, piece))
+                unit = {
+                    "when": item["when"] + float(start[piece][0] - start[0]),
+                    "seconds": float(seconds[piece].sum()),
+                    "programme": number[item["programme"]],
+                    "log": index,
+                    "temperature": values["temperature"][piece].mean(axis=0),
+                    "since_start": float(since[piece].mean()),
+                }
+                for name in ("moment", "size", "rows", "energy", "torque"):
+                    unit[name] = values[name][piece].sum(axis=0)
+                for name, value in unit.items():
+                    rows.setdefault(name, []).append(value)
+        columns = tuple(Column.of(key) for key in about[0]["columns"])
+        integers = {"programme", "log"}
+        arrays = {
+            name: np.array(value, dtype=np.intp if name in integers else float)
+            for name, value in rows.items()
+        }
+        return History([item[2] for item in tables], about, Units(columns=columns, **arrays), pieces)
+
+    def normal(self, index: Sequence[int]) -> Normal:
+        """The normal equations of some units, read from their files."""
+        import pyarrow.parquet
+
+        p = len(self.units.columns)
+        upper = np.triu_indices(p)
+        gram = np.zeros((len(index), p, p))
+        for k, unit in enumerate(index):
+            log, piece = self._pieces[unit]
+            table = pyarrow.parquet.read_table(
+                self.files[log], columns=["gram"], use_threads=False, partitioning=None
+            )
+            packed = _matrix(table["gram"])[piece].sum(axis=0)
+            gram[k][upper] = packed
+            gram[k].T[upper] = packed
+        units = np.asarray(index, dtype=np.intp)
+        return Normal(gram, self.units.moment[units], self.units.energy[units].sum(axis=1))
+
+
+@contextmanager
+def _placing(path: Path) -> Iterator[Path]:
+    """A draft that takes its place when the block ends well.
+
+    All below a store is the store's own, and its bytes must not depend on the order of writing: the marks and records
+    by which :mod:`armloop.outputs` knows a command's outputs have no place here.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    try:
+        yield draft
+        os.replace(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _write(path: Path, text: str) -> None:
+    with _placing(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def _partition(arm: str) -> str:
+    return f"arm={quote(arm, safe=' ')}"
+
+
+def _digests(path: Path) -> tuple[str, str]:
+    log, _, model = path.stem.partition("-")
+    return log, model
+
+
+def _lists(values: Array) -> Any:
+    import pyarrow
+
+    flat = pyarrow.array(np.ascontiguousarray(values, dtype=float).ravel())
+    return pyarrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
+
+
+def _matrix(column: Any) -> Array:
+    whole = column.combine_chunks()
+    width = whole.type.list_size
+    return np.asarray(whole.flatten().to_numpy(zero_copy_only=False), dtype=float).reshape(-1, width)
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); move it away, and it is made anew") from error
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: holds no JSON object; move it away, and it is made anew")
+    return value
+
+
+def size_on_disk(folder: Path) -> int:
+    """Bytes of all files below a folder."""
+    return sum(os.stat(path).st_size for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,287 @@
+"""Every export, read back by its consumer, gives the model's torques as far as the target can say them."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exact_parts import energies, model_of, rigid_body, scara_terms
+
+from armloop.arm import Arm, load_arm
+from armloop.cli import main
+from armloop.components import RigidBody
+from armloop.effects import Estimate, effect
+from armloop.errors import ModelError
+from armloop.export import export
+from armloop.export.c_code import c_source
+from armloop.export.consistent import consistent_inertia, pseudo_inertia
+from armloop.export.reading_c import CompiledTorque, compiler
+from armloop.export.said import said
+from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.friction import FrictionTerm
+from armloop.library.rigid_body import BaseParameters
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.motion import Motion
+
+PLAIN = (FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0))
+RICH = (
+    FrictionTerm("offset", 0.2),
+    FrictionTerm("sign", 0.3),
+    FrictionTerm("smooth_sign", 0.2, 0.05),
+    FrictionTerm("hysteresis", 0.4, 1e-3),
+    FrictionTerm("hysteresis", 0.2, 1e-2),
+    FrictionTerm("load_sign", 0.03),
+    FrictionTerm("load_hysteresis", 0.02, 3e-3),
+    FrictionTerm("viscous_forward", 1.0),
+    FrictionTerm("viscous_backward", 1.2),
+    FrictionTerm("root", 0.1),
+    FrictionTerm("quadratic", 0.05),
+    FrictionTerm("cubic", 0.02),
+    FrictionTerm("stribeck_peak", 0.3, 0.1),
+    FrictionTerm("stribeck", -0.1, 0.2),
+)
+EFFECTS: tuple = (
+    ("payload", None, {"mass": 0.8, "com": [0.05, 0.01, -0.02], "own_inertia": 1e-3}),
+    ("rotor_inertia", 2, {"inertia": 0.11}),
+    ("joint_spring", 1, {"stiffness": 3.0, "rest": 0.2}),
+    ("viscous_friction", 2, {"coefficient": 0.4}),
+    ("coulomb_friction", 1, {"level": 0.15}),
+)
+SUBTLE: tuple = (
+    ("torque_ripple", 1, {"amplitude": 0.3, "order": 17.0, "phase": 0.4}),
+    ("stribeck_friction", 2, {"static_excess": 0.3, "velocity": 0.2}),
+    ("friction_asymmetry", 1, {"level": 0.1}),
+    ("load_dependent_friction", 2, {"coefficient": 0.05}),
+    ("quadratic_drag", 1, {"coefficient": 0.2}),
+    ("friction_drift", 2, {"level": 0.4, "time_constant": 30.0}),
+    ("presliding_hysteresis", 1, {"level": 0.5, "width": 0.01, "level_change": -0.2}),
+    ("gravity_tilt", None, {"roll": 0.03, "pitch": -0.02}),
+)
+
+
+def coupled(model: ReconstructedModel) -> ReconstructedModel:
+    values = {"inertia": 0.05, "viscous": 0.3, "coulomb": 0.2, "ratio": -1.0}
+    return model.with_effects(
+        [
+            AddedEffect(
+                effect("transmission_coupling", 1, 2), {k: Estimate(x, 0.0, "") for k, x in values.items()}
+            )
+        ]
+    )
+
+
+def six_joints() -> Arm:
+    """A wrist of three axes behind the three-axis arm, with made-up links."""
+    arm = load_arm("three_axis")
+    rng = np.random.default_rng(3)
+    X = np.tile(np.eye(4), (6, 1, 1))
+    X[:3] = arm.X_PF
+    X[3:, :3, 3] = [[0.3, 0, 0], [0.1, 0, 0.02], [0.05, 0.01, 0]]
+    axis = np.vstack([arm.axis, [[1, 0, 0], [0, 1, 0], [1, 0, 0]]])
+    com = np.vstack([arm.com, rng.uniform(-0.05, 0.05, (3, 3))])
+    mass = np.append(arm.mass, [1.0, 0.7, 0.3])
+    own = np.array(
+        [m * (1e-3 * np.eye(3) + c @ c * np.eye(3) - np.outer(c, c)) for m, c in zip(mass, com, strict=True)]
+    )
+    joints = (*arm.joints, *(replace(arm.joints[0], name=f"wrist_{k}") for k in (1, 2, 3)))
+    inertia = np.concatenate([arm.inertia, own[3:]])
+    return replace(arm, name="six", joints=joints, X_PF=X, axis=axis, mass=mass, com=com, inertia=inertia)
+
+
+ARMS = {"three_axis": load_arm("three_axis"), "scara": load_arm("scara"), "six": six_joints()}
+
+
+def disguised(arm: Arm, rotors: bool) -> RigidBody:
+    """The arm's base parameters in links that no bodies have: the smallest numbers with the same torques."""
+    base = BaseParameters.of_arm(arm)
+    links = base.to_full(base.from_full(nominal_parameters(arm)))
+    assert min(np.linalg.eigvalsh(pseudo_inertia(links[10 * i : 10 * i + 10]))[0] for i in range(arm.n)) < 0
+    return RigidBody(np.append(links, np.linspace(0.1, 0.2, arm.n)) if rotors else links, ("m1",), np.ones(1))
+
+
+@pytest.mark.parametrize("rotors", [False, True])
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
+def test_what_a_target_can_say_reads_back(tmp_path, target, name, rotors):
+    if target == "mjcf":
+        pytest.importorskip("mujoco")
+    model = model_of(ARMS[name], disguised(ARMS[name], rotors), friction=PLAIN, effects=EFFECTS)
+    found = export(model, target, tmp_path / "arm")
+    assert found.difference is not None and found.consumer
+    assert (found.difference < 1e-6 * found.rms).all()
+    assert not any("no bodies" in line for line in found.missing)
+    if target == "mjcf":  # says all of it
+        assert found.missing == [] and (found.unsaid < 1e-6 * found.rms).all()
+
+
+def test_inertias_are_those_of_bodies_that_can_exist_and_near_the_prior():
+    for arm in ARMS.values():
+        nominal = nominal_parameters(arm)
+        found = consistent_inertia(arm, disguised(arm, False).parameters, np.zeros(arm.n), nominal)
+        assert found.exact
+        for i in range(arm.n):
+            assert np.linalg.eigvalsh(pseudo_inertia(found.links[10 * i : 10 * i + 10]))[0] > 0
+        # With the nominal links for a prior nothing is left to move but what a margin to the cone asks for.
+        np.testing.assert_allclose(found.links, nominal, atol=0.02 * np.abs(nominal).max())
+
+
+def test_base_parameters_that_no_bodies_have_are_said_and_come_near(tmp_path):
+    arm = ARMS["three_axis"]
+    links = nominal_parameters(arm)
+    links[14:17] -= 0.3 * np.abs(links[14:17]).max()  # the second link's inertia, below nothing
+    found = export(
+        model_of(arm, RigidBody(links, ("m1",), np.ones(1)), friction=PLAIN), "urdf", tmp_path / "a.urdf"
+    )
+    assert any("no bodies with positive masses" in line for line in found.missing)
+    assert (found.difference < 1e-6 * found.rms).all()
+    what = said(model_of(arm, RigidBody(links, ("m1",), np.ones(1)), friction=PLAIN))
+    rng = np.random.default_rng(0)
+    Y = regressor(arm, *rng.normal(size=(3, 200, 3)))
+    wanted = Y @ links
+    assert np.sqrt(np.mean((Y @ what.links - wanted) ** 2)) < 0.5 * np.sqrt(np.mean(wanted**2))
+
+
+@pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
+def test_energies_and_terms_become_the_bodies_they_are(tmp_path, target):
+    if target == "mjcf":
+        pytest.importorskip("mujoco")
+    for model in (
+        model_of(ARMS["three_axis"], energies(ARMS["three_axis"]), friction=PLAIN),
+        model_of(ARMS["scara"], *scara_terms(ARMS["scara"]), friction=PLAIN),
+    ):
+        found = export(model, target, tmp_path / "arm", None)
+        assert (found.difference < 1e-6 * found.rms).all()
+        if target == "mjcf":
+            assert (found.unsaid < 1e-6 * found.rms).all()
+
+
+def test_what_cannot_be_said_is_listed_and_the_nearest_friction_is_written(tmp_path):
+    model = model_of(ARMS["three_axis"], friction=RICH, effects=(*EFFECTS, *SUBTLE))
+    found = export(model, "urdf", tmp_path / "arm.urdf")
+    text = "\n".join(found.missing)
+    for word in (
+        "Stribeck",
+        "memory",
+        "load",
+        "a constant torque",
+        "spring",
+        "tilt",
+        "torque_ripple",
+        "dry friction",
+    ):
+        assert word in text
+    assert (found.difference < 1e-6 * found.rms).all()
+    bare = model_of(ARMS["three_axis"], friction=(), effects=EFFECTS)
+    plain = export(bare, "urdf", tmp_path / "bare.urdf")
+    assert "Stribeck" not in "\n".join(plain.missing)
+
+
+def test_the_drake_program_has_all_of_the_model(tmp_path):
+    model = model_of(ARMS["three_axis"], friction=RICH, effects=(*EFFECTS, *SUBTLE))
+    found = export(model, "drake", tmp_path / "arm")
+    assert (found.difference < 1e-6 * found.rms).all()
+    # Where joints slide, all that is left is how dry friction sets in, and the load's acceleration.
+    assert (found.unsaid < 0.5 * found.rms).all()
+    program = (tmp_path / "arm" / "simulate.py").read_text()
+    lines = [line for line in program.splitlines() if line and not line.startswith(("from", "import", '"""'))]
+    assert len(lines) == 9
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "arm" / "simulate.py")],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd="/",
+    )
+    assert "q after 0.1 s" in done.stdout
+
+
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler (cc, gcc, clang)")
+MODELS = {
+    "body": lambda: model_of(
+        ARMS["six"], disguised(ARMS["six"], True), friction=RICH, effects=(*EFFECTS, *SUBTLE)
+    ),
+    "energies": lambda: model_of(
+        ARMS["three_axis"], energies(ARMS["three_axis"]), friction=RICH, effects=EFFECTS
+    ),
+    "terms": lambda: model_of(ARMS["scara"], *scara_terms(ARMS["scara"]), friction=RICH),
+    "coupled": lambda: coupled(model_of(ARMS["three_axis"], friction=PLAIN)),
+    "frictionless": lambda: model_of(ARMS["scara"], friction=()),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", MODELS)
+def test_the_c_file_is_the_feedforward_to_rounding(tmp_path, kind):
+    model = MODELS[kind]()
+    source, _ = c_source(model)
+    assert "malloc" not in source and source.count("#include") == 1
+    (tmp_path / "arm.c").write_text(source)
+    compiled = CompiledTorque(tmp_path / "arm.c")  # -std=c99 -Wall -Wextra -Werror
+    rng = np.random.default_rng(1)
+    q, v, vdot = rng.uniform(-3, 3, (3, 300, model.arm.n))
+    v[:20] = 0.0  # at rest, too
+    v[20:40, 0] = 0.0
+    expected = np.array([model.feedforward(*row) for row in zip(q, v, vdot, strict=True)])
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(compiled.torque(q, v, vdot) - expected) <= 1e-13 * scale + 1e-13).all()
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", ["body", "energies", "terms"])
+def test_the_c_file_remembers_as_the_model_predicts(tmp_path, kind):
+    model = MODELS[kind]()
+    model = replace(model, effects=tuple(a for a in model.effects if a.effect.name != "friction_drift"))
+    (tmp_path / "arm.c").write_text(c_source(model)[0])
+    time = np.arange(0, 6, 2e-3)
+    n = model.arm.n
+    w, size = np.linspace(0.8, 2.5, n), 0.3 * (1 - np.exp(-(time[:, None] ** 2)))
+    q = size * np.sin(w * time[:, None] ** 1.5)
+    v = np.gradient(q, time, axis=0)
+    v[0] = 0.0
+    vdot = np.gradient(v, time, axis=0)
+    expected = model.predict(Motion(time, q, v, vdot, np.array([0])))
+    found = CompiledTorque(tmp_path / "arm.c").remembered(q, v, vdot)
+    slid = CompiledTorque(tmp_path / "arm.c").torque(q, v, vdot)
+    scale = np.abs(expected).max(axis=0)
+    assert (np.abs(found - expected) <= 1e-11 * scale).all()
+    assert np.abs(slid - expected).max() > 1e-3  # memory matters here
+
+
+def test_the_exported_urdf_is_the_same_arm(tmp_path):
+    for arm in (ARMS["three_axis"], ARMS["scara"]):
+        export(model_of(arm, friction=PLAIN), "urdf", tmp_path / "arm.urdf")
+        again = load_arm(tmp_path / "arm.urdf")
+        assert again.fingerprint() == arm.fingerprint()
+        assert [j.name for j in again.joints] == [j.name for j in arm.joints]
+        np.testing.assert_allclose(again.X_tool, arm.X_tool, atol=1e-12)
+
+
+def test_the_command_prints_and_answers(tmp_path, capsys):
+    model_of(ARMS["three_axis"], friction=RICH).save(tmp_path / "model.json")
+    line = ["export", str(tmp_path / "model.json"), "--to", "sdf", "--out", str(tmp_path / "arm.sdf")]
+    assert main(line) == 0
+    out = capsys.readouterr().out
+    assert "read back by Drake" in out and "cannot say" in out and "Stribeck" in out
+    assert main([*line, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert max(answer["difference"]) < 1e-6 * max(answer["rms"])
+    assert answer["files"] == [str(tmp_path / "arm.sdf")]
+
+
+def test_currents_are_no_torques(tmp_path, capsys):
+    model = replace(model_of(ARMS["three_axis"]), recorded={"unit": "A", "drive_gains": None})
+    with pytest.raises(ModelError, match="currents"):
+        export(model, "urdf", tmp_path / "arm.urdf")
+    assert not (tmp_path / "arm.urdf").exists()
+    export(model, "c", tmp_path / "arm.c")
+    assert "current in A" in (tmp_path / "arm.c").read_text()
+
+
+def test_without_a_consumer_the_file_is_written_and_it_is_said(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    found = export(model_of(ARMS["scara"]), "mjcf", tmp_path / "arm.xml")
+    assert found.difference is None and any("not installed" in note for note in found.notes)
+    assert (tmp_path / "arm.xml").exists()
+    assert rigid_body(ARMS["scara"]).parameters.shape == (40,)

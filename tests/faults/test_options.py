@@ -1,0 +1,91 @@
+"""Options that cannot be: one line before any work, within seconds."""
+
+import re
+from pathlib import Path
+
+import pytest
+from faults.conftest import contents
+
+from armloop.cli import main
+
+RECONSTRUCT = "reconstruct run.csv --arm three_axis --out m.json"
+EXCITE = "excite three_axis --out r.csv"
+DIAGNOSE = "diagnose model.json run.csv --out d"
+WRONG: dict[str, tuple[str, str]] = {
+    "no address": (f"{RECONSTRUCT} --scheduler nonsense", "no Dask scheduler answers"),
+    "half an address": (f"{RECONSTRUCT} --scheduler tcp://", "no Dask scheduler answers"),
+    "no port": (f"{RECONSTRUCT} --scheduler tcp://127.0.0.1", "no Dask scheduler answers"),
+    "a port that is none": (f"{RECONSTRUCT} --scheduler tcp://127.0.0.1:99999", "no Dask scheduler answers"),
+    "nobody at the port": (f"{RECONSTRUCT} --scheduler tcp://127.0.0.1:1", "no Dask scheduler answers"),
+    "another protocol": (f"{RECONSTRUCT} --scheduler http://127.0.0.1:80", "no Dask scheduler answers"),
+    "a name of no host": (f"{RECONSTRUCT} --scheduler {'x' * 300}:80", "no Dask scheduler answers"),
+    "no jobs": (f"{RECONSTRUCT} --jobs 0", "--jobs 0"),
+    "negative jobs": (f"{RECONSTRUCT} --jobs -3", "--jobs -3"),
+    "half a job": (f"{RECONSTRUCT} --jobs 0.5", "--jobs"),
+    "no penalty": (f"{RECONSTRUCT} --penalty 0", "--penalty 0"),
+    "a penalty of nan": (f"{RECONSTRUCT} --penalty nan", "--penalty nan"),
+    "an infinite penalty": (f"{RECONSTRUCT} --penalty inf", "--penalty inf"),
+    "order 0": (f"{RECONSTRUCT} --max-order 0", "--max-order 0"),
+    "order 99": (f"{RECONSTRUCT} --max-order 99", "--max-order 99"),
+    "a negative cutoff": (f"{RECONSTRUCT} --cutoff -1", "--cutoff -1"),
+    "a cutoff of nan": (f"{RECONSTRUCT} --cutoff nan", "--cutoff nan"),
+    "an infinite cutoff": (f"{RECONSTRUCT} --cutoff inf", "--cutoff inf"),
+    "an unknown estimator": (f"{RECONSTRUCT} --estimator magic", "unknown estimator 'magic'"),
+    "an unknown option": (f"{RECONSTRUCT} --magic", "unrecognized arguments: --magic"),
+    "gains for torques": (f"{RECONSTRUCT} --tau-unit N*m --drive-gains 1,1,1", "--drive-gains turn currents"),
+    "gains that are words": (f"{RECONSTRUCT} --drive-gains a,b,c", "--drive-gains 'a,b,c'"),
+    "a gain of zero": (f"{RECONSTRUCT} --drive-gains 0,1,1", "every gain must be a positive"),
+    "a gain of inf": (f"{RECONSTRUCT} --drive-gains inf,1,1", "every gain must be a positive"),
+    "ratios of two": (f"{RECONSTRUCT} --snr 60,40 --cutoff 0", "give three numbers in dB"),
+    "a ratio of nan": (f"{RECONSTRUCT} --snr nan,40,20 --cutoff 0", "ratios in dB must be positive"),
+    "ratios of a time series": (f"{RECONSTRUCT} --snr 60,40,20", "give --cutoff 0 with it"),
+    "a billion references": (f"{EXCITE} --random 1000000000", "random 1000000000"),
+    "two references": (f"{EXCITE} --random 2", "random 2"),
+    "a million starts": (f"{EXCITE} --starts 1000000", "--starts 1000000"),
+    "no rows": (f"{EXCITE} --rate 0", "--rate 0"),
+    "rows without end": (f"{EXCITE} --rate 1e9", "--rate 1e"),
+    "a rate of nan": (f"{EXCITE} --rate nan", "--rate nan"),
+    "a duration without end": (f"{EXCITE} --duration 1e9", "duration 1e"),
+    "a duration of nan": (f"{EXCITE} --duration nan", "duration nan"),
+    "a thousand harmonics": (f"{EXCITE} --harmonics 100000", "harmonics 100000"),
+    "order 9": (f"{EXCITE} --order 9", "order 9"),
+    "a negative frequency": (f"{EXCITE} --base-frequency -1", "base frequency -1"),
+    "all reserved": (f"{EXCITE} --reserve 1", "reserve 1"),
+    "an unknown criterion": (f"{EXCITE} --criterion magic", "magic"),
+    "an unknown library": (f"{EXCITE} --library magic", "magic"),
+    "noise of two joints": (f"{EXCITE} --noise 1,1", "--noise '1,1'"),
+    "noise of nan": (f"{EXCITE} --noise nan,1,1", "--noise"),
+    "another suffix": ("excite three_axis --out r.txt", "a reference ends in"),
+    "a negative seed": (f"{EXCITE} --seed -1", "no seed"),
+    "half a seed": ("collect three_axis --out c --seed 0.5", "no seed"),
+    "an unknown plan": ("collect three_axis --out c --plan huge", "there are: dwell, paper, quick"),
+    "an unknown arm": ("collect puma --out c", "puma: no such file and no built-in arm"),
+    "the run held out, too": (f"{DIAGNOSE} --held-out run.csv", "is one of the logs diagnosed"),
+    "ranges without a next run": (f"{DIAGNOSE} --next-run-duration 60", "give it, too"),
+    "a next run that is no table": (f"{DIAGNOSE} --next-run n.txt", "a reference ends in"),
+    "no block": ("crossvalidate run.csv other.csv --arm three_axis --block 0", "--block 0"),
+    "a block of nan": ("crossvalidate run.csv --arm three_axis --block nan", "--block nan"),
+    "no draws": ("reproduce table2 --out r --draws 0", "--draws 0"),
+    "a million draws": ("reproduce table2 --out r --draws 1000000", "--draws 1000000"),
+    "an unknown item": ("reproduce fig99 --out r", "unknown item 'fig99'"),
+    "a model without a name": ("track scenario.yaml --model model.json", "write NAME=MODEL.json"),
+    "a model twice": ("track scenario.yaml --model a=model.json --model a=model.json", "'a' is given twice"),
+    "the exact model": ("track scenario.yaml --model exact=model.json", "choose another name"),
+    "a pace without a view": ("track scenario.yaml --rate 2", "--rate is the pace of --meshcat"),
+    "no command": ("", "required: COMMAND"),
+    "an unknown command": ("magic", "magic"),
+    "an arm that is a folder": ("collect . --out c", "no such file"),
+    "an arm that is a device": ("collect /dev/null --out c", "no such file"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_an_option_that_cannot_be(name: str, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command, said = WRONG[name]
+    before = contents(place)
+    assert main(command.split()) == 2
+    answer = capsys.readouterr()
+    assert answer.out == ""
+    assert answer.err.startswith("armloop: ") and answer.err.count("\n") == 1, answer.err
+    assert re.search(said, answer.err), answer.err
+    assert contents(place) == before

@@ -1,0 +1,136 @@
+"""Sums add, whatever the cut; a change is named from them alone; step and drift are told apart."""
+
+import numpy as np
+import pytest
+from operation import Change, healthy_model, operate
+
+from armloop.errors import LogError
+from armloop.model import ReconstructedModel
+from armloop.monitoring.catalogue import Column, watched
+from armloop.monitoring.naming import Normal, name_change
+from armloop.monitoring.sums import LogSums, log_sums
+from armloop.monitoring.trend import course
+from armloop.monitoring.units import Stream, Units, unit_edges
+from armloop.monitoring.warmth import adjust
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    return healthy_model()
+
+
+def normal(parts: list[LogSums]) -> Normal:
+    return Normal(
+        np.array([part.gram.sum(axis=0) for part in parts]),
+        np.array([part.moment.sum(axis=0) for part in parts]),
+        np.array([part.energy.sum() for part in parts]),
+    )
+
+
+def test_the_columns_of_every_log_are_the_same(model: ReconstructedModel) -> None:
+    first, second = (log_sums(model, operate(3, k)) for k in range(2))
+    assert first.columns == second.columns
+    assert [Column.of(column.key) for column in first.columns] == list(first.columns)
+    names = {effect.name for effect, _ in watched(model)}
+    assert {"payload", "viscous_friction", "coulomb_friction", "gravity_tilt", "time_delay"} <= names
+    assert "friction_drift" not in names  # it has memory
+
+
+def test_least_squares_from_sums_are_those_of_the_samples(model: ReconstructedModel) -> None:
+    # a coefficient written into the log comes out of Σ x u / Σ x²
+    log = operate(3, 0)
+    more = log.tau.copy()
+    more[:, 1] += 0.7 * log.v[:, 1]
+    before = log_sums(model, log)
+    after = log_sums(model, type(log)(log.time, log.q, log.v, more, name="more"))
+    (index,) = (i for i, c in enumerate(before.columns) if c.place == ("viscous_friction", 2, None))
+    size = before.gram[:, index, index].sum()
+    change = (after.moment[:, index].sum() - before.moment[:, index].sum()) / size
+    assert change == pytest.approx(
+        0.7, rel=5e-3
+    )  # v as recorded has noise that the filter takes out of the column
+
+
+def test_a_log_in_which_nothing_slides_is_refused_by_name(model: ReconstructedModel) -> None:
+    log = operate(3, 0)
+    rest = type(log)(log.time, 0 * log.q, 0 * log.v, log.tau, name="rest")
+    with pytest.raises(LogError, match="rest: no joint slides"):
+        log_sums(model, rest)
+
+
+@pytest.mark.parametrize(
+    ("change", "effect", "joint"),
+    [
+        (Change(mass=0.3), "payload", None),
+        (Change(friction=np.array([0.0, 0.0, 0.15])), "viscous_friction", 3),
+    ],
+    ids=["load", "friction"],
+)
+def test_a_change_is_named_from_sums_alone(
+    model: ReconstructedModel, change: Change, effect: str, joint: int | None
+) -> None:
+    healthy = normal([log_sums(model, operate(5, k)) for k in range(10)])
+    window = normal([log_sums(model, operate(5, k, change)) for k in range(10, 18)])
+    first, *_ = name_change(model.arm, log_sums(model, operate(5, 0)).columns, healthy, window)
+    assert first.place[:2] == (effect, joint)
+    if effect == "payload":
+        assert float(first.parameters["mass"].value) == pytest.approx(0.3, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_step_and_drift_are_told_apart(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    when = 86400.0 * np.arange(40) / 4
+    noise = 0.1 * rng.standard_normal(40)
+    step = course(when, noise + (np.arange(40) >= 25))
+    assert (step.form, step.began) == ("step", 25)
+    assert step.size == pytest.approx(1.0, abs=0.15)
+    drift = course(when, noise + 0.25 * np.maximum(when / 86400 - 4.0, 0.0))
+    assert drift.form == "drift"
+    assert drift.per_day == pytest.approx(0.25, rel=0.2)
+    assert course(when[:6], noise[:6]).form == "cannot_tell"
+
+
+def units_of(values: np.ndarray, temperature: np.ndarray, since: np.ndarray) -> Units:
+    n = len(values)
+    zero, one = np.zeros((n, 1)), np.ones((n, 1))
+    return Units(
+        (Column("viscous_friction", 1, None, 0),),
+        np.arange(n, dtype=float),
+        np.full(n, 60.0),
+        np.zeros(n, dtype=np.intp),
+        np.arange(n),
+        values[:, None],
+        one,
+        100 * one,
+        one,
+        one,
+        zero + temperature[:, None],
+        since,
+    )
+
+
+@pytest.mark.parametrize("known", ["temperature", "since_start"])
+def test_warm_up_is_learned_and_is_no_wear(known: str) -> None:
+    rng = np.random.default_rng(0)
+    since = rng.uniform(0, 6000, 60)
+    warm = 25 + 20 * (1 - np.exp(-since / 1200.0))
+    values = 1 - 0.2 * (warm - 25) / 20 + 0.005 * rng.standard_normal(60)
+    nothing = np.full(60, np.nan)
+    units = units_of(
+        values, warm if known == "temperature" else nothing, since if known == "since_start" else nothing
+    )
+    listed = [Stream("viscous_friction", 1, None, 0)]
+    cleared = adjust(units, values[:, None], listed, healthy=20)
+    assert cleared.known == known and cleared.learned.all()
+    assert cleared.values.std() < 0.2 * values.std()
+    untold = adjust(units_of(values, nothing, nothing), values[:, None], listed, healthy=20)
+    assert untold.known is None
+    np.testing.assert_array_equal(untold.values[:, 0], values)
+
+
+def test_a_long_log_is_several_units_of_about_the_same_length() -> None:
+    pieces = unit_edges(np.full(61, 30.0))  # half an hour and a little
+    assert [p.stop - p.start for p in pieces] == [15, 16, 15, 15] or len(pieces) == 4
+    assert pieces[0].start == 0 and pieces[-1].stop == 61
+    assert unit_edges(np.full(20, 30.0)) == [slice(0, 20)]

@@ -1,0 +1,170 @@
+"""A fleet is watched: what changed is found and named, what did not is left alone, what is broken is set aside."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from operation import contents
+
+from armloop.cli import main
+from armloop.log import read_log, write_log
+from armloop.tables import write_columns
+from armloop.watch import Options, watch
+from armloop.watch.sources import find_logs, recorded_at
+from armloop.watch.store import Store
+
+pytestmark = pytest.mark.slow
+
+CHANGED = 26
+
+
+@pytest.fixture(scope="module")
+def watched(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The store after one call."""
+    store = tmp_path_factory.mktemp("watched") / "store"
+    arguments = ["--models", str(fleet / "models"), "--logs", str(fleet / "logs"), "--store", str(store)]
+    assert main(["watch", *arguments, "--sums-only"]) == 3
+    return store
+
+
+def test_what_changed_is_found_named_and_dated(watched: Path) -> None:
+    alarms = {alarm["arm"]: alarm for alarm in Store(watched).alarms()}
+    assert set(alarms) == {"loaded", "rubbing"}
+    load, friction = alarms["loaded"], alarms["rubbing"]
+    (effect, *_) = load["effects"]
+    assert effect["effect"] == "payload"
+    assert effect["parameters"]["mass"]["value"] == pytest.approx(0.3, rel=0.05)
+    assert friction["effects"][0]["joint"] == 2
+    assert "friction" in friction["effects"][0]["effect"] or "drag" in friction["effects"][0]["effect"]
+    # nothing tells how warm joint 2 was
+    assert [item["effect"] for item in friction["alternatives"]] == ["warm_up"]
+    for alarm in alarms.values():
+        assert alarm["delay"]["units"] <= 14
+        assert alarm["since_log"] >= f"2026-01-{1 + (CHANGED - 2) // 10:02d}"
+        assert alarm["course"]["form"] in ("step", "cannot_tell")
+
+
+def test_a_second_call_finds_nothing_new_and_changes_no_byte(
+    fleet: Path, watched: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = contents(watched)
+    arguments = ["--models", str(fleet / "models"), "--logs", str(fleet / "logs"), "--store", str(watched)]
+    assert main(["watch", *arguments, "--sums-only", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["logs"] == {"read": 0, "known": 120, "set_aside": 0}
+    assert (answer["new"], len(answer["alarms"])) == ([], 2)
+    assert contents(watched) == before
+
+
+def test_the_page_stands_by_itself(fleet: Path, watched: Path, tmp_path: Path) -> None:
+    page = tmp_path / "watch.html"
+    arguments = ["--models", str(fleet / "models"), "--logs", str(fleet / "logs"), "--store", str(watched)]
+    assert main(["watch", *arguments, "--sums-only", "--report", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "http://" not in text.replace("http://www.w3.org", "") and "https://" not in text
+    for words in ("Trends of", "payload", "loaded", "rubbing", "healthy", "warm up"):
+        assert words in text
+
+
+def test_the_same_logs_in_portions_give_the_same_sums(fleet: Path, watched: Path, tmp_path: Path) -> None:
+    files = find_logs([fleet / "logs" / "healthy"])
+    files = [type(file)(file.path, "healthy", "") for file in files]
+    models = fleet / "models"
+    for portion in (files[20:], files[:25], files[:1]):
+        watch(models, portion, tmp_path / "store", Options(full=False))
+    whole = {k: v for k, v in contents(watched).items() if "arm=healthy" in k}
+    mine = {k: v for k, v in contents(tmp_path / "store").items() if "arm=healthy" in k}
+    assert {k: v for k, v in mine.items() if k.startswith("sums")} == {
+        k: v for k, v in whole.items() if k.startswith("sums")
+    }
+
+
+def test_broken_and_foreign_logs_are_set_aside_with_their_reason(fleet: Path, tmp_path: Path) -> None:
+    logs = tmp_path / "logs"
+    (logs / "healthy").mkdir(parents=True)
+    (logs / "stranger").mkdir()
+    good = sorted((fleet / "logs" / "healthy").iterdir())[0]
+    shutil.copy(good, logs / "healthy")
+    (logs / "healthy" / "broken.csv").write_text("time,q1,v1,tau1\n0,1,2\n", encoding="utf-8")
+    (logs / "healthy" / "cut.parquet").write_bytes(good.read_bytes()[:900])
+    shutil.copy(sorted((fleet / "logs" / "loaded").iterdir())[0], logs / "stranger")
+    outcome = watch(fleet / "models", find_logs([logs]), tmp_path / "store")
+    assert (outcome.counts.read, outcome.counts.aside) == (1, 3)
+    reasons = {Path(item["log"]).name: item["reason"] for item in outcome.aside}
+    assert "joints" in reasons["broken.csv"] or "row 1" in reasons["broken.csv"]
+    assert "Parquet" in reasons["cut.parquet"]
+    assert any("no model of arm 'stranger'" in reason for reason in reasons.values())
+    # a model comes: the log is used, and is aside no more
+    models = tmp_path / "models"
+    shutil.copytree(fleet / "models", models)
+    shutil.copy(models / "healthy.json", models / "stranger.json")
+    again = watch(models, find_logs([logs]), tmp_path / "store")
+    assert (again.counts.read, len(again.aside)) == (1, 2)
+
+
+def test_arm_programme_and_warmth_come_from_columns(fleet: Path, tmp_path: Path) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    log = read_log(sorted((fleet / "logs" / "healthy").iterdir())[0])
+    path = tmp_path / "somewhere" / "log.parquet"
+    write_log(path, log)
+    table = pyarrow.parquet.read_table(path)
+    for name, value in (
+        ("arm", "loaded"),
+        ("programme", "polish"),
+        ("temperature", 31.0),
+        ("since_start", 600.0),
+    ):
+        table = table.append_column(name, pyarrow.array([value] * log.samples))
+    pyarrow.parquet.write_table(table, path)
+    outcome = watch(fleet / "models", find_logs([tmp_path / "somewhere"]), tmp_path / "store")
+    assert [arm["arm"] for arm in outcome.arms] == ["loaded"]
+    assert outcome.arms[0]["warmth"] == "temperature"
+    history = Store(tmp_path / "store").history("loaded", outcome.arms[0]["model"])
+    assert history.programmes == ["polish"]
+    np.testing.assert_allclose(history.units.temperature, 31.0)
+    np.testing.assert_allclose(history.units.since_start, 600.0)
+
+
+def test_when_a_log_was_recorded(tmp_path: Path) -> None:
+    day = tmp_path / "2025-03-04"
+    day.mkdir()
+    for name, expected in (
+        ("run_20240131T120530.csv", 1706702730.0),
+        ("2024-01-31.csv", 1706659200.0),
+        ("20249931.csv", 1741046400.0),  # no date: its folder's
+    ):
+        (day / name).touch()
+        assert recorded_at(day / name, 0.0) == expected
+    assert recorded_at(day / name, 1.7e9) == 1.7e9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--models", "nowhere", "--logs", "."], "holds no model"),
+        (["--models", "MODELS", "--logs", "nowhere"], "no such file or folder"),
+        (["--models", "MODELS", "--logs", ".", "--false-alarm-hours", "-3"], "positive number of hours"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    fleet: Path, tmp_path: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [str(fleet / "models") if word == "MODELS" else word for word in arguments]
+    assert main(["watch", *given, "--store", str(tmp_path / "store")]) == 2
+    said = capsys.readouterr().err
+    assert words in said and len(said.splitlines()) == 1
+
+
+def test_a_folder_of_something_else_is_no_store(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_columns(tmp_path / "mine.csv", {"time": np.arange(3.0)})
+    assert (
+        main(["watch", "--models", str(fleet / "models"), "--logs", str(tmp_path), "--store", str(tmp_path)])
+        == 2
+    )
+    assert "neither empty nor a store" in capsys.readouterr().err
