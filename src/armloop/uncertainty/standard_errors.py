@@ -19,6 +19,7 @@ from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.regression.determined import combination, told_apart
 from armloop.uncertainty.blocking import block_length, correlation_time, covered_time, independent_blocks
+from armloop.uncertainty.friction_lines import friction_line
 from armloop.uncertainty.sandwich import Equations
 from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 
@@ -102,6 +103,7 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         ``degrees_of_freedom`` of Student's t; ``shared``: the same for terms that serve all joints;
         ``undetermined``: coefficients that these samples do not tell apart, and the sums of them that they determine;
         ``stribeck``: per joint f_s, f_c, f_v, v_s of Eq. (34), where the law has that form;
+        ``friction_line``: per joint f_c, f_v of the straight line nearest to any law;
         ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
     """
     parts, seconds, correlation = covariances(model, samples, fitted)
@@ -120,6 +122,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
                 where[unknown.name] = _entry(error, freedom)
     table["undetermined"] = [entry for part in parts for entry in part.undetermined()]
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
+    rows = np.logical_or.reduce([one.rows for one in fitted])
+    table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
         "block_seconds": seconds,
@@ -353,3 +357,18 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
                 if np.isfinite(error) and np.isfinite(freedom):
                     found[key] = {"value": float(value), **_entry(error, freedom)}
     return found
+
+
+def _line(
+    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """:func:`friction_line` of a joint, whose friction is all in one problem."""
+    for part in parts:
+        own = np.array([u.kind == "friction" and u.joint == joint for u in part.unknowns], dtype=bool)
+        if own.any():
+            names = [u.name for u, mine in zip(part.unknowns, own, strict=True) if mine]
+            covariance = part.covariance[np.ix_(own, own)]
+            return friction_line(
+                model, joint, names, covariance, float(part.freedom[own].min()), samples, rows
+            )
+    return {}
