@@ -110,11 +110,9 @@ def test_parameters_that_the_motion_leaves_open_are_said_to_be():
     log = MotionLog(motion.time, q, v, 1.0 + friction(v), np.zeros_like(q), name="creep")
     found = reconstruct([log], three_axis(), library="rigid-body", options=Options(standard_errors=False))
     (note,) = [note for note in found.notes if "does not determine" in note]
-    assert (
-        "taken from the URDF" in note
-        and "what it determines is" in note
-        and found.model.history["physics"]["passed"]
-    )
+    assert "taken from the URDF" in note and "what it determines is" in note
+    # what cannot be kept physical on such data is said where it is not
+    assert set(found.model.history["physics"]["faults"]) <= set(found.notes)
 
 
 def test_the_ladder_says_what_each_rung_brought(result: Reconstruction):
