@@ -20,6 +20,7 @@ from armloop.motion import Samples
 from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
 from armloop.reconstruction.apart import Apart, independent_blocks
+from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
@@ -128,7 +129,8 @@ def reconstruct(
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
         library: one of :data:`LIBRARIES`; by default the best of them (:mod:`armloop.reconstruction.libraries`), unless
             an option speaks of the double feature set.
-        conditioning: filter; by default what suits the library.
+        conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
+            (:mod:`armloop.reconstruction.bandwidth`).
         recorded: how the logs recorded the torque, kept in the model for later logs.
         workers: who passes over logs that are not kept in memory; by default this process.
         in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
@@ -136,7 +138,8 @@ def reconstruct(
             the other libraries read everything, and are not compared with it.
 
     Raises:
-        InputError: logs that do not fit the arm, an unknown method or friction law, or too little excitation.
+        InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
+            or too little excitation.
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
@@ -164,9 +167,16 @@ def reconstruct(
         library = candidates(arm, settings)[0]
     apart: Apart | None = None
 
+    if conditioning is None:
+        progress("choosing the low-pass on held-out blocks")
+        bandwidth = choose_bandwidth(kept or logs, arm, Conditioning())
+    else:
+        bandwidth = Bandwidth(conditioning.cutoff_hz)
+        check_nyquist(kept or logs, conditioning.cutoff_hz)
+
     def attempt(library: str) -> Attempt:
         nonlocal apart, settings
-        how = conditioning or default_conditioning(library)
+        how = conditioning or bandwidth.suited(default_conditioning(library))
         progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if apart is None:
             apart = independent_blocks(arm, kept or logs, how, settings.block_seconds, settings.folds)
@@ -176,9 +186,11 @@ def reconstruct(
         else:
             data = Data.of(condition(kept or [log.read() for log in logs], how), settings)
         check_recorded(arm, data.reference.samples)
-        return Attempt(
-            library, how, data, _found(arm, data, method, library, settings, progress), apart.margin
-        )
+        found = _found(arm, data, method, library, settings, progress)
+        if bandwidth.trials:
+            found.history["bandwidth"] = bandwidth.to_dict()
+        found.notes += bandwidth.notes()
+        return Attempt(library, how, data, found, apart.margin)
 
     if library is not None:
         tried = [Contender(library, attempt(library), chosen=True)]
