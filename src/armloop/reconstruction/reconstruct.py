@@ -23,6 +23,7 @@ from armloop.reconstruction.apart import Apart, independent_blocks
 from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
+from armloop.reconstruction.fitted import in_memory as kept_in_memory
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
@@ -39,6 +40,8 @@ from armloop.reconstruction.libraries import (
 )
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
+from armloop.reconstruction.ripple import find_ripple
+from armloop.reconstruction.ripple import notes as ripple_notes
 from armloop.reconstruction.shared import SHARED_CONDITIONING, motion_range
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise_on
@@ -224,6 +227,15 @@ def _finished(
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
+    if method == "stepwise" and kept_in_memory(data):
+        bare = ReconstructedModel(
+            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
+        )
+        chunk = data.reference
+        ripple = find_ripple(bare, [log.read() for log in logs], chunk.samples, chunk.held_out)
+        found.notes += ripple_notes(ripple)
+        for one in (found, *([] if found.final is None else [found.final])):
+            one.effects = (*one.effects, *ripple)
     notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
     if apart is not None and apart.too_short:
         notes.append(
