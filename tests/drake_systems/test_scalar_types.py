@@ -80,9 +80,9 @@ def effect_torque(name):
 
 
 SYSTEMS = {
-    **{f"feedforward of {k}": lambda m=m: Feedforward(m(), m().arm.n) for k, m in STILL_MODELS.items()},
-    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), 4, stacked=True),
-    "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 3, 2),
+    **{f"feedforward of {k}": lambda m=m: Feedforward(m()) for k, m in STILL_MODELS.items()},
+    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), stacked=True),
+    "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 2),
     **{
         f"computed torque of {k}": lambda m=m: ComputedTorque(m(), AccelerationGains.critical(m().arm.n))
         for k, m in STILL_MODELS.items()
@@ -260,5 +260,5 @@ def test_a_model_of_numbers_alone_stays_float():
         def feedforward(self, q, v, vdot, step):
             return q
 
-    assert Feedforward(Numbers(), 2).ToAutoDiffXdMaybe() is None
+    assert Feedforward(Numbers(), n=2).ToAutoDiffXdMaybe() is None
     assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToSymbolicMaybe() is None

@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction_system import PreslidingFriction, Stop
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.effects.base import number
 from armloop.library.friction import FrictionLaw
@@ -76,7 +76,7 @@ def BeyondBodies_(T: type) -> Any:
     return Impl
 
 
-BeyondBodies = BeyondBodies_[None]
+BeyondBodies = with_signature(BeyondBodies_[None])
 
 
 def presliding_elements(model: ReconstructedModel) -> list[Stop]:

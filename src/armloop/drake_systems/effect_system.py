@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Adder
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.arm import Arm
-from armloop.drake_systems.scalars import functions_of, vector, within
+from armloop.drake_systems.scalars import functions_of, vector, with_signature, within
 from armloop.dynamics import effect_law
 from armloop.effects import Value, effect_kind
 from armloop.effects.base import number
@@ -105,7 +105,7 @@ def EffectTorque_(T: type) -> Any:
     return Impl
 
 
-EffectTorque = EffectTorque_[None]
+EffectTorque = with_signature(EffectTorque_[None])
 
 
 def add_joint_forces(

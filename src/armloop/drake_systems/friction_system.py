@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.library.hysteresis import stop_step
 
 
@@ -57,7 +57,7 @@ def JointFrictionSystem_(T: type) -> Any:
     return Impl
 
 
-JointFrictionSystem = JointFrictionSystem_[None]
+JointFrictionSystem = with_signature(JointFrictionSystem_[None])
 
 
 class Stop(NamedTuple):
@@ -137,7 +137,7 @@ def PreslidingFriction_(T: type) -> Any:
     return Impl
 
 
-PreslidingFriction = PreslidingFriction_[None]
+PreslidingFriction = with_signature(PreslidingFriction_[None])
 
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:

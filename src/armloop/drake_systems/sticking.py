@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
@@ -89,4 +89,4 @@ def StickingForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-StickingForwardDynamics = StickingForwardDynamics_[None]
+StickingForwardDynamics = with_signature(StickingForwardDynamics_[None])

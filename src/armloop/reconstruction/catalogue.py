@@ -256,6 +256,19 @@ class _Columns:
         if key not in self._smoothed:
             columns = self.raw(effect, shape)
             acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
-            columns[:, acts] = smooth(self._samples, columns[:, acts])
+            if not acts:
+                return columns
+            first, *others = acts
+            # what acts alike, or against each other, on several joints is filtered once
+            like = {j: _ratio(columns[:, j], columns[:, first]) for j in others}
+            columns[:, first] = smooth(self._samples, columns[:, first])
+            for j, ratio in like.items():
+                whole = columns[:, j]
+                columns[:, j] = smooth(self._samples, whole) if ratio is None else ratio * columns[:, first]
             self._smoothed[key] = columns
         return self._smoothed[key]
+
+
+def _ratio(x: Array, y: Array) -> float | None:
+    """±1 where x is ±y, else None."""
+    return next((r for r in (1.0, -1.0) if np.array_equal(x, r * y)), None)
