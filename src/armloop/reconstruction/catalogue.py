@@ -39,16 +39,6 @@ _CHANCE = 1e-3
 _AS_GOOD = 0.9
 #: Part of a law's column beside all that the model can say, below which it says nothing new.
 _NEW = 2e-3
-#: Laws of a joint's friction: they are rungs of the friction ladder, which has had its say.
-_ON_THE_LADDER = (
-    "coulomb_friction",
-    "viscous_friction",
-    "stribeck_friction",
-    "friction_asymmetry",
-    "load_dependent_friction",
-    "quadratic_drag",
-    "presliding_hysteresis",
-)
 #: What comes and goes: the arm as it was trained carries what it carries.
 _OF_A_RUN = ("payload", "friction_drift")
 _MOST = 6
@@ -165,9 +155,11 @@ class Laws:
 
 
 def permanent(arm: Arm) -> list[Effect]:
-    """Laws that an arm may have had all along and that fit beside others as linear columns."""
-    left_out = (*_ON_THE_LADDER, *_OF_A_RUN)
-    return [effect for effect in hypotheses(arm) if effect.name not in left_out and not effect.memory]
+    """Laws that an arm may have had all along and that fit beside others as linear columns.
+
+    A joint's friction is none of them: it has rungs of the friction ladder, which has had its say.
+    """
+    return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
 
 
 def search(
