@@ -343,9 +343,9 @@ def main() -> None:
     systems = {
         "empty system": Empty(False),
         "empty system that reads its inputs": Empty(True),
-        "Feedforward of 50 terms": Feedforward(models[50], N),
-        "Feedforward of 300 terms": Feedforward(models[300], N),
-        "Feedforward of 300 terms, one port": Feedforward(models[300], N, stacked=True),
+        "Feedforward of 50 terms": Feedforward(models[50]),
+        "Feedforward of 300 terms": Feedforward(models[300]),
+        "Feedforward of 300 terms, one port": Feedforward(models[300], stacked=True),
     }
     measures = {name: evaluation(system) for name, system in systems.items()}
     x, drive = np.full(3 * N, 0.3), models[300].stacked_drive()

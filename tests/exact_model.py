@@ -12,6 +12,7 @@ from armloop.arm import Arm
 from armloop.drake_systems.effects import UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.plant import add_links
+from armloop.library.friction import KINDS
 
 Array = NDArray[np.float64]
 
@@ -28,11 +29,13 @@ class ExactModel:
     ) -> None:
         self.arm = arm
         realised = realise(arm, effects)
+        level = [0.0] * arm.n
+        for law in realised.laws:
+            assert law.terms[0].element is KINDS["sign"]
+            level[law.along.joint] += law.terms[0].coefficient
         self._friction = [
-            JointFriction(f.static + level, f.coulomb + level, f.stribeck_velocity, f.viscous + viscous)
-            for f, level, viscous in zip(
-                friction, [dry.level for dry in realised.dry], realised.viscous, strict=True
-            )
+            JointFriction(f.static + more, f.coulomb + more, f.stribeck_velocity, f.viscous + viscous)
+            for f, more, viscous in zip(friction, level, realised.viscous, strict=True)
         ]
         self._plant = MultibodyPlant(0.0)
         add_links(self._plant, arm, realised)

@@ -35,6 +35,7 @@ LAYERS = (
     {"watch"},
     {"reports"},
     {"loop", "reproduction"},
+    {"api"},
     {"commands"},
     {"cli"},
     {"__main__"},

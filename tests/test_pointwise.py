@@ -8,10 +8,9 @@ from armloop.components import RigidBody, SparseTerms
 from armloop.effects import Estimate, effect
 from armloop.functions import MATH
 from armloop.kinematics import nominal_parameters
-from armloop.library.friction import _KINDS, FrictionLaw, FrictionTerm
+from armloop.library.friction import KINDS, Acting, FrictionLaw, FrictionTerm, Sliding, torque_along
 from armloop.model import AddedEffect, ReconstructedModel, load_model
 from armloop.motion import Motion
-from armloop.pointwise import FRICTION_LAWS
 
 PARAMETERS = {
     "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001},
@@ -28,7 +27,8 @@ def model_with(name: str) -> ReconstructedModel:
     arm = load_arm("three_axis")
     whole = name in ("payload", "gravity_tilt")
     added = AddedEffect(
-        effect(name, None if whole else 2), {k: Estimate(v, 0.0, "") for k, v in PARAMETERS[name].items()}
+        effect(name, None if whole else 2),
+        {k: Estimate(v, (0 * np.asarray(v)).tolist(), "") for k, v in PARAMETERS[name].items()},
     )
     terms = SparseTerms(2, np.array([[0, 2], [4, 10]]), np.array([[0.5, 0.0, 1.0], [0.0, 2.0, 0.3]]))
     body = RigidBody(np.concatenate([nominal_parameters(arm), [0.1, 0.2, 0.3]]), ("m1",), np.array([1.0]))
@@ -85,10 +85,11 @@ def test_one_array_for_a_sample_gives_the_same(kind, step):
 def test_every_kind_of_friction_has_its_law_for_one_sample():
     v = np.array([-0.7, -0.02, 0.3])
     motion = Motion(np.arange(3.0), np.cumsum(v)[:, None], v[:, None], v[:, None], np.array([0, 1, 2]))
-    assert set(FRICTION_LAWS) == set(_KINDS)
-    for kind, law in FRICTION_LAWS.items():
-        if "hysteresis" not in kind:  # one sample has no past
-            found = [law(x, np.sign(x), 0.1, MATH) for x in v.tolist()]
+    for kind, element in KINDS.items():
+        if element.way != "memory":  # one sample has no past
+            states = [Sliding(0.0, x, np.sign(x), float(k)) for k, x in enumerate(v.tolist())]
+            term = [Acting(1.0, element, 0.1)]
+            found = [torque_along(term, x, 1.0, MATH, sharp=False) for x in states]
             expected = FrictionTerm(kind, 1.0, 0.1).column(motion, 0, np.ones((3, 1)))
             np.testing.assert_allclose(found, expected, rtol=1e-9, err_msg=kind)
 

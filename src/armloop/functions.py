@@ -18,7 +18,10 @@ Function = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Functions:
-    """Functions of one number; `sign` is -1, 0 or 1. The absolute value is Python's own `abs`."""
+    """Functions of one number; `sign` is -1, 0 or 1. The absolute value is Python's own `abs`.
+
+    `clip(x, lower, upper)` takes two bounds.
+    """
 
     sin: Function
     cos: Function
@@ -26,9 +29,16 @@ class Functions:
     tanh: Function
     sqrt: Function
     sign: Function
+    clip: Callable[[Any, Any, Any], Any]
 
 
 MATH = Functions(
-    math.sin, math.cos, math.exp, math.tanh, math.sqrt, lambda x: (x > 0) - (x < 0)
+    math.sin,
+    math.cos,
+    math.exp,
+    math.tanh,
+    math.sqrt,
+    lambda x: (x > 0) - (x < 0),
+    lambda x, lower, upper: min(max(x, lower), upper),
 )  # for a single sample several times faster than numpy's
-NUMPY = Functions(np.sin, np.cos, np.exp, np.tanh, np.sqrt, np.sign)
+NUMPY = Functions(np.sin, np.cos, np.exp, np.tanh, np.sqrt, np.sign, np.clip)

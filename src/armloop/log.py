@@ -109,6 +109,37 @@ class MotionLog:
         _say_doubts(log)
         return log
 
+    @classmethod
+    def from_frame(
+        cls, frame: Any, *, joints: int | None = None, name: str = "log", tau_unit: str = "N*m"
+    ) -> "MotionLog":
+        """Make a log of a data frame (pandas, polars, pyarrow) with the columns of a file: `time,q1..,v1..,tau1..`.
+
+        joints : how many joints the arm has; None takes what the frame has. v may be missing: see `from_arrays`
+
+        Raises `LogError` when columns are missing, and as the class does.
+        """
+        header = [str(column) for column in getattr(frame, "column_names", frame.columns)]
+        n, _ = _columns(Path(name), header)
+        if joints is not None and n != joints:
+            raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
+        kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
+        cells = {
+            kind: np.stack(
+                [_numbers(frame[f"{kind}{j}"], f"{kind}{j}", name) for j in range(1, n + 1)], axis=1
+            )
+            for kind in kinds
+        }
+        return cls.from_arrays(
+            _numbers(frame["time"], "time", name),
+            cells["q"],
+            cells["tau"],
+            cells.get("v"),
+            cells.get("vdot"),
+            name=name,
+            tau_unit=tau_unit,
+        )
+
     @property
     def samples(self) -> int:
         """The number of samples N."""

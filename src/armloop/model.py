@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.components import COMPONENTS, Component
-from armloop.effects import Context, Effect, Estimate, effect
+from armloop.effects import Context, Effect, Estimate, Value, effect
+from armloop.effects.base import Placed
 from armloop.effects.base import Pointwise as EffectPointwise
 from armloop.errors import ArmError, ModelError
 from armloop.files import write_json
 from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.friction import FrictionLaw
+from armloop.library.friction import Acting, FrictionLaw
 from armloop.motion import Motion
 from armloop.pointwise import Drive, pointwise, stacked
 from armloop.reading import read_json
@@ -48,11 +49,20 @@ class AddedEffect:
 
     def torque(self, context: Context) -> Array:
         """(N, n) torque of the effect."""
-        return self.effect.torque(context, {key: e.value for key, e in self.parameters.items()})
+        return self.effect.torque(context, self.values)
 
     def pointwise(self, arm: Arm, inertial: Array | None) -> EffectPointwise:
         """The effect's torque for one sample at a time."""
-        return self.effect.pointwise(arm, {key: e.value for key, e in self.parameters.items()}, inertial)
+        return self.effect.pointwise(arm, self.values, inertial)
+
+    def placed(self) -> Placed | None:
+        """The effect's law along its direction, where it has one."""
+        return self.effect.placed(self.values)
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The parameters without their errors."""
+        return {key: e.value for key, e in self.parameters.items()}
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as in ``diagnosis.json``."""
@@ -135,7 +145,9 @@ class ReconstructedModel:
         tau = context.predicted
         assert tau is not None
         # One fault after the other, each on what the one before has left: first where the encoder says the arm is.
-        faults = sorted((a for a in self.effects if sensors and a.effect.sensor), key=_fault_order)
+        faults = sorted(
+            (a for a in self.effects if sensors and a.effect.sensor), key=lambda a: a.effect.fault_order
+        )
         for fault in faults:
             tau = tau + fault.torque(replace(context, predicted=tau))
         return tau
@@ -209,20 +221,19 @@ class ReconstructedModel:
 
     def _parts(
         self, step: int
-    ) -> tuple[Arm, tuple[Component, ...], FrictionLaw, list[tuple[bool, EffectPointwise]]]:
-        """What acts at one sample: added effects that are friction stand with the friction."""
-        added = [a for a in self.effects if step >= 3 and not a.effect.sensor]
+    ) -> tuple[Arm, tuple[Component, ...], list[list[Acting]], list[tuple[bool, EffectPointwise]]]:
+        """What acts at one sample: added effects that are friction of one joint stand with its friction."""
+        added = [a for a in self.effects if step >= 3 and not a.effect.sensor and a.effect.searched]
         inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
-        terms = [list(joint) for joint in self.friction.terms]
+        friction = [[t.acting for t in joint if t.step <= step] for joint in self.friction.terms]
         effects = []
         for a in added:
-            term = a.effect.friction({key: e.value for key, e in a.parameters.items()})
-            if term is None:
+            law = a.placed()
+            if law is None or law.along.ratio or any(t.element.part != "friction" for t in law.terms):
                 effects.append((a.effect.load, a.pointwise(self.arm, inertial)))
             else:
-                assert a.effect.joint is not None
-                terms[a.effect.joint - 1].append(term)
-        return self.arm, self.components, FrictionLaw(tuple(map(tuple, terms))), effects
+                friction[law.along.joint] += law.terms
+        return self.arm, self.components, friction, effects
 
     @cached_property
     def _pointwise(self) -> dict[int, Drive]:
@@ -277,11 +288,6 @@ class ReconstructedModel:
             raise ModelError(
                 f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
             )
-
-
-def _fault_order(added: AddedEffect) -> int:
-    order = ("encoder_offset", "torque_gain", "torque_offset", "time_delay")
-    return order.index(added.effect.name) if added.effect.name in order else len(order)
 
 
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:

@@ -6,9 +6,8 @@ recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,8 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.effects.base import Pointwise as EffectPointwise
-from armloop.functions import MATH, Functions
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.functions import MATH
+from armloop.library.friction import KINDS, Acting, Sliding, stribeck_fall, torque_along
 from armloop.newton_euler import inverse_dynamics
 from armloop.wave_table import WaveTable
 
@@ -36,13 +35,14 @@ class Drive(Protocol):
 def pointwise(
     arm: Arm,
     components: Sequence[Component],
-    friction: FrictionLaw,
+    friction: Sequence[Sequence[Acting]],
     effects: Sequence[tuple[bool, EffectPointwise]],
     step: int,
 ) -> Drive:
     """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
     Args:
+        friction: the elements that act on each joint.
         effects: each with whether its torque loads the joint, so that friction grows with it; one that does
             not is friction itself or knows no velocity, and takes the velocities that friction does.
 
@@ -52,7 +52,7 @@ def pointwise(
     terms = WaveTable(sparse).torque if sparse else lambda q, v, vdot: np.zeros(arm.n)
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
     bodies += [_energies(c, step) for c in components if isinstance(c, Lagrangian)]
-    laws = [_friction([t for t in joint if t.step <= step]) for joint in friction.terms]
+    laws = [_friction(joint) for joint in friction]
 
     def torque(q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
         tau = terms(q, v, vdot)
@@ -66,7 +66,10 @@ def pointwise(
             if is_load:
                 load = [x + float(y) for x, y in zip(load, extra, strict=True)]
         return np.array(
-            [x + law(speed, y) for x, law, speed, y in zip(total, laws, slip.tolist(), load, strict=True)]
+            [
+                x + law(at, speed, y)
+                for x, law, at, speed, y in zip(total, laws, q.tolist(), slip.tolist(), load, strict=True)
+            ]
         )
 
     return torque
@@ -75,7 +78,7 @@ def pointwise(
 def stacked(
     arm: Arm,
     components: Sequence[Component],
-    friction: FrictionLaw,
+    friction: Sequence[Sequence[Acting]],
     effects: Sequence[tuple[bool, EffectPointwise]],
     step: int,
 ) -> Callable[[Array], Sequence[float]]:
@@ -85,20 +88,17 @@ def stacked(
     """
     n, acting = arm.n, [c for c in components if not isinstance(c, SparseTerms) or c.step <= step]
     sparse = [c for c in acting if isinstance(c, SparseTerms) and len(c.index)]
-    laws = [_numbers([t for t in joint if t.step <= step]) for joint in friction.terms]
+    laws = [_numbers(joint) for joint in friction]
     if effects or not sparse or len(sparse) < len(acting) or any(others for _, others in laws):
         drive = pointwise(arm, components, friction, effects, step)
         return lambda x: drive(x[:n], x[n : 2 * n], x[2 * n :]).tolist()
-    terms, exp = WaveTable(sparse).stacked, math.exp
-    numbers = [
-        (offset, viscous, dry + drop, -drop, -scale * scale)
-        for (offset, dry, drop, viscous, scale), _ in laws
-    ]
+    terms = WaveTable(sparse).stacked
+    numbers = [(offset, viscous, dry + drop, -drop, speed) for (offset, dry, drop, viscous, speed), _ in laws]
 
     def torque(x: Array) -> list[float]:
         return [
-            y + offset + viscous * v + (dry + dip * exp(narrow * v * v)) * ((v > 0) - (v < 0))
-            for y, v, (offset, viscous, dry, dip, narrow) in zip(
+            y + offset + viscous * v + (dry + dip * stribeck_fall(v, speed, MATH)) * ((v > 0) - (v < 0))
+            for y, v, (offset, viscous, dry, dip, speed) in zip(
                 terms(x).tolist(), x[n : 2 * n].tolist(), numbers, strict=True
             )
         ]
@@ -106,41 +106,37 @@ def stacked(
     return torque
 
 
-def _numbers(terms: Sequence[FrictionTerm]) -> tuple[tuple[float, ...], list[tuple[float, Any, float, bool]]]:
-    """Offset, dry level, its rise, viscous coefficient and 1 / v_s of one joint's Eq. (34), and what else it has."""
-    simple = {"offset": 0.0, "sign": 0.0, "stribeck": 0.0, "viscous": 0.0}
-    scale, others = 0.0, []
+#: The elements of Eq. (34), which are summed in one expression.
+_EQUATION_34 = {KINDS[kind]: k for k, kind in enumerate(("offset", "sign", "stribeck", "viscous"))}
+
+
+def _numbers(terms: Sequence[Acting]) -> tuple[tuple[float, ...], list[Acting]]:
+    """Offset, dry level, its rise, viscous coefficient and v_s of one joint's Eq. (34), and what else it has."""
+    simple, speed, others = [0.0] * len(_EQUATION_34), 1.0, []
     for t in terms:
-        # Python's own floats: numpy's scalars, as a fit leaves them, take three times as long.
-        coefficient, parameter = float(t.coefficient), float(t.parameter)
-        if t.kind in simple and (t.kind != "stribeck" or not simple["stribeck"]):
-            simple[t.kind] += coefficient
-            scale = 1.0 / parameter if t.kind == "stribeck" else scale
-        else:
-            others.append((coefficient, FRICTION_LAWS[t.kind], parameter, t.by_load))
-    return (*simple.values(), scale), others
+        place = _EQUATION_34.get(t.element)
+        if place is None or (t.parameter and simple[place]):
+            others.append(t)
+            continue
+        simple[place] += t.coefficient
+        speed = t.parameter or speed
+    return (*simple, speed), others
 
 
-def _friction(terms: Sequence[FrictionTerm]) -> Callable[[float, float], float]:
-    """One joint's friction (v, load) -> torque, Eq. (34) in one expression where the law has that form."""
-    (offset, dry, drop, viscous, scale), others = _numbers(terms)
-    exp = math.exp
+def _friction(terms: Sequence[Acting]) -> Callable[[float, float, float], float]:
+    """One joint's friction (q, v, load) -> torque, Eq. (34) in one expression where the law has that form."""
+    (offset, dry, drop, viscous, speed), others = _numbers(terms)
 
-    def torque(v: float, load: float) -> float:
+    def torque(q: float, v: float, load: float) -> float:
         total = offset + viscous * v
         if v:
-            x = v * scale
-            level = dry + drop - drop * exp(-x * x)
+            level = dry + drop - drop * stribeck_fall(v, speed, MATH)
             total += level if v > 0 else -level
         return total
 
-    def sum_of_all(v: float, load: float) -> float:
-        total = torque(v, load)
-        sign = (v > 0) - (v < 0)
-        for coefficient, law, parameter, by_load in others:
-            value = coefficient * law(v, sign, parameter, MATH)
-            total += value * abs(load) if by_load else value
-        return total
+    def sum_of_all(q: float, v: float, load: float) -> float:
+        x = Sliding(q, v, (v > 0) - (v < 0))
+        return torque(q, v, load) + float(torque_along(others, x, load, MATH, sharp=False))
 
     return sum_of_all if others else torque
 
@@ -190,25 +186,3 @@ def _energies(body: Lagrangian, step: int) -> Pointwise:
         return tau
 
     return torque
-
-
-#: Friction per unit of each kind's coefficient at one velocity: (v, sign(v), parameter, functions).
-#: Kinds with memory act as if fully slid. The smooth stand-in for the sign is whatever the caller hands in.
-FRICTION_LAWS: dict[str, Callable[[Any, Any, float, Functions], Any]] = {
-    "offset": lambda v, sign, p, f: 1.0,
-    "sign": lambda v, sign, p, f: sign,
-    "smooth_sign": lambda v, sign, p, f: f.tanh(v / p),
-    "hysteresis": lambda v, sign, p, f: sign,
-    "load_sign": lambda v, sign, p, f: sign,
-    "load_smooth_sign": lambda v, sign, p, f: f.tanh(v / p),
-    "load_hysteresis": lambda v, sign, p, f: sign,
-    "viscous": lambda v, sign, p, f: v,
-    "viscous_forward": lambda v, sign, p, f: 0.5 * (v + abs(v)),
-    "viscous_backward": lambda v, sign, p, f: 0.5 * (v - abs(v)),
-    # sqrt(|v|) sign(v), rounded off below 1e-10 so that it has a derivative at rest
-    "root": lambda v, sign, p, f: v / f.sqrt(f.sqrt(v * v + 1e-20)),
-    "quadratic": lambda v, sign, p, f: abs(v) * v,
-    "cubic": lambda v, sign, p, f: v * v * v,
-    "stribeck_peak": lambda v, sign, p, f: f.exp(-(v / p) * (v / p)) * sign,
-    "stribeck": lambda v, sign, p, f: (1.0 - f.exp(-(v / p) * (v / p))) * sign,
-}

@@ -3,7 +3,7 @@
 import pytest
 
 from armloop.diagnosis.remedies import remedy
-from armloop.effects import EFFECTS, Estimate, effect
+from armloop.effects import EFFECTS, Estimate, Law, Parameter, effect
 from armloop.model import AddedEffect
 
 FAULTS = {
@@ -37,6 +37,10 @@ def test_all_listed_sensors_have_one_and_nothing_else_has() -> None:
 
 
 def test_a_sensor_of_the_users_own_gets_general_words() -> None:
-    own = effect("torque_gain", 2)
-    own.name = "bent_sensor"  # type: ignore[misc]
-    assert remedy(AddedEffect(own, {})).startswith("Correct the reading of joint 2 before anything uses it")
+    class Bent(Law):
+        name, role, law, elements = "bent_sensor", "sensor", "b v", ("viscous",)
+        parameters = (Parameter("bend", "TAU*s/POS"),)
+
+    assert remedy(AddedEffect(Bent(2), {})).startswith(
+        "Correct the reading of joint 2 before anything uses it"
+    )

@@ -5,15 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 from exact_model import ExactModel
+from exact_parts import model_of
 from numpy.testing import assert_allclose
 
+from armloop.arm import load_arm
 from armloop.drake_systems.bounded_feedforward import bounded_reference
 from armloop.drake_systems.bounded_program import TOLERANCE
 from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.scenarios import load_plant, load_tracking
 from armloop.drake_systems.tracking import run_tracking
+from armloop.dynamics import Dynamics
 from armloop.errors import InputError, ScenarioError
-from armloop.excitation import places_reference
+from armloop.excitation import MotionRanges, fourier_reference, places_reference
+from armloop.library.friction import FrictionTerm
 
 PLACES = [[0.9, -0.7, 0.02, -0.3], [-0.6, 0.9, 0.02, 0.4]]
 
@@ -145,3 +149,22 @@ def test_what_is_wrong_with_limits_is_told(tmp_path):
         path.write_text(f"plant: three_axis\nlimits: {{{fields}}}\n")
         with pytest.raises(ScenarioError, match=rf"mine.yaml: {message}"):
             load_tracking(path)
+
+
+@pytest.mark.parametrize("kind", ["cubic", "quadratic", "viscous_forward"])
+def test_friction_that_is_not_linear_in_the_speed_is_in_the_torques(kind):
+    arm = load_arm("three_axis")
+    friction = (FrictionTerm("sign", 0.3), FrictionTerm("viscous", 0.5), FrictionTerm(kind, 1.5))
+    model = model_of(arm, friction=friction)
+    reference = fourier_reference(MotionRanges.of(arm), 4.0, 2)
+    dynamics, t = Dynamics(model), np.arange(0.0, 4.0, 0.01)
+    asked = np.abs(dynamics.torque(*reference.evaluate(t)))
+    effort = np.where([False, False, True], 0.85, 1.5) * asked.max(axis=0)
+    bounded = bounded_reference(reference, model, effort)
+    knots = bounded.deviation.time
+    assert (asked > effort).any(axis=0).tolist() == [False, False, True]
+    state = bounded.evaluate(knots)
+    # where no sign is open the torques told are those of the motion told, to second order in what the last round moved
+    slides = (np.abs(state[1]) > 0.1) & (np.abs(reference.evaluate(knots)[1]) > 0.1)
+    error = np.abs(bounded.torques - dynamics.torque(*state))[slides]
+    assert error.max() < 2e-3 * asked.max()

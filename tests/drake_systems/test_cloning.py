@@ -159,4 +159,4 @@ def test_a_reference_and_its_feedforward_are_constants_to_derivatives():
     for name in ("q_ref", "v_ref", "vdot_ref", "tau_ff"):
         value = dual.GetOutputPort(name).Eval(context)
         assert_allclose(ExtractValue(value).ravel(), source.GetOutputPort(name).Eval(own))
-    assert Feedforward(model, 3).Clone() is not None
+    assert Feedforward(model).Clone() is not None

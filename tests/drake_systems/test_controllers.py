@@ -126,7 +126,7 @@ def test_the_model_is_exchanged_in_one_line_while_the_arm_moves():
 
 def test_a_reference_knows_what_the_system_feedforward_would_say():
     model, reference = identified(), paper_reference()
-    source, system = ReferenceSource(reference, 1e-3, model, step=2), Feedforward(model, 3, 2)
+    source, system = ReferenceSource(reference, 1e-3, model, step=2), Feedforward(model, 2)
     a, b = source.CreateDefaultContext(), system.CreateDefaultContext()
     for t in (0.0, 0.4, 1.7, 39.0, 50.0):
         a.SetTime(t)

@@ -28,3 +28,9 @@ def test_its_documentation_is_complete(name: str) -> None:
     assert "port" in text and "(n,)" in text, "ports by name and size"
     assert "Scalar type" in text, "scalar types"
     assert "Not supported" in text or "cannot" in text, "what it does not do"
+
+
+@pytest.mark.parametrize("name", [name for name in SYSTEMS if f"{name}_" in room.__all__])
+def test_its_signature_names_its_arguments(name: str) -> None:
+    parameters = inspect.signature(SYSTEMS[name]).parameters
+    assert parameters and not {"args", "kwargs", "self", "converter"} & set(parameters)

@@ -35,6 +35,7 @@ from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import EFFECTS, Context
 from armloop.errors import ModelError
 from armloop.functions import MATH
+from armloop.library.friction import Sliding, torque_along
 
 ARM, SCARA = load_arm("three_axis"), load_arm("scara")
 PARAMETERS = {
@@ -46,6 +47,7 @@ PARAMETERS = {
     "load_dependent_friction": {"coefficient": 0.1},
     "quadratic_drag": {"coefficient": 0.2},
     "friction_drift": {"level": 0.3, "time_constant": 50.0},
+    "viscous_asymmetry": {"coefficient": -0.25},
     "joint_spring": {"stiffness": 1.5, "rest": 0.3},
     "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
     "presliding_hysteresis": {"level": 0.2, "width": 0.01},
@@ -78,9 +80,9 @@ def effect_torque(name):
 
 
 SYSTEMS = {
-    **{f"feedforward of {k}": lambda m=m: Feedforward(m(), m().arm.n) for k, m in STILL_MODELS.items()},
-    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), 4, stacked=True),
-    "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 3, 2),
+    **{f"feedforward of {k}": lambda m=m: Feedforward(m()) for k, m in STILL_MODELS.items()},
+    "feedforward of one port": lambda: Feedforward(STILL_MODELS["sparse terms"](), stacked=True),
+    "feedforward of step 2": lambda: Feedforward(STILL_MODELS["rigid body"](), 2),
     **{
         f"computed torque of {k}": lambda m=m: ComputedTorque(m(), AccelerationGains.critical(m().arm.n))
         for k, m in STILL_MODELS.items()
@@ -171,7 +173,7 @@ def test_a_diagram_with_it_can_be_cloned(name):
 def test_every_effect_but_the_sensors_has_a_system():
     acting = {name for name, kind in EFFECTS.items() if not kind.sensor}
     assert acting <= set(PARAMETERS)
-    with pytest.raises(ModelError, match="effect torque_offset: no law of q, v and vdot"):
+    with pytest.raises(ModelError, match="effect torque_offset: falsifies the record"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})
 
 
@@ -201,7 +203,9 @@ def test_an_effect_says_what_its_columns_say(name):
         q, v, vdot = (x[k].tolist() for x in (motion.q, motion.v, motion.vdot))
         tau = law.equations.torque(q, v, vdot) if law.equations else [0.0] * 3
         if law.friction is not None:
-            tau[law.joint] += law.friction(v[law.joint], np.sign(v[law.joint]), 0.0, motion.time[k])
+            along, terms = law.friction
+            x = Sliding(along.of(q), along.of(v), np.sign(along.of(v)), motion.time[k] - motion.time[0])
+            along.add(tau, torque_along(terms, x, 0.0, MATH))
         assert_allclose(tau, expected[k], atol=1e-12)
 
 
@@ -256,5 +260,5 @@ def test_a_model_of_numbers_alone_stays_float():
         def feedforward(self, q, v, vdot, step):
             return q
 
-    assert Feedforward(Numbers(), 2).ToAutoDiffXdMaybe() is None
+    assert Feedforward(Numbers(), n=2).ToAutoDiffXdMaybe() is None
     assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToSymbolicMaybe() is None

@@ -71,9 +71,9 @@ def test_the_record_has_the_fault_and_the_dynamics_do_not(name: str) -> None:
 def test_no_drake_system_has_the_fault(name: str) -> None:
     models, states = (model(name), model()), random_motion(3, 1, seed=5)
     q, v, vdot = states.q[0], states.v[0], states.vdot[0]
-    feed = [outputs(Feedforward(m, 3), [q, v, vdot]) for m in models]
+    feed = [outputs(Feedforward(m), [q, v, vdot]) for m in models]
     assert_array_equal(*feed)
-    differentiable = [Feedforward(m, 3).ToAutoDiffXd() for m in models]
+    differentiable = [Feedforward(m).ToAutoDiffXd() for m in models]
     assert_array_equal(*(outputs(system, [q, v, vdot]).astype(object) for system in differentiable))
     slopes = []
     for m in models:

@@ -2,12 +2,18 @@
 
 import numpy as np
 import pytest
+from exact_parts import model_of
 from numpy.testing import assert_allclose
+from pydrake.systems.framework import DiagramBuilder
 
+from armloop.arm import load_arm
+from armloop.drake_systems.closed_loop import add_arm_with_controller
 from armloop.drake_systems.feedforward import Feedforward
+from armloop.drake_systems.nearest_friction import nearest_friction
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.reference import ReferenceSource
 from armloop.excitation import paper_reference
+from armloop.library.friction import FrictionTerm
 
 
 class Recorder:
@@ -19,7 +25,7 @@ class Recorder:
 
 @pytest.mark.parametrize(("step", "expected"), [(1, 1.0), (2, 21.0), (3, 321.0)])
 def test_feedforward_takes_the_reference_on_named_ports(step, expected):
-    system = Feedforward(Recorder(), 2, step)
+    system = Feedforward(Recorder(), step, n=2)
     context = system.CreateDefaultContext()
     for name, value in (("q_ref", 1.0), ("v_ref", 2.0), ("vdot_ref", 3.0)):
         system.GetInputPort(name).FixValue(context, np.full(2, value))
@@ -67,3 +73,32 @@ def test_pid_reads_q_through_the_encoder():
 def test_gains_are_checked(bad):
     with pytest.raises(ValueError, match="at least 0, one per joint"):
         PidGains(*bad)
+
+
+def test_feedforward_knows_the_joints_of_its_model():
+    model = model_of(load_arm("three_axis"))
+    assert Feedforward(model).get_output_port().size() == 3
+    with pytest.raises(ValueError, match="knows its joints"):
+        Feedforward(model, 4)
+    with pytest.raises(ValueError, match="has 3 joints"):
+        Feedforward(model, n=1)
+    with pytest.raises(ValueError, match="say its number"):
+        Feedforward(Recorder())
+
+
+def test_a_controlled_arm_of_a_urdf_has_the_friction_of_its_model(repository):
+    urdf = repository / "urdf" / "three_axis.urdf"
+    model = model_of(load_arm(urdf))
+    gains, reference = PidGains.paper(3), paper_reference()
+    found = add_arm_with_controller(DiagramBuilder(), urdf, gains, reference, model).plant.friction
+    for f in found:
+        assert_allclose([f.static, f.coulomb, f.stribeck_velocity, f.viscous], [0.72, 0.55, 0.1, 2.65])
+    without = add_arm_with_controller(DiagramBuilder(), urdf, gains, reference).plant.friction
+    assert without != found
+    # a law of another form: the nearest of Eq. (34)
+    laws = (("hysteresis", 0.4, 1e-3), ("stribeck_peak", 0.3, 0.1), ("root", 0.2), ("viscous", 1.0))
+    other = tuple(FrictionTerm(*law) for law in laws)
+    v = np.linspace(0.05, 1.0, 50)
+    true = 0.4 + 0.3 * np.exp(-((v / 0.1) ** 2)) + 0.2 * np.sqrt(v) + v
+    for near in nearest_friction(model_of(load_arm(urdf), friction=other)):
+        assert np.abs(near.force(v) - true).max() < 0.05 * true.max()

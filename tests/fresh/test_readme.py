@@ -74,10 +74,12 @@ def test_every_command_and_the_python_run(tmp_path):
     for line in commands("armloop"):
         if "$UR10E" not in line:
             assert armloop(line, tmp_path).strip(), line
-    (example,) = blocks("python")
-    assert len([line for line in example.splitlines() if line.strip()]) <= 10
-    (tmp_path / "example.py").write_text(example, encoding="utf-8")
-    run([sys.executable, "example.py"], tmp_path)
+    whole_loop, diagram = blocks("python")
+    for example, lines in ((whole_loop, 15), (diagram, 10)):
+        assert len([line for line in example.splitlines() if line.strip()]) <= lines
+        (tmp_path / "example.py").write_text(example, encoding="utf-8")
+        run([sys.executable, "example.py"], tmp_path)
+    assert (tmp_path / "out" / "augmented.json").is_file() and (tmp_path / "out" / "arm.c").is_file()
     assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
 
 

@@ -7,10 +7,11 @@ import pytest
 from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.kinematics import nominal_parameters, regressor
+from armloop.library.friction import FRICTION_LAWS as LAWS
 from armloop.log import MotionLog
 from armloop.motion import Motion
 from armloop.reconstruction import Options, reconstruct
-from armloop.reconstruction.friction_ladder import LAWS, inner_folds, restricted, rungs
+from armloop.reconstruction.friction_ladder import inner_folds, restricted, rungs
 from armloop.signals import Conditioning, condition
 
 

@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction_system import PreslidingFriction, Stop
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.effects.base import number
 from armloop.library.friction import FrictionLaw
@@ -67,7 +67,7 @@ def BeyondBodies_(T: type) -> Any:
             state = self._state.Eval(context).tolist()
             q, v, still = state[:n], state[n:], [0.0] * n
             load = whole.load(q, v, still) if whole.load_matters else None
-            tau = whole.friction(v, load, context.get_time())
+            tau = whole.friction(v, load, context.get_time(), q)
             if self._bodies is not None:
                 more = zip(tau, whole.rigid(q, v, still), self._bodies.rigid(q, v, still), strict=True)
                 tau = [x + y - z for x, y, z in more]
@@ -76,7 +76,7 @@ def BeyondBodies_(T: type) -> Any:
     return Impl
 
 
-BeyondBodies = BeyondBodies_[None]
+BeyondBodies = with_signature(BeyondBodies_[None])
 
 
 def presliding_elements(model: ReconstructedModel) -> list[Stop]:

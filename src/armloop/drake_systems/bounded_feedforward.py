@@ -16,8 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 
 from armloop.drake_systems.bounded_program import Program
+from armloop.drake_systems.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.errors import InputError
 from armloop.excitation import Reference, TableReference
@@ -86,10 +88,10 @@ def bounded_reference(
     time = np.linspace(0.0, reference.duration, steps + 1)
     h = float(time[1])
     base = reference.evaluate(time)
-    equations = ModelEquations(model, NUMPY)
-    friction, slope, slow = _friction(equations, base[1])
-    level = np.abs(_friction(equations, _CREEP + 0 * base[1])[0])
-    dry = friction - slope * base[1]
+    equations = ModelEquations(model, NUMPY, sharp=True)
+    slopes = ModelEquations(model, functions_of(AutoDiffXd), sharp=True)
+    dry, _, slow = _dry_friction(equations, *base)
+    level = _dry_friction(equations, base[0], _CREEP + 0 * base[1], base[2])[1]
     d, torques = np.zeros((3, steps + 1, n)), base[0]
     for _ in range(_ROUNDS):
         slow |= np.sign(base[1] + d[1]) != np.sign(base[1])
@@ -98,8 +100,9 @@ def bounded_reference(
             raise InputError(f"{_NONE} {limits}: dry friction alone takes them; {_REMEDY}")
         # the torque about the present answer, told as a function of the whole deviation
         rigid, J = _derivatives(equations, *(x + y for x, y in zip(base, d, strict=True)))
-        J[1] = J[1] + slope[:, :, None] * np.eye(n)
-        tau = rigid + slope * (base[1] + d[1])
+        smooth, slope = _smooth_friction(equations, slopes, base[0] + d[0], base[1] + d[1])
+        J[1] = J[1] + slope
+        tau = rigid + smooth
         offset = tau - sum(np.einsum("kij,kj->ki", J[a], d[a]) for a in range(3))
         program = Program(h, offset, J, effort, rate, dry, np.where(slow, level, 0.0), reserve)
         found = program.solve()
@@ -133,14 +136,41 @@ def _derivatives(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> 
     return _torque(equations, q, v, vdot), J
 
 
-def _friction(equations: ModelEquations, v: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the friction (K, n) at velocities v, its slope where it slides, and where v is too slow to tell its sign."""
+def _dry_friction(
+    equations: ModelEquations, q: Array, v: Array, vdot: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the dry friction (K, n), its level, and where the sliding is too slow to tell its sign."""
+    dry, level, slow = np.zeros_like(v), np.zeros_like(v), np.zeros(v.shape, dtype=bool)
+    columns = [list(x.T) for x in (q, v, vdot)]
+    load = equations.load(*columns) if equations.load_matters else None
+    for along, size, _ in equations.dry_and_smooth(columns[0], columns[1], load):
+        w = along.of(columns[1])
+        for joint, part in ((along.joint, 1.0), (along.other, along.ratio)):
+            if part:
+                dry[:, joint] += part * size * np.sign(w)
+                level[:, joint] += np.abs(part * size)
+                slow[:, joint] |= np.abs(w) < _SLOW
+    return dry, level, slow
 
-    def at(speed: Array) -> Array:
-        columns = equations.friction(list(speed.T))
-        return np.stack([np.broadcast_to(x, len(speed)) for x in columns], axis=1)
 
-    # far from rest, where dry friction is level
-    way = np.where(v < 0, -1.0, 1.0)
-    slope = np.abs(at(v + 1.0 * way) - at(v + 0.5 * way)) / 0.5
-    return at(v), slope, np.abs(v) < _SLOW
+def _smooth_friction(
+    equations: ModelEquations, slopes: ModelEquations, q: Array, v: Array
+) -> tuple[Array, Array]:
+    """Return the smooth part of friction (K, n), such as drag, and its derivative by v (K, n, n), by AutoDiffXd.
+
+    Slower than `_SLOW` the derivative is that at this speed: some laws are infinitely steep at rest.
+    """
+    K, n = v.shape
+    tau, slope = np.zeros((K, n)), np.zeros((K, n, n))
+    for along, _, smooth in equations.dry_and_smooth(list(q.T), list(v.T)):
+        for joint, part in ((along.joint, 1.0), (along.other, along.ratio)):
+            tau[:, joint] += part * smooth if part else 0.0
+    faster = np.where(v < 0, -1.0, 1.0) * np.maximum(np.abs(v), _SLOW)
+    for k in range(K):
+        speeds = InitializeAutoDiff(faster[k]).ravel().tolist()
+        for along, _, smooth in slopes.dry_and_smooth(q[k].tolist(), speeds):
+            if isinstance(smooth, AutoDiffXd):
+                for joint, part in ((along.joint, 1.0), (along.other, along.ratio)):
+                    if part:
+                        slope[k, joint] += part * smooth.derivatives()
+    return tau, slope

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,14 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.nearest_friction import nearest_friction
 from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.rate_limiter import RateLimiter
 from armloop.drake_systems.reference import ReferenceSource
-from armloop.drake_systems.scenarios import Plant, plant_for
+from armloop.drake_systems.scenarios import Plant, plant_for, plant_names
 from armloop.excitation import Reference
+from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 
@@ -90,8 +92,8 @@ def add_arm_with_controller(
 
     The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
 
-    arm : a plant of `scenarios.load_plant`; or a built-in name or the path of a URDF, then with the friction
-        and encoders of `scenarios.plant_for`
+    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, then with the
+        friction of a reconstructed `model` (`nearest_friction`), without one that of `scenarios.plant_for`
     gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
     model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
@@ -100,7 +102,7 @@ def add_arm_with_controller(
     Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains, reference, model and controller do
     not fit each other.
     """
-    spec = arm if isinstance(arm, Plant) else plant_for(arm)
+    spec = arm if isinstance(arm, Plant) else _plant(arm, model)
     n, config, period = spec.arm.n, spec.config, spec.config.time_step
     _check_controller(controller, gains, model, step)
     source = ReferenceSource(reference, period, model if controller == "pid" else None, step)
@@ -128,6 +130,14 @@ def add_arm_with_controller(
         builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
     builder.Connect(drives.GetOutputPort("tau"), plant.GetInputPort("tau"))
     return ControlledArm(plant, source, law, drives if drives is not law else None)
+
+
+def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
+    """The plant of an arm; one of a URDF, which says nothing of dry friction, has that of its model."""
+    plant = plant_for(spec)
+    if str(spec) in plant_names() or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
+        return plant
+    return replace(plant, config=replace(plant.config, friction=nearest_friction(model)))
 
 
 def _check_controller(

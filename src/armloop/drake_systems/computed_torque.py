@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 
@@ -167,7 +167,7 @@ def ComputedTorque_(T: type) -> Any:
                 return tau
             equations = self._equations
             load = equations.load(q, v, vdot) if equations.load_matters else None
-            friction = equations.friction(sliding, load)
+            friction = equations.friction(sliding, load, q=q)
             return vector(T, [x + y for x, y in zip(equations.rigid(q, v, vdot), friction, strict=True)])
 
         def _integral(self, context: Any) -> np.ndarray:
@@ -191,4 +191,4 @@ def ComputedTorque_(T: type) -> Any:
     return Impl
 
 
-ComputedTorque = ComputedTorque_[None]
+ComputedTorque = with_signature(ComputedTorque_[None])

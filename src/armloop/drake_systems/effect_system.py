@@ -12,11 +12,11 @@ from pydrake.systems.primitives import Adder
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.arm import Arm
-from armloop.drake_systems.scalars import functions_of, vector, within
-from armloop.dynamics import EffectLaw, contact_equations, effect_law
-from armloop.dynamics.own_effects import OwnEffectEquations
-from armloop.effects import Value
+from armloop.drake_systems.scalars import functions_of, vector, with_signature, within
+from armloop.dynamics import effect_law
+from armloop.effects import Value, effect_kind
 from armloop.effects.base import number
+from armloop.library.friction import Sliding, torque_along
 
 
 @TemplateSystem.define("EffectTorque_")
@@ -24,13 +24,13 @@ def EffectTorque_(T: type) -> Any:
     """Return the class for one scalar type."""
 
     class Impl(LeafSystem_[T]):
-        """The torque of one listed effect: of a payload, a spring, a ripple, additional friction, ..
+        """The torque of one effect, listed or a user's own: of a payload, a spring, a ripple, additional friction, ..
 
         tau = law(q, v, vdot), what the drive must supply because of it (see `armloop.effects`);
         force = -tau, what it does to the arm.
 
-        Input ports: `state` (2n,) positions, then velocities; `vdot` (n,), only for `payload`, `rotor_inertia` and
-        `transmission_coupling`, whose torque depends on it. Output ports: `tau` (n,), to add to a feedforward; `force`
+        Input ports: `state` (2n,) positions, then velocities; `vdot` (n,), only for effects whose torque depends on it, such
+        as `payload` and `rotor_inertia`. Output ports: `tau` (n,), to add to a feedforward; `force`
         (n,), to add to a plant's applied generalized forces (`add_joint_forces`). N*m (N). Stateless; time enters where
         the law knows it. Scalar types float, AutoDiffXd and Expression.
 
@@ -65,20 +65,14 @@ def EffectTorque_(T: type) -> Any:
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = arm, name, joint, dict(parameters)
             self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
-            self._interval: tuple[float, float] | None = None
-            if name == "external_contact":
-                self._law = EffectLaw(contact_equations(arm, parameters["force"], functions_of(T)))
-                self._interval = number(parameters["start"]), number(parameters["end"])
-            else:
-                self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
+            self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
+            event = effect_kind(name).role == "event"
+            self._interval = (number(parameters["start"]), number(parameters["end"])) if event else None
             n = self._n = arm.n
             self._state = self.DeclareVectorInputPort("state", 2 * n)
-            equations = self._law.equations
-            inertia = name in ("payload", "rotor_inertia", "transmission_coupling") or (
-                isinstance(equations, OwnEffectEquations) and equations.has_inertia
-            )
-            self._vdot = self.DeclareVectorInputPort("vdot", n) if inertia else None
-            by_load = name == "load_dependent_friction"
+            self._vdot = self.DeclareVectorInputPort("vdot", n) if self._law.has_inertia else None
+            rubbing = self._law.friction.terms if self._law.friction else ()
+            by_load = any(t.element.by_load for t in rubbing)
             self._load = self.DeclareVectorInputPort("load", n) if by_load else None
             sources = {self.all_input_ports_ticket(), self.time_ticket()}
             for port, factor in (("tau", 1.0), ("force", -1.0)):
@@ -98,10 +92,12 @@ def EffectTorque_(T: type) -> Any:
                     q, v, still if self._vdot is None else self._vdot.Eval(context).tolist()
                 )
             if law.friction is not None:
-                j = law.joint
-                sign = functions_of(T).tanh(v[j] / self._options["smoothing"])
-                load = 0.0 if self._load is None else self._load.Eval(context).tolist()[j]
-                tau[j] = tau[j] + law.friction(v[j], sign, load, context.get_time())
+                along, terms = law.friction
+                w, functions = along.of(v), functions_of(T)
+                sign = functions.tanh(w / self._options["smoothing"])
+                load = 0.0 if self._load is None else self._load.Eval(context).tolist()[along.joint]
+                x = Sliding(along.of(q), w, sign, context.get_time())
+                along.add(tau, torque_along(terms, x, load, functions, sharp=False))
             if self._interval is not None:
                 factor = factor * within(T, context.get_time(), *self._interval)
             output.SetFromVector(vector(T, [factor * x for x in tau]))
@@ -109,7 +105,7 @@ def EffectTorque_(T: type) -> Any:
     return Impl
 
 
-EffectTorque = EffectTorque_[None]
+EffectTorque = with_signature(EffectTorque_[None])
 
 
 def add_joint_forces(

@@ -10,7 +10,7 @@ from armloop.arm import Arm
 from armloop.components import RigidBody
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
-from armloop.effects import Estimate, effect
+from armloop.effects import Estimate
 from armloop.kinematics import nominal_parameters
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
@@ -38,8 +38,11 @@ def exact_model(
     )
     added = tuple(
         AddedEffect(
-            effect(e.name, e.joint),
-            {key: Estimate(np.asarray(value).tolist(), 0.0, "") for key, value in e.parameters.items()},
+            e.build(),
+            {
+                key: Estimate(np.asarray(value).tolist(), (0.0 * np.asarray(value)).tolist(), "")
+                for key, value in e.parameters.items()
+            },
         )
         for e in effects
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 
@@ -51,18 +51,24 @@ def Feedforward_(T: type) -> Any:
         def _construct(
             self,
             model: FeedforwardModel,
-            n: int,
             step: int = 3,
             *,
+            n: int | None = None,
             stacked: bool = False,
             converter: Any = None,
         ) -> None:
-            """model : see `FeedforwardModel`; n : its joints; step : 1, 2 or 3; stacked : one input port."""
+            """model : see `FeedforwardModel`; step : 1, 2 or 3; n : joints of a model without an arm; stacked : one port.
+
+            Raises `ValueError` for another step, or where the model's number of joints is not known or not n.
+            """
+            n = _joints(model, n)
+            if step not in (1, 2, 3):
+                raise ValueError(f"step is {step!r}; it must be 1, 2 or 3 (a model knows its joints)")
             if not isinstance(model, ReconstructedModel):
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments, self._n, self._stacked = (model, n, step), n, stacked
+            self._arguments, self._n, self._stacked = (model, step), n, stacked
             if T is float:
                 self._drive = (_stacked_drive if stacked else _drive)(model, step)
             else:
@@ -79,10 +85,10 @@ def Feedforward_(T: type) -> Any:
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
             self._arguments = model, *self._arguments[1:]
-            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[2])
+            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[1])
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, stacked=other._stacked, converter=converter)
+            Impl._construct(self, *other._arguments, n=other._n, stacked=other._stacked, converter=converter)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
             q, v, vdot = self._inputs
@@ -107,7 +113,19 @@ def Feedforward_(T: type) -> Any:
     return Impl
 
 
-Feedforward = Feedforward_[None]
+Feedforward = with_signature(Feedforward_[None])
+
+
+def _joints(model: FeedforwardModel, n: int | None) -> int:
+    """The number of joints of a model, or as it is said to be."""
+    known: int | None = getattr(getattr(model, "arm", None), "n", None)
+    if known is None:
+        if n is None:
+            raise ValueError(f"{type(model).__name__} has no arm: say its number of joints with n=")
+        return n
+    if n is not None and known != n:
+        raise ValueError(f"n is {n}; the model's arm has {known} joints")
+    return int(known)
 
 
 def _drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:

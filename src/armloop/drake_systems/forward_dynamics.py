@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
 
@@ -91,4 +91,4 @@ def ForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-ForwardDynamics = ForwardDynamics_[None]
+ForwardDynamics = with_signature(ForwardDynamics_[None])

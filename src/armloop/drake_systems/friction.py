@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from armloop.functions import NUMPY, Functions
+from armloop.library.friction import stribeck_fall
 
 
 @dataclass(frozen=True)
@@ -35,11 +39,16 @@ class JointFriction:
         if self.stribeck_velocity <= 0:
             raise ValueError(f"stribeck_velocity {self.stribeck_velocity} must be above 0")
 
+    def level(self, v: Any, functions: Functions = NUMPY) -> Any:
+        """Return the level of the dry part at `v`, a number of any kind."""
+        return self.coulomb + (self.static - self.coulomb) * stribeck_fall(
+            v, self.stribeck_velocity, functions
+        )
+
     def dry(self, v: ArrayLike) -> NDArray[np.float64]:
         """Return the part with sign(v) at `v` (any shape); 0 at rest, where it is not determined."""
         v = np.asarray(v, dtype=float)
-        level = self.coulomb + (self.static - self.coulomb) * np.exp(-((v / self.stribeck_velocity) ** 2))
-        return np.asarray(level * np.sign(v))
+        return np.asarray(self.level(v) * np.sign(v))
 
     def force(self, v: ArrayLike) -> NDArray[np.float64]:
         """Return f(v), what the drive must supply to keep sliding at `v` (any shape)."""

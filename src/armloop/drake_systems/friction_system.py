@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import pydrake.math as drake_math
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
+from armloop.library.hysteresis import stop_step
 
 
 @TemplateSystem.define("JointFrictionSystem_")
@@ -47,18 +47,17 @@ def JointFrictionSystem_(T: type) -> Any:
 
         def _calc_force(self, context: Any, output: Any) -> None:
             friction, smoothing = self._arguments
-            exp, tanh = functions_of(T).exp, functions_of(T).tanh
-            force = []
-            for f, v in zip(friction, self._state.Eval(context).tolist()[self._n :], strict=True):
-                x = v / f.stribeck_velocity
-                level = f.coulomb + (f.static - f.coulomb) * exp(-x * x)
-                force.append(-(level * tanh(v / smoothing) + f.viscous * v))
+            functions = functions_of(T)
+            force = [
+                -(f.level(v, functions) * functions.tanh(v / smoothing) + f.viscous * v)
+                for f, v in zip(friction, self._state.Eval(context).tolist()[self._n :], strict=True)
+            ]
             output.SetFromVector(vector(T, force))
 
     return Impl
 
 
-JointFrictionSystem = JointFrictionSystem_[None]
+JointFrictionSystem = with_signature(JointFrictionSystem_[None])
 
 
 class Stop(NamedTuple):
@@ -119,7 +118,7 @@ def PreslidingFriction_(T: type) -> Any:
             q = self._state.Eval(context).tolist()[:n]
             memory = context.get_discrete_state_vector().CopyToVector().tolist()
             z = [
-                drake_math.max(drake_math.min(last + q[e.joint - 1] - memory[e.joint - 1], e.width), -e.width)
+                stop_step(last, q[e.joint - 1] - memory[e.joint - 1], e.width, functions_of(T))
                 for e, last in zip(elements, memory[n:], strict=True)
             ]
             return q, z
@@ -138,7 +137,7 @@ def PreslidingFriction_(T: type) -> Any:
     return Impl
 
 
-PreslidingFriction = PreslidingFriction_[None]
+PreslidingFriction = with_signature(PreslidingFriction_[None])
 
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:
@@ -147,5 +146,5 @@ def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:
         Stop(j + 1, float(term.coefficient), float(term.parameter))
         for j, joint in enumerate(terms)
         for term in joint
-        if term.kind == "hysteresis"
+        if term.element.way == "memory" and not term.by_load
     ]

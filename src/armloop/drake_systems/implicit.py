@@ -10,6 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from armloop.library.friction import Direction
+
+STICKING_GAIN = 1e8
+"""A sticking joint creeps at its load divided by this, N*m*s/rad (N*s/m)."""
+
 _EDGE = 1e-9  # of a limit: on the edge between two pieces both are right
 _TOGETHER, _ENOUGH = 8, 2000
 
@@ -29,6 +34,15 @@ class ClampedLaw(NamedTuple):
     limit: float
     other: int = -1
     ratio: float = 0.0
+
+    @staticmethod
+    def dry(along: Direction, level: float) -> ClampedLaw:
+        """Return dry friction of a level along a direction: a joint that sticks creeps at its load / `STICKING_GAIN`."""
+        return ClampedLaw(along.joint, 0.0, STICKING_GAIN, level, along.other, along.ratio)
+
+    def speed(self, v: Sequence[float]) -> float:
+        """Return w of the joints' velocities (n,)."""
+        return v[self.joint] + self.ratio * v[self.other] if self.ratio else v[self.joint]
 
     def piece(self, w: float) -> int:
         """Return which of the law's three straight pieces w is on: 0 the steep one, +-1 a limit."""

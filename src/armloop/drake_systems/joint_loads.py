@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,17 +15,21 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from armloop.drake_systems.effects import DryFriction, Realisation
+from armloop.drake_systems.effects import Realisation
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
 from armloop.drake_systems.own_effects import Law
 from armloop.drake_systems.scalars import functions_of, vector
 from armloop.dynamics.model import solve
+from armloop.effects.base import Placed
+from armloop.functions import MATH, Functions
+from armloop.library.friction import Acting, Direction, Sliding, torque_along
+from armloop.library.hysteresis import stop_step
 
 Array = NDArray[np.float64]
 
-STICKING_GAIN = 1e8
-"""A sticking joint creeps at its load divided by this, N*m*s/rad (N*s/m)."""
+_STEP = 1e-5  # rad/s (m/s), of the slope of what is smooth
+_LOAD_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,9 @@ def JointLoads_(T: type) -> Any:
 
         h is the plant's time step, w the velocity at its end: the plant's own step is predicted, so that joints
         really stick and servos may be stiff (see `implicit`). f is the dry part of Eq. (34) with the sign of w and
-        the level at the velocity of the step's start. The servo is there in speed mode only. Effects are springs,
-        ripples, drag, contacts, elasto-plastic elements, shared motors and further dry friction (see `effects`).
+        the level at the velocity of the step's start. The servo is there in speed mode only. Of an effect's law along a
+        direction the dry part adds to that level, what is smooth in w is taken to first order about the step's start, and
+        what depends on the position, elasto-plastic elements and contacts at it (see `effects`).
 
         Input ports: `state` (2n,) positions, then velocities; torque mode: `tau` (n,) of the drives, clamped here
         as in the plant; speed mode: `desired_state` (2n,) at the end of the step. Output port `load` (n,).
@@ -89,21 +94,25 @@ def JointLoads_(T: type) -> Any:
             self._effort = [drive.effort_limit() for drive in drives]
             self._damping = [self._step * drive.joint().default_damping() for drive in drives]
             # Python's own floats throughout: numpy's scalars take three times as long.
-            self._dry = [
-                _DryLaw(j, f, dry)
-                for j, (f, dry) in enumerate(zip(friction, effects.dry, strict=True))
-                if f.static > 0 or dry.stribeck or dry.by_load or dry.fading
+            self._rubbing = _rubbing(friction, effects.laws)
+            self._explicit_laws = [
+                Placed(along, tuple(t for t in terms if t.element.part == "position"))
+                for along, terms in effects.laws
+                if any(t.element.part == "position" for t in terms)
             ]
-            self._by_load = any(law.by_load for law in self._dry)
-            self._constant = [-dry.constant for dry in effects.dry]
-            self._quadratic = [(j, float(c)) for j, c in enumerate(effects.quadratic) if c]
-            self._springs = [(int(j), k, rest) for j, k, rest in effects.springs.tolist()]
-            self._ripples = [(int(j), a, order, phase) for j, a, order, phase in effects.ripples.tolist()]
-            self._presliding = [(int(j), level, width) for j, level, width in effects.presliding.tolist()]
-            self._couplings = [(int(j), int(k), *rest) for j, k, *rest in effects.couplings.tolist()]
-            self._contacts = [
-                (start, end, np.array(force)) for start, end, *force in effects.contacts.tolist()
+            self._memories = [
+                (along, term)
+                for along, terms in effects.laws
+                for term in terms
+                if term.element.way == "memory"
             ]
+            self._rotors = [
+                (along, t.coefficient)
+                for along, terms in effects.laws
+                for t in terms
+                if t.element.part == "inertia"
+            ]
+            self._contacts = effects.contacts
             self._tool = np.zeros(3) if X_tool is None else np.asarray(X_tool)[:3, 3]
             self._laws = [*effects.own, *([] if law is None else [law])]
             self._servo = servo
@@ -113,9 +122,9 @@ def JointLoads_(T: type) -> Any:
             else:
                 self._command = self.DeclareVectorInputPort("desired_state", 2 * n)
             self.DeclareVectorOutputPort("load", n, self._calc_load)
-            if self._presliding:
+            if self._memories:
                 # Not a number until the first step: an element is relaxed where the motion starts.
-                self.DeclareDiscreteState(np.full(2 * len(self._presliding), np.nan))
+                self.DeclareDiscreteState(np.full(2 * len(self._memories), np.nan))
                 self.DeclarePeriodicDiscreteUpdateEvent(self._step, 0.0, self._stretch_on)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
@@ -124,40 +133,37 @@ def JointLoads_(T: type) -> Any:
 
         def relax(self, context: Any) -> None:
             """Let elasto-plastic elements forget what they went through."""
-            if self._presliding:
-                forgotten = [math.nan] * (2 * len(self._presliding))
+            if self._memories:
+                forgotten = [math.nan] * (2 * len(self._memories))
                 context.get_mutable_discrete_state_vector().SetFromVector(vector(T, forgotten))
 
         def _stretches(self, context: Any, q: list[float]) -> list[float]:
             """Stretch of each elasto-plastic element now."""
             past = context.get_discrete_state_vector().CopyToVector().tolist()
             now = []
-            for k, (j, _, width) in enumerate(self._presliding):
+            for k, (along, term) in enumerate(self._memories):
                 before, stretch = past[2 * k : 2 * k + 2]
-                now.append(0.0 if before != before else min(max(stretch + q[j] - before, -width), width))
+                new = before != before
+                now.append(
+                    0.0 if new else stop_step(stretch, along.of(q) - before, term.parameter, functions_of(T))
+                )
             return now
 
         def _stretch_on(self, context: Any, values: Any) -> None:
             q = self._state.Eval(context).tolist()
-            stretches = self._stretches(context, q)
-            pairs = zip(self._presliding, stretches, strict=True)
-            values.set_value(vector(T, [x for (j, _, _), stretch in pairs for x in (q[j], stretch)]))
+            pairs = zip(self._memories, self._stretches(context, q), strict=True)
+            values.set_value(vector(T, [x for (along, _), z in pairs for x in (along.of(q), z)]))
 
         def _explicit(self, context: Any, q: list[float], v: list[float]) -> list[float]:
             """What the effects do that is soft enough to be taken at the step's start."""
-            load = list(self._constant)
-            for j, stiffness, rest in self._springs:
-                load[j] -= stiffness * (q[j] - rest)
-            sin = functions_of(T).sin
-            for j, amplitude, order, phase in self._ripples:
-                load[j] -= amplitude * sin(order * q[j] + phase)
-            for j, drag in self._quadratic:
-                load[j] -= drag * v[j] * abs(v[j])
-            if self._presliding:
-                for (j, level, width), stretch in zip(
-                    self._presliding, self._stretches(context, q), strict=True
-                ):
-                    load[j] -= level * stretch / width
+            load, functions = [0.0] * self._n, functions_of(T)
+            for along, terms in self._explicit_laws:
+                x = Sliding(along.of(q), 0.0, 0.0)
+                along.add(load, -torque_along(terms, x, 0.0, functions))
+            if self._memories:
+                for (along, term), z in zip(self._memories, self._stretches(context, q), strict=True):
+                    x = Sliding(along.of(q), along.of(v), z / term.parameter, context.get_time())
+                    along.add(load, -torque_along([term], x, 0.0, functions))
             for law in self._laws:
                 load = [x - y for x, y in zip(load, law(q, v), strict=True)]
             for start, end, force in self._contacts:
@@ -178,34 +184,42 @@ def JointLoads_(T: type) -> Any:
 
         def _calc_load(self, context: Any, output: Any) -> None:
             # Called every step: for a handful of joints plain floats are several times faster than arrays.
-            x = self._state.Eval(context)
+            known = self._state.Eval(context)
             command = self._command.Eval(context).tolist()
-            state = x.tolist()
+            state = known.tolist()
             n, h, servo = self._n, self._step, self._servo
             q, v = state[:n], state[n:]
             plant, scratch = self._plant, self._scratch
-            plant.SetPositionsAndVelocities(scratch, x)
-            load = self._explicit(context, q, v)
+            plant.SetPositionsAndVelocities(scratch, known)
+            load, functions = self._explicit(context, q, v), functions_of(T)
 
             inertia = plant.CalcMassMatrix(scratch)
             bias = plant.CalcBiasTerm(scratch) - plant.CalcGravityGeneralizedForces(scratch)
-            momentum = (inertia.dot(x[n:]) - h * bias).tolist()
+            momentum = (inertia.dot(known[n:]) - h * bias).tolist()
             A = inertia.tolist()
             laws: list[ClampedLaw] = []
-            exp = functions_of(T).exp
             pieces: list[int] = []
-            for law in self._dry:
+            for along, rotor in self._rotors:
+                speed = along.of(v)
                 laws.append(
-                    ClampedLaw(
-                        law.joint, 0.0, STICKING_GAIN, law.level(v[law.joint], context.get_time(), exp)
-                    )
+                    ClampedLaw(along.joint, rotor * speed / h, rotor / h, math.inf, along.other, along.ratio)
                 )
-                pieces.append(laws[-1].piece(v[law.joint]))
-            for j, k, ratio, rotor, viscous, coulomb in self._couplings:
-                speed = v[j] + ratio * v[k]
-                laws.append(ClampedLaw(j, rotor * speed / h, rotor / h + viscous, math.inf, k, ratio))
-                laws.append(ClampedLaw(j, 0.0, STICKING_GAIN, coulomb, k, ratio))
-                pieces += [0, laws[-1].piece(speed)]
+                pieces.append(0)
+            by_load = []
+            for rubbing in self._rubbing:
+                along, w = rubbing.along, rubbing.along.of(v)
+                x = Sliding(along.of(q), w, 1.0, context.get_time())
+                level, more = rubbing.level(x, functions), rubbing.more
+                if rubbing.smooth:
+                    torque, slope = rubbing.smoothly(x, functions)
+                    laws.append(
+                        ClampedLaw(along.joint, slope * w - torque, slope, math.inf, along.other, along.ratio)
+                    )
+                    pieces.append(0)
+                if more:
+                    by_load.append((len(laws), along, level, torque_along(more, x, 1.0, functions)))
+                laws.append(ClampedLaw.dry(along, max(level, 0.0)))
+                pieces.append(laws[-1].piece(w))
             for j in range(n):
                 A[j][j] += self._damping[j]
                 limit, acting = self._effort[j], load[j]
@@ -217,13 +231,12 @@ def JointLoads_(T: type) -> Any:
                     pieces.append(0)
                 momentum[j] += h * acting
             implicit = implicit_torques(A, momentum, laws, pieces, h)
-            if self._by_load:
-                # The load hangs on the acceleration, that on the friction: twice is enough, friction is the smaller part.
+            for _ in range(_LOAD_ROUNDS if by_load else 0):
+                # The load hangs on the acceleration, that on the friction, which is the smaller part.
                 w = solve(A, [p + h * tau for p, tau in zip(momentum, implicit, strict=True)])
-                passing = [abs(y) for y in (inertia.dot(np.array(w) - x[n:]) / h + bias).tolist()]
-                for index, law in enumerate(self._dry):
-                    more = law.by_load * passing[law.joint]
-                    laws[index] = laws[index]._replace(limit=laws[index].limit + more)
+                passing = [abs(y) for y in (inertia.dot(np.array(w) - known[n:]) / h + bias).tolist()]
+                for index, along, level, part in by_load:
+                    laws[index] = ClampedLaw.dry(along, max(level + part * passing[along.joint], 0.0))
                 implicit = implicit_torques(A, momentum, laws, pieces, h)
             output.SetFromVector(vector(T, [x + y for x, y in zip(load, implicit, strict=True)]))
 
@@ -233,20 +246,52 @@ def JointLoads_(T: type) -> Any:
 JointLoads = JointLoads_[None]
 
 
-class _DryLaw:
-    """Level of one joint's dry friction."""
+class _Rubbing:
+    """What rubs along one direction: a joint's Eq. (34) without its viscous part, and the effects' elements.
 
-    def __init__(self, joint: int, friction: JointFriction, more: DryFriction) -> None:
-        self.joint, self.by_load = joint, float(more.by_load)
-        self._coulomb = float(friction.coulomb)
-        excesses = [(friction.static - friction.coulomb, friction.stribeck_velocity), *more.stribeck]
-        self._excesses = [(float(d), 1.0 / float(vs)) for d, vs in excesses if d]
-        self._fading = [(float(f), 1.0 / float(T)) for f, T in more.fading]
+    smooth : whether a part of it does not turn with the sliding; it is taken to first order about the step's start
+    more : elements that grow with the load
+    """
 
-    def level(self, v: Any, time: Any, exp: Callable[[Any], Any]) -> Any:
-        level = self._coulomb
-        for excess, inverse in self._excesses:
-            level += excess * exp(-((v * inverse) ** 2))
-        for fading, inverse in self._fading:
-            level += fading * exp(-time * inverse)
-        return level
+    def __init__(self, along: Direction, friction: JointFriction | None, terms: Sequence[Acting]) -> None:
+        self.along, self._friction = along, friction
+        own = [t for t in terms if t.element.part == "friction" and t.element.way != "memory"]
+        self._terms = [t for t in own if not t.element.by_load]
+        self.more = [t for t in own if t.element.by_load]
+        states = (Sliding(0.3, w, 1.0, 1.0) for w in (-0.7, 0.2))
+        self.smooth = any(self._smooth(x, MATH) != 0.0 for x in states)
+
+    def __bool__(self) -> bool:
+        eq34 = self._friction is not None and self._friction.static > 0
+        return eq34 or bool(self._terms) or bool(self.more)
+
+    def level(self, x: Sliding, functions: Functions) -> Any:
+        """Level of the dry part without what grows with the load."""
+        own = 0.0 if self._friction is None else self._friction.level(x.v, functions)
+        if not self._terms:
+            return own
+        forward, backward = self._ends(x, functions)
+        return own + 0.5 * (forward - backward)
+
+    def smoothly(self, x: Sliding, functions: Functions) -> tuple[Any, Any]:
+        """What is smooth, and its slope where it resists."""
+        up, down = (self._smooth(x._replace(v=x.v + step), functions) for step in (_STEP, -_STEP))
+        return self._smooth(x, functions), max((up - down) / (2.0 * _STEP), 0.0)
+
+    def _smooth(self, x: Sliding, functions: Functions) -> Any:
+        forward, backward = self._ends(x, functions)
+        return 0.5 * (forward + backward)
+
+    def _ends(self, x: Sliding, functions: Functions) -> list[Any]:
+        return [torque_along(self._terms, x._replace(sign=s), 0.0, functions) for s in (1.0, -1.0)]
+
+
+def _rubbing(friction: Sequence[JointFriction], laws: Sequence[Placed]) -> list[_Rubbing]:
+    """What rubs along each joint, and each direction that two share."""
+    terms: dict[Direction, list[Acting]] = {Direction(j): [] for j in range(len(friction))}
+    for law in laws:
+        terms.setdefault(law.along, []).extend(law.terms)
+    found = [
+        _Rubbing(along, None if along.ratio else friction[along.joint], own) for along, own in terms.items()
+    ]
+    return [rubbing for rubbing in found if rubbing]

@@ -73,7 +73,7 @@ def model_posture(model: ReconstructedModel, q0: ArrayLike) -> tuple[Array, Arra
     equations = ModelEquations(model, MATH, symmetric=True)
     q, n = np.asarray(q0, dtype=float).tolist(), model.arm.n
     speed = np.where(model.arm.revolute, 1.0, 0.1)
-    fast, slow = (equations.friction((part * speed).tolist()) for part in (1.0, 0.5))
+    fast, slow = (equations.friction((part * speed).tolist(), q=q) for part in (1.0, 0.5))
     F = np.diag((np.array(fast, dtype=float) - np.array(slow, dtype=float)) / (0.5 * speed))
     h, columns = 1e-5, []
     for e in np.eye(n):

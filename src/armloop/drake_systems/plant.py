@@ -9,6 +9,7 @@ well, but Drake then solves a contact problem at every step: twice the time of t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +84,10 @@ class ArmPlant(Diagram):
         self.arm = arm
         self._servo, self._law = servo, law
         self.effects = realise(arm, effects)
-        self.friction = _with_effects(friction, self.effects)
+        self.friction = tuple(
+            replace(f, viscous=f.viscous + more)
+            for f, more in zip(friction, self.effects.viscous, strict=True)
+        )
         builder = DiagramBuilder()
         self.plant: MultibodyPlant = builder.AddNamedSystem("plant", MultibodyPlant(time_step))
         add_links(self.plant, arm, self.effects)
@@ -164,8 +168,8 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
             reason = " ".join(str(error).split())
             raise ArmError(f"{arm.name}: link of {joint.name} has no possible inertia: {reason}") from error
         if effects is not None and i == arm.n - 1:
-            for mass, com in effects.payloads:
-                inertia += _ball(mass, com)
+            for mass, com, own in effects.payloads:
+                inertia += _payload(mass, com, own)
         if i == arm.n - 1 and inertia.get_mass() <= 0:
             raise ArmError(f"{arm.name}: the last link has no mass; give it one to simulate the arm")
         body = plant.AddRigidBody(f"link_{i + 1}", instance, inertia)
@@ -181,14 +185,6 @@ def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = Non
     plant.mutable_gravity_field().set_gravity_vector(R_WB.T @ arm.gravity)
 
 
-def _with_effects(friction: Sequence[JointFriction], effects: Realisation) -> tuple[JointFriction, ...]:
-    """Friction of Eq. (34) with what effects change of its numbers; the rest of their friction is not of its form."""
-    return tuple(
-        JointFriction(f.static + dry.level, f.coulomb + dry.level, f.stribeck_velocity, f.viscous + viscous)
-        for f, dry, viscous in zip(friction, effects.dry, effects.viscous, strict=True)
-    )
-
-
 def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:
     """Return a link's spatial inertia; `inertia` is about the link frame's origin."""
     if mass <= 0:
@@ -201,11 +197,13 @@ def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:
     return SpatialInertia(mass, com, unit)
 
 
-def _ball(mass: float, com: Array) -> SpatialInertia:
-    """Return a steel ball's spatial inertia about the link frame's origin."""
+def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
+    """Return a payload's spatial inertia about the link frame's origin; a steel ball's where `own` is not known."""
     if mass <= 0:
         return SpatialInertia.Zero()
-    return SpatialInertia.SolidSphereWithDensity(PAYLOAD_DENSITY, _radius(mass)).Shift(-com)
+    if own is None:
+        return SpatialInertia.SolidSphereWithDensity(PAYLOAD_DENSITY, _radius(mass)).Shift(-com)
+    return SpatialInertia(mass, np.zeros(3), UnitInertia(*[own / mass] * 3)).Shift(-com)
 
 
 def _radius(mass: float) -> float:

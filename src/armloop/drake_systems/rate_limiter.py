@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from armloop.drake_systems.scalars import vector
+from armloop.drake_systems.scalars import vector, with_signature
 
 
 @TemplateSystem.define("RateLimiter_")
@@ -74,4 +74,4 @@ def RateLimiter_(T: type) -> Any:
     return Impl
 
 
-RateLimiter = RateLimiter_[None]
+RateLimiter = with_signature(RateLimiter_[None])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,11 +13,18 @@ from pydrake.symbolic import Expression, if_then_else
 
 from armloop.functions import MATH, Functions
 
+
+def _clip(x: Any, lower: Any, upper: Any) -> Any:
+    return drake_math.max(drake_math.min(x, upper), lower)
+
+
 _COMMON = (drake_math.sin, drake_math.cos, drake_math.exp, drake_math.tanh, drake_math.sqrt)
 _FUNCTIONS: dict[type, Functions] = {
     float: MATH,
-    AutoDiffXd: Functions(*_COMMON, lambda x: float(x > 0.0) - float(x < 0.0)),
-    Expression: Functions(*_COMMON, lambda x: if_then_else(x > 0.0, 1.0, if_then_else(x < 0.0, -1.0, 0.0))),
+    AutoDiffXd: Functions(*_COMMON, lambda x: float(x > 0.0) - float(x < 0.0), _clip),
+    Expression: Functions(
+        *_COMMON, lambda x: if_then_else(x > 0.0, 1.0, if_then_else(x < 0.0, -1.0, 0.0)), _clip
+    ),
 }
 
 
@@ -37,3 +45,11 @@ def vector(T: type, values: Sequence[Any]) -> np.ndarray:
     if T is float:
         return np.array(values, dtype=float)
     return np.array([x if isinstance(x, T) else T(x) for x in values], dtype=object)
+
+
+def with_signature(system: Any) -> Any:
+    """The class of a template, with the arguments of its `_construct` where `help` and an editor look for them."""
+    construct = inspect.signature(system._construct)
+    kept = [p for name, p in construct.parameters.items() if name not in ("self", "converter")]
+    system.__signature__ = construct.replace(parameters=kept)
+    return system

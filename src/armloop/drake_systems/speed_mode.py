@@ -121,12 +121,7 @@ class SpeedModeArm:
         rows = np.arange(first, last, max(1, round(1.0 / (rate * self._step))))
         v = (q[rows + half] - q[rows - half]) / (2 * half * self._step)
         tau = 0.5 * (torque[:-1] + torque[1:])
-        faults = self.plant.effects
-        if faults.torque_delay:
-            # Before the motion began the arm stood as at its start.
-            late = t[rows] - faults.torque_delay
-            tau = np.column_stack([np.interp(late, t[:-1], column) for column in tau.T])
-        else:
-            tau = tau[rows]
-        tau = faults.torque_gain * tau + faults.torque_offset
-        return Recording(t[rows], q[rows] + faults.encoder_offset, v, tau)
+        q = q[:-1]
+        for fault in self.plant.effects.faults:
+            q, tau = fault(t[:-1], q, tau)
+        return Recording(t[rows], q[rows], v, tau[rows])

@@ -9,8 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
-from armloop.drake_systems.joint_loads import STICKING_GAIN
-from armloop.drake_systems.scalars import functions_of, vector
+from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
@@ -72,19 +71,17 @@ def StickingForwardDynamics_(T: type) -> Any:
             n, h, equations = self._n, self._step, self._equations
             state = context.get_discrete_state_vector().CopyToVector().tolist()
             q, v, tau, t = state[:n], state[n:], self._tau.Eval(context).tolist(), context.get_time()
-            still, joints = [0.0] * n, range(n)
+            still = [0.0] * n
             M, rest = equations.mass_matrix(q), equations.rigid(q, v, still)
             load = equations.load(q, v, still) if equations.load_matters else None
-            forward, backward = (equations.friction(v, load, t, [sign] * n) for sign in (1.0, -1.0))
-            laws = [
-                ClampedLaw(j, 0.0, STICKING_GAIN, max(0.5 * (forward[j] - backward[j]), 0.0)) for j in joints
-            ]
+            laws: list[ClampedLaw] = []
+            for along, level, smooth in equations.dry_and_smooth(q, v, load, t):
+                along.add(rest, smooth)
+                laws.append(ClampedLaw.dry(along, max(level, 0.0)))
             momentum = [
-                sum(m * x for m, x in zip(M[j], v, strict=True))
-                + h * (tau[j] - rest[j] - 0.5 * (forward[j] + backward[j]))
-                for j in joints
+                sum(m * x for m, x in zip(M[j], v, strict=True)) + h * (tau[j] - rest[j]) for j in range(n)
             ]
-            pieces = [law.piece(x) for law, x in zip(laws, v, strict=True)]
+            pieces = [law.piece(law.speed(v)) for law in laws]
             dry = implicit_torques(M, momentum, laws, pieces, h)
             w = solve(M, [p + h * x for p, x in zip(momentum, dry, strict=True)])
             discrete.set_value(vector(T, [x + h * y for x, y in zip(q, w, strict=True)] + w))
@@ -92,4 +89,4 @@ def StickingForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-StickingForwardDynamics = StickingForwardDynamics_[None]
+StickingForwardDynamics = with_signature(StickingForwardDynamics_[None])

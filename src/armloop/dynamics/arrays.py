@@ -48,11 +48,14 @@ class Dynamics:
         """C(q, v) v, the torques of the motion at constant velocities."""
         return self._answer(lambda e, x, y: e.bias(x, y), q, v)
 
-    def friction(self, v: ArrayLike, load: ArrayLike | None = None) -> Array:
-        """Friction at velocities v, 0 at rest; ``load`` for friction that grows with it (0 by default)."""
-        if load is None:
-            return self._answer(lambda e, x: e.friction(x), v)
-        return self._answer(lambda e, x, y: e.friction(x, y), v, load)
+    def friction(self, v: ArrayLike, load: ArrayLike | None = None, q: ArrayLike | None = None) -> Array:
+        """Friction at velocities v, 0 at rest; ``load`` and ``q`` for friction that changes with them (0 by default)."""
+        nothing = np.zeros_like(np.asarray(v, dtype=float))
+        return self._answer(
+            lambda e, x, y, z: e.friction(x, y, q=z),
+            v,
+            *(nothing if x is None else x for x in (load, q)),
+        )
 
     def torque(self, q: ArrayLike, v: ArrayLike, vdot: ArrayLike) -> Array:
         """Inverse dynamics: what the drives supply."""

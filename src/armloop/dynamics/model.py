@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from armloop.arm import Arm
 from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
-from armloop.dynamics.effects import EffectLaw, effect_law
+from armloop.dynamics.effects import effect_law
 from armloop.dynamics.equations import BodyEquations, EnergyEquations, Equations, Numbers, Rows
 from armloop.dynamics.sparse import SparseArrayEquations, SparseEquations
 from armloop.errors import ModelError
 from armloop.functions import NUMPY, Functions
+from armloop.library.friction import Acting, Direction, Sliding, torque_along
 from armloop.model import ReconstructedModel
-from armloop.pointwise import FRICTION_LAWS
 
 _LOAD_ROUNDS = 3
 
@@ -79,24 +80,17 @@ class ModelEquations:
             (part, True) for part in equations(model.arm, used, functions)
         ]
         self._parts += [(law.equations, law.load) for law in laws if law.equations is not None]
-        self._effects: list[EffectLaw] = [law for law in laws if law.friction is not None]
-        self._friction = [
-            [
-                (
-                    float(t.coefficient),
-                    FRICTION_LAWS[t.kind.replace("smooth_", "") if sharp else t.kind],
-                    float(t.parameter),
-                    t.by_load,
-                )
-                for t in joint
-                if t.step <= step
-            ]
-            for joint in model.friction.terms
-        ]
-        self._smoothing = smoothing
-        self.load_matters = any(by_load for joint in self._friction for *_, by_load in joint) or any(
-            effect.name == "load_dependent_friction" for effect, _ in added
-        )
+        #: What rubs, along every joint and every direction that two share.
+        self._friction: dict[Direction, list[Acting]] = {
+            Direction(j): [t.acting for t in joint if t.step <= step]
+            for j, joint in enumerate(model.friction.terms)
+        }
+        for law in laws:
+            if law.friction is not None:
+                self._friction.setdefault(law.friction.along, []).extend(law.friction.terms)
+        self._smoothing, self._sharp = smoothing, sharp
+        rubbing = [t.element for terms in self._friction.values() for t in terms]
+        self.load_matters = any(element.by_load for element in rubbing)
 
     def mass_matrix(self, q: Numbers) -> Rows:
         """The n rows of M(q), kg m² (kg, kg m).
@@ -127,40 +121,51 @@ class ModelEquations:
         self,
         v: Numbers,
         load: Sequence[Any] | None = None,
-        t: Any = 0.0,
-        signs: Sequence[Any] | None = None,
+        t: Any = math.inf,
+        q: Numbers | None = None,
     ) -> list[Any]:
         """The n friction torques at velocities v; at rest, where they are not determined, 0.
 
         Args:
             load: n torques, for friction that grows with them; 0 by default.
-            t: time, s, for friction that changes with it.
-            signs: n directions to take instead of those of v.
+            t: time since the start, s, for friction that changes with it; by default that of a warm joint.
+            q: n positions, for friction that changes with them; 0 by default.
         """
-        f = self.functions
+        f, total = self.functions, [0.0] * self.n
         loads = [0.0] * self.n if load is None else load
-        if signs is None:
-            signs = [f.tanh(x / self._smoothing) if self._smoothing else f.sign(x) for x in v]
-        total: list[Any] = []
-        for speed, sign, torque, laws in zip(v, signs, loads, self._friction, strict=True):
-            own: Any = 0.0
-            for coefficient, law, parameter, by_load in laws:
-                value = coefficient * law(speed, sign, parameter, f)
-                own = own + (value * abs(torque) if by_load else value)
-            total.append(own)
-        for effect in self._effects:
-            j = effect.joint
-            assert effect.friction is not None
-            total[j] = total[j] + effect.friction(v[j], signs[j], loads[j], t)
+        for along, terms in self._friction.items():
+            w = along.of(v)
+            sign = f.tanh(w / self._smoothing) if self._smoothing else f.sign(w)
+            x = Sliding(0.0 if q is None else along.of(q), w, sign, t)
+            along.add(total, torque_along(terms, x, loads[along.joint], f, self._sharp))
         return total
 
-    def torque(self, q: Numbers, v: Numbers, vdot: Numbers, t: Any = 0.0) -> list[Any]:
+    def dry_and_smooth(
+        self, q: Numbers, v: Numbers, load: Sequence[Any] | None = None, t: Any = math.inf
+    ) -> list[tuple[Direction, Any, Any]]:
+        """Along each direction: the level of dry friction, which has the sign of the sliding, and what else rubs."""
+        loads, found = [0.0] * self.n if load is None else load, []
+        for along, terms in self._friction.items():
+            forward, backward = (
+                torque_along(
+                    terms,
+                    Sliding(along.of(q), along.of(v), sign, t),
+                    loads[along.joint],
+                    self.functions,
+                    self._sharp,
+                )
+                for sign in (1.0, -1.0)
+            )
+            found.append((along, 0.5 * (forward - backward), 0.5 * (forward + backward)))
+        return found
+
+    def torque(self, q: Numbers, v: Numbers, vdot: Numbers, t: Any = math.inf) -> list[Any]:
         """Inverse dynamics: the n torques of the drives."""
         rigid = self.rigid(q, v, vdot)
         load = self.load(q, v, vdot) if self.load_matters else None
-        return [x + y for x, y in zip(rigid, self.friction(v, load, t), strict=True)]
+        return [x + y for x, y in zip(rigid, self.friction(v, load, t, q), strict=True)]
 
-    def acceleration(self, q: Numbers, v: Numbers, tau: Numbers, t: Any = 0.0) -> list[Any]:
+    def acceleration(self, q: Numbers, v: Numbers, tau: Numbers, t: Any = math.inf) -> list[Any]:
         """Forward dynamics: vdot of M(q) vdot = tau - bias(q, v) - gravity(q) - friction(v).
 
         Friction that grows with the load depends on vdot in turn, c |M vdot + rest|. Where the loads' signs are
@@ -169,12 +174,12 @@ class ModelEquations:
         M must have a positive definite symmetric part (see :func:`armloop.dynamics.require_mass_matrix`).
         """
         M, joints = self.mass_matrix(q), range(self.n)
-        friction = self.friction(v, None, t)
+        friction = self.friction(v, None, t, q)
         drive = [x - y - z for x, y, z in zip(tau, self._rest(q, v), friction, strict=True)]
         vdot = solve(M, drive)
         if not self.load_matters:
             return vdot
-        slopes = [x - y for x, y in zip(self.friction(v, [1.0] * self.n, t), friction, strict=True)]
+        slopes = [x - y for x, y in zip(self.friction(v, [1.0] * self.n, t, q), friction, strict=True)]
         load_M, load_rest = self._inertia(q, loads_only=True), self._rest(q, v, loads_only=True)
         for _ in range(_LOAD_ROUNDS):
             loads = [

@@ -8,24 +8,23 @@ from __future__ import annotations
 from typing import Any
 
 from armloop.arm import Arm
-from armloop.effects.base import (
-    Context,
-    Effect,
-    Estimate,
-    LinearJointEffect,
-    ProfiledJointEffect,
-    Value,
-)
+from armloop.effects.base import Context, Effect, Estimate, Parameter, Value
+from armloop.effects.law import INERTIA, Law, LinearJointEffect, ProfiledJointEffect
 from armloop.effects.listed import EFFECTS
 from armloop.effects.own import find, own_effects, own_names, register
 from armloop.errors import ModelError
+from armloop.library.friction import Element
 
 __all__ = [
     "EFFECTS",
+    "INERTIA",
     "Context",
     "Effect",
+    "Element",
     "Estimate",
+    "Law",
     "LinearJointEffect",
+    "Parameter",
     "ProfiledJointEffect",
     "Value",
     "effect",

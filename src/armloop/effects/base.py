@@ -1,26 +1,68 @@
-"""What every physical effect says of itself: its law, its columns, its parameters and their bounds.
+"""What every physical effect says of itself: where it sits, its law, its parameters and their bounds.
 
 An effect is fitted as coefficients of columns, linear for a fixed shape (the order of a ripple, say), and
 then turned into named physical parameters. The same object predicts its torque for a model that has it.
+Most are a :class:`armloop.effects.law.Law`; what is none (a body, a fault of a sensor, a push) derives from
+:class:`Effect` itself.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
-from armloop.library.friction import FrictionTerm
+from armloop.kinematics import regressor
+from armloop.library.friction import Acting, Direction
 from armloop.motion import Motion
+from armloop.newton_euler import inverse_dynamics
 
 Array = NDArray[np.float64]
 Value = float | list[float]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What a law calls a number of its, its unit and its bounds.
+
+    Attributes:
+        unit: with TAU, POS and INERTIA to be filled in for a joint.
+        least: smallest value of the whole effect, as a simulated arm may have it; ``above``: it must be larger.
+        positive: whether also what is found in addition to a model must be above zero.
+        size: 3 for a vector.
+        default: value where none is given; None where it must be.
+        shape: whether it is the law's nonlinear parameter: "continuous" is refined between the values tried,
+            "chosen" is one of them.
+    """
+
+    name: str
+    unit: str = "1"
+    least: float = -np.inf
+    above: float = -np.inf
+    positive: bool = False
+    size: int = 1
+    default: Value | None = None
+    shape: str = ""
+
+    def fault(self, value: Any) -> str:
+        """What is wrong with a value given for it, as "must be ..."; empty if nothing is."""
+        try:
+            number = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            return "must be a number"
+        if number.shape != (() if self.size == 1 else (self.size,)) or not np.isfinite(number).all():
+            return "must be one finite number" if self.size == 1 else "must be three finite numbers"
+        if (number <= self.above).any():
+            return f"must be above {self.above:g}"
+        if (number < self.least).any():
+            return f"must not be {'negative' if self.least == 0 else f'below {self.least:g}'}"
+        return ""
 
 
 @dataclass(frozen=True)
@@ -34,6 +76,12 @@ class Estimate:
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
         return {"value": self.value, "std_error": self.std_error, "unit": self.unit}
+
+    def words(self, digits: int = 4) -> str:
+        """A scalar with its standard error and unit."""
+        return f"{number(self.value):.{digits}g} ± {number(self.std_error):.2g} {self.unit}".removesuffix(
+            " 1"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,23 +106,45 @@ class Context:
     predicted: Array | None = None
 
 
+class Body(NamedTuple):
+    """Rigid bodies on the links: (10 n,) parameters, a gravity of their own (3,), or none; or their weight alone."""
+
+    parameters: Array
+    gravity: Array | None = None
+    weight_only: bool = False
+
+
+class Placed(NamedTuple):
+    """A law with its numbers: the elements that act along a direction."""
+
+    along: Direction
+    terms: tuple[Acting, ...]
+
+
 class Effect(ABC):
-    """A physical effect on all joints (``joint`` None), on one (1-based), or on a pair.
+    """A physical effect on the whole arm, on one joint (1-based), or on a pair.
 
     Class attributes:
         name: as in ``diagnosis.json``.
-        joint_wise: whether it sits in one joint.
-        pair_wise: whether it also concerns another joint, ``other_joint``.
-        sensor: whether it falsifies what is recorded instead of acting on the arm.
-        complexity: number of free parameters, for preferring the simplest of equals.
+        scope: "arm", "joint" or "pair"; ``joint_wise`` and ``pair_wise`` follow from it.
+        role: "mechanical"; "sensor", which falsifies what is recorded instead of acting on the arm; or "event" of one
+            run, which no hypothesis of a diagnosis searches for and no controller supplies. ``sensor`` and
+            ``searched`` follow from it.
+        parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
-        searched: whether it is one of the hypotheses of a diagnosis; an event of one run is found otherwise.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
+        rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
+        fault_order: of sensors: a record is falsified by the lower ones first.
+        alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
+        looks_like: the name of an effect whose likenesses it shares.
     """
 
     name: ClassVar[str]
+    scope: ClassVar[str] = "joint"
+    role: ClassVar[str] = "mechanical"
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
     joint_wise: ClassVar[bool] = True
     pair_wise: ClassVar[bool] = False
     sensor: ClassVar[bool] = False
@@ -84,6 +154,20 @@ class Effect(ABC):
     load: ClassVar[bool] = False
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
+    rubs: ClassVar[bool] = False
+    fault_order: ClassVar[int] = 9
+    alike: ClassVar[Mapping[str, str]] = {}
+    looks_like: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        stated = vars(cls)
+        if "scope" in stated:
+            cls.joint_wise, cls.pair_wise = cls.scope != "arm", cls.scope == "pair"
+        if "role" in stated:
+            cls.sensor, cls.searched = cls.role == "sensor", cls.role != "event"
+        if "parameters" in stated and "complexity" not in stated:
+            cls.complexity = len(cls.parameters)
 
     def __init__(self, joint: int | None = None, other_joint: int | None = None) -> None:
         self.joint = joint
@@ -128,21 +212,52 @@ class Effect(ABC):
         """
         return x, np.eye(len(x))
 
-    @abstractmethod
+    def named(self, x: Array, shape: float) -> tuple[float, ...]:
+        """The scalar parameters, in their order, of free parameters x (k,): these themselves by default."""
+        del shape
+        return tuple(x.tolist())
+
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        """Named parameters from the free parameters (k,) and their covariance (k, k)."""
+        """Named parameters from the free parameters (k,) and their covariance (k, k), by the delta method."""
+        step = 1e-6 * np.maximum(np.sqrt(np.abs(np.diag(covariance))), np.maximum(np.abs(x), 1e-12))
+        ends = [[self.named(x + s * h, shape) for s in (1.0, -1.0)] for h in np.diag(step)]
+        slopes = np.array([np.subtract(up, down) for up, down in ends]) / (2 * step[:, None])
+        errors = np.sqrt(np.maximum(np.einsum("kp,kl,lp->p", slopes, covariance, slopes), 0.0))
+        return {
+            p.name: Estimate(float(value), float(error), fill(arm, p.unit, self.joint))
+            for p, value, error in zip(self.parameters, self.named(x, shape), errors, strict=True)
+        }
 
     @abstractmethod
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         """(N, n) torque that the drive must supply in addition (or that the sensor adds)."""
 
-    def friction(self, parameters: dict[str, Value]) -> FrictionTerm | None:
-        """The friction term of its joint that a controller supplies for it, where it is one."""
+    def placed(self, parameters: Mapping[str, Value]) -> Placed | None:
+        """The law along its direction, where it has one written for every kind of number."""
         del parameters
         return None
 
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
+        """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
+        del arm, parameters, inertial
+        return None
+
+    def body_torque(self, context: Context, parameters: Mapping[str, Value]) -> Array:
+        """(N, n) torque of :meth:`body`."""
+        body, motion = self.body(context.arm, parameters, context.inertial), context.motion
+        assert body is not None
+        v, vdot = ((0 * x if body.weight_only else x) for x in (motion.v, motion.vdot))
+        return np.asarray(regressor(context.arm, motion.q, v, vdot, body.gravity) @ body.parameters)
+
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
-        """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,)."""
+        """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,); none of an event."""
+        rest = np.zeros(arm.n)
+        if not self.searched:
+            return lambda q, v, vdot: rest
+        body = self.body(arm, parameters, inertial)
+        if body is not None:
+            dynamics = inverse_dynamics(arm, body.parameters, body.gravity)
+            return (lambda q, v, vdot: dynamics(q, rest, rest)) if body.weight_only else dynamics
 
         def torque(q: Array, v: Array, vdot: Array) -> Array:
             motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.zeros(1, dtype=np.intp))
@@ -150,10 +265,23 @@ class Effect(ABC):
 
         return torque
 
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        """What is wrong with parameters beside each other, each of which is right; empty if nothing is."""
+        del parameters
+        return ""
+
+    def falsified(
+        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
+    ) -> tuple[Array, Array] | None:
+        """What a sensor makes of one run's q and tau (N, n), recorded at ``time`` (N,); None where it cannot be told so."""
+        del time, q, tau, parameters
+        return None
+
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         """Whether the parameters are physically possible."""
-        del arm, parameters
-        return True
+        del arm
+        return all(number(parameters[p.name].value) > 0 for p in self.parameters if p.positive)
 
     def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
         """Whether the run can show the nonlinear parameter found; beyond what was tried it stands for another effect."""
@@ -163,6 +291,16 @@ class Effect(ABC):
     @abstractmethod
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         """What was found, in words."""
+
+    def remedy(self, parameters: dict[str, Estimate]) -> str:
+        """What the arm's owner should do, in words; empty for what acts on the arm itself."""
+        del parameters
+        of = "" if self.joint is None else f" of joint {self.joint}"
+        return (
+            f"Correct the reading{of} before anything uses it. The feedforward stays as it is"
+            if self.sensor
+            else ""
+        )
 
     def full_columns(self, context: Context, shape: float) -> Array:
         """(N, n, p) columns on all joints."""
@@ -185,115 +323,9 @@ def number(value: Value) -> float:
 
 def fill(arm: Arm, text: str, joint: int | None) -> str:
     """A unit with TAU, POS and INERTIA filled in for a joint (1-based)."""
-    assert joint is not None
+    if joint is None:
+        return text
     kind = arm.joints[joint - 1]
     inertia = "kg*m^2" if kind.kind == "revolute" else "kg"
     unit = text.replace("TAU", kind.torque_unit).replace("POS", kind.position_unit)
     return unit.replace("INERTIA", inertia)
-
-
-class LinearJointEffect(Effect):
-    """An effect of one joint with one linear coefficient: torque = coefficient · column."""
-
-    needs_model = False
-    parameter: ClassVar[str]
-    unit: ClassVar[str]
-    law: ClassVar[str]
-    nonnegative: ClassVar[bool] = False
-
-    @abstractmethod
-    def column(self, motion: Motion, joint: int) -> Array:
-        """(N,) torque per unit of the coefficient at joint ``joint`` (0-based)."""
-
-    def columns(self, context: Context, shape: float) -> Array:
-        assert self.joint is not None
-        return self.column(context.motion, self.joint - 1)[:, None]
-
-    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        return self.full_columns(context, 0.0)[:, :, 0] * number(parameters[self.parameter])
-
-    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        error = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return {self.parameter: Estimate(float(x[0]), error, fill(arm, self.unit, self.joint))}
-
-    def sentence(self, parameters: dict[str, Estimate]) -> str:
-        e = parameters[self.parameter]
-        return (
-            f"joint {self.joint} needs {self.law} in addition, with {self.parameter} "
-            f"{number(e.value):.4g} ± {number(e.std_error):.2g} {e.unit}"
-        )
-
-    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        return not self.nonnegative or number(parameters[self.parameter].value) > 0
-
-
-class ProfiledJointEffect(Effect):
-    """An effect of one joint, linear in one coefficient a for each value of a positive nonlinear parameter s.
-
-    The search tries values of s on a grid; around the best, a·c(s) is taken to first order in log s, with the
-    columns c and dc/dlog s, so that s has a value between the grid's and a standard error.
-
-    Class attributes:
-        parameter, shape_name: names of a and s.
-        unit, shape_unit: their units, with TAU, POS and INERTIA to be filled in.
-        law: as a formula.
-    """
-
-    complexity = 2
-    needs_model = False
-    parameter: ClassVar[str]
-    shape_name: ClassVar[str]
-    unit: ClassVar[str]
-    shape_unit: ClassVar[str]
-    law: ClassVar[str]
-
-    _LOG_STEP: ClassVar[float] = 0.03
-    #: Beyond this the first order says nothing.
-    _FARTHEST: ClassVar[float] = 0.3
-
-    @abstractmethod
-    def column(self, motion: Motion, joint: int, shape: float) -> Array:
-        """(N,) torque per unit of the coefficient at joint ``joint`` (0-based)."""
-
-    def columns(self, context: Context, shape: float) -> Array:
-        assert self.joint is not None
-        j, h = self.joint - 1, self._LOG_STEP
-        low, middle, high = (self.column(context.motion, j, shape * float(np.exp(x))) for x in (-h, 0.0, h))
-        return np.column_stack([middle, (high - low) / (2 * h)])
-
-    def refined(self, x: Array, shape: float) -> float:
-        size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
-        return shape * float(np.exp(np.clip(x[1] / size, -self._FARTHEST, self._FARTHEST)))
-
-    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        assert self.joint is not None
-        tau = np.zeros_like(context.motion.q)
-        shape = number(parameters[self.shape_name])
-        tau[:, self.joint - 1] = self.column(context.motion, self.joint - 1, shape)
-        return tau * number(parameters[self.parameter])
-
-    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        size = float(x[0]) if abs(x[0]) > 1e-12 else 1e-12
-        slope = np.array([-x[1] / size**2, 1 / size])
-        value = self.refined(x, shape)
-        error = value * float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
-        return {
-            self.parameter: Estimate(
-                float(x[0]), float(np.sqrt(max(covariance[0, 0], 0.0))), fill(arm, self.unit, self.joint)
-            ),
-            self.shape_name: Estimate(value, error, fill(arm, self.shape_unit, self.joint)),
-        }
-
-    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        return number(parameters[self.parameter].value) > 0
-
-    def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
-        return min(tried) <= number(parameters[self.shape_name].value) <= max(tried)
-
-    def sentence(self, parameters: dict[str, Estimate]) -> str:
-        level, shape = parameters[self.parameter], parameters[self.shape_name]
-        return (
-            f"joint {self.joint} needs {self.law} in addition, with {self.parameter} "
-            f"{number(level.value):.4g} ± {number(level.std_error):.2g} {level.unit} and {self.shape_name} "
-            f"{number(shape.value):.3g} ± {number(shape.std_error):.2g} {shape.unit}"
-        )

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Pointwise, Value, number
+from armloop.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.effects.payload import link_parameters
 from armloop.kinematics import tool_jacobian
 from armloop.motion import Motion
 
@@ -18,10 +22,14 @@ class ExternalContact(Effect):
     """
 
     name = "external_contact"
-    joint_wise = False
+    scope = "arm"
+    role = "event"
+    parameters = (
+        Parameter("start", "s", least=0.0),
+        Parameter("end", "s"),
+        Parameter("force", "N", size=3),
+    )
     memory = True
-    complexity = 3
-    searched = False
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         during = self.during(context.motion, parameters)
@@ -39,9 +47,16 @@ class ExternalContact(Effect):
     def columns(self, context: Context, shape: float) -> Array:
         return -np.swapaxes(tool_jacobian(context.arm, context.motion.q), 1, 2)
 
-    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
-        nothing = np.zeros(arm.n)
-        return lambda q, v, vdot: nothing
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        late = number(parameters["end"]) <= number(parameters["start"])
+        return "end must come after start" if late else ""
+
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+        """-J^T force while it lasts: the weight of a unit mass at the tool whose gravity is the force."""
+        mass = link_parameters(arm, {"mass": 1.0, "com": [0.0, 0.0, 0.0]})
+        force = np.asarray(parameters["force"], dtype=float)
+        return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), mass]), force, weight_only=True)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))

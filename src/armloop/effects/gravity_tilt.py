@@ -2,38 +2,53 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Pointwise, Value, number
+from armloop.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.errors import ModelError
 from armloop.kinematics import regressor
-from armloop.newton_euler import inverse_dynamics
+
+
+def base_rotation(roll: float, pitch: float) -> Array:
+    """R_WB of a base rolled about x, then pitched about y: R_y R_x."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    return np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
 
 
 def tilted_gravity(gravity: Array, roll: float, pitch: float) -> Array:
     """Gravity in the frame of a base rolled about x, then pitched about y: (R_y R_x)ᵀ g."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    R_WB = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
-    return R_WB.T @ gravity
+    return np.asarray(base_rotation(roll, pitch).T @ gravity)
 
 
 class GravityTilt(Effect):
     """Gravity acts along another direction than the model took for granted."""
 
     name = "gravity_tilt"
-    joint_wise = False
-    complexity = 2
+    scope = "arm"
+    parameters = (Parameter("roll", "rad"), Parameter("pitch", "rad"))
     load = True
     needs_inertial = True
-
-    def _gravity_torque(self, context: Context, gravity: Array) -> Array:
-        assert context.inertial is not None
-        zero = np.zeros_like(context.motion.q)
-        return regressor(context.arm, context.motion.q, zero, zero, gravity) @ context.inertial
+    alike: ClassVar = {
+        "payload": (
+            "both change the gravity load; a run with fast and slow motion at the same postures would tell them apart"
+        )
+    }
 
     def columns(self, context: Context, shape: float) -> Array:
         # Torques are linear in gravity, and gravity in products of sines and cosines of the two angles: see embed.
-        along = np.stack([self._gravity_torque(context, axis) for axis in np.eye(3)], axis=2)
+        assert context.inertial is not None
+        zero = np.zeros_like(context.motion.q)
+        along = np.stack(
+            [
+                regressor(context.arm, context.motion.q, zero, zero, axis) @ context.inertial
+                for axis in np.eye(3)
+            ],
+            axis=2,
+        )
         x, y, z = context.arm.gravity
         parts = [(x, 0, 0), (-z, 0, 0), (0, x, 0), (0, y, 0), (0, z, 0), (0, 0, x), (0, 0, -y), (0, 0, z)]
         return along @ np.array(parts, dtype=float).T
@@ -49,25 +64,15 @@ class GravityTilt(Effect):
         pitch = np.array([-sp, cp, cp * sr, 0, -sp * sr, cp * cr, 0, -sp * cr])
         return beta, np.column_stack([roll, pitch])
 
-    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        g = context.arm.gravity
-        tilted = tilted_gravity(g, number(parameters["roll"]), number(parameters["pitch"]))
-        return self._gravity_torque(context, tilted) - self._gravity_torque(context, g)
-
-    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
-        assert inertial is not None
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+        if inertial is None:
+            raise ModelError("effect gravity_tilt: its law needs the model's inertial parameters")
         tilted = tilted_gravity(arm.gravity, number(parameters["roll"]), number(parameters["pitch"]))
         # Gravity torques are linear in gravity: the difference of the two directions is one of them.
-        change = inverse_dynamics(arm, inertial, tilted - arm.gravity)
-        rest = np.zeros(arm.n)
-        return lambda q, v, vdot: change(q, rest, rest)
+        return Body(inertial, tilted - arm.gravity, weight_only=True)
 
-    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        errors = np.sqrt(np.diag(covariance))
-        return {
-            name: Estimate(float(b), float(e), "rad")
-            for name, b, e in zip(("roll", "pitch"), x, errors, strict=True)
-        }
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        return self.body_torque(context, parameters)
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return all(abs(number(e.value)) < 0.6 for e in parameters.values())

@@ -1,50 +1,36 @@
-"""The effects that armloop brings along."""
+"""The effects that armloop brings along: every effect that a file of this folder defines."""
 
 from __future__ import annotations
 
-from armloop.effects.base import Effect
-from armloop.effects.coulomb_friction import CoulombFriction
-from armloop.effects.encoder_offset import EncoderOffset
-from armloop.effects.external_contact import ExternalContact
-from armloop.effects.friction_asymmetry import FrictionAsymmetry
-from armloop.effects.friction_drift import FrictionDrift
-from armloop.effects.gravity_tilt import GravityTilt
-from armloop.effects.joint_spring import JointSpring
-from armloop.effects.load_dependent_friction import LoadDependentFriction
-from armloop.effects.payload import Payload
-from armloop.effects.presliding_hysteresis import PreslidingHysteresis
-from armloop.effects.quadratic_drag import QuadraticDrag
-from armloop.effects.rotor_inertia import RotorInertia
-from armloop.effects.stribeck_friction import StribeckFriction
-from armloop.effects.time_delay import TimeDelay
-from armloop.effects.torque_gain import TorqueGain
-from armloop.effects.torque_offset import TorqueOffset
-from armloop.effects.torque_ripple import TorqueRipple
-from armloop.effects.transmission_coupling import TransmissionCoupling
-from armloop.effects.viscous_friction import ViscousFriction
+import inspect
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
 
-#: Every listed effect by its name in ``diagnosis.json``.
+from armloop.effects.base import Effect
+
+_PACKAGE = __package__ or "armloop.effects"
+
+
+def _defined(module: str) -> list[type[Effect]]:
+    """The named effects of a module, but not those that it imports."""
+    members = vars(import_module(f"{_PACKAGE}.{module}")).values()
+    return [
+        kind
+        for kind in members
+        if inspect.isclass(kind)
+        and issubclass(kind, Effect)
+        and kind.__module__ == f"{_PACKAGE}.{module}"
+        and hasattr(kind, "name")
+    ]
+
+
+_FOLDER = str(Path(__file__).parent)
+_FILES = sorted({module.name for module in iter_modules([_FOLDER])} - {"base", "law", "listed", "own"})
+
+#: Every listed effect by its name in ``diagnosis.json``. What looks like another comes after it: of equals a search
+#: names the first.
 EFFECTS: dict[str, type[Effect]] = {
     kind.name: kind
-    for kind in (
-        Payload,
-        ViscousFriction,
-        CoulombFriction,
-        JointSpring,
-        TorqueRipple,
-        RotorInertia,
-        TorqueOffset,
-        GravityTilt,
-        StribeckFriction,
-        FrictionAsymmetry,
-        LoadDependentFriction,
-        QuadraticDrag,
-        FrictionDrift,
-        PreslidingHysteresis,
-        TransmissionCoupling,
-        TorqueGain,
-        EncoderOffset,
-        TimeDelay,
-        ExternalContact,
-    )
+    for kind in sorted((k for file in _FILES for k in _defined(file)), key=lambda k: bool(k.looks_like))
 }

@@ -17,6 +17,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, TypeVar
 
 from armloop.effects.base import Effect
+from armloop.effects.law import Law
 from armloop.effects.listed import EFFECTS
 from armloop.errors import InputError
 
@@ -109,6 +110,10 @@ def _check(kind: Any, where: str) -> None:
     if not (isinstance(kind, type) and issubclass(kind, Effect)):
         raise InputError(f"{where}: is {kind!r}; it must be a subclass of armloop.effects.Effect")
     missing = [*_undefined(kind), *sorted(kind.__abstractmethods__)]
+    if not missing and not kind.parameters and kind.estimates is Effect.estimates:
+        missing = ["parameters"]
+    if not missing and issubclass(kind, Law) and not kind.elements and kind.values is Law.values:
+        missing = ["elements"]
     if missing:
         raise InputError(f"{where}: {kind.__name__} lacks {', '.join(missing)}; define them in the class")
     if not isinstance(kind.name, str) or not _NAME.fullmatch(kind.name):

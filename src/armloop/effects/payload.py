@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Pointwise, Value, number
+from armloop.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
 from armloop.kinematics import regressor
-from armloop.newton_euler import inverse_dynamics
 
 _TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -22,8 +23,13 @@ class Payload(Effect):
     """
 
     name = "payload"
+    scope = "arm"
+    parameters = (
+        Parameter("mass", "kg", least=0.0, positive=True),
+        Parameter("com", "m", size=3),
+        Parameter("own_inertia", "kg*m^2", least=0.0, default=0.0),
+    )
     needs_model = False
-    joint_wise = False
     complexity = 5
     load = True
 
@@ -50,12 +56,11 @@ class Payload(Effect):
         J[4:7, 4] = 1.0
         return beta, J
 
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+        return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), link_parameters(arm, parameters)]))
+
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self.columns(context, 0.0) @ link_parameters(context.arm, parameters)
-
-    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
-        others = np.zeros(10 * (arm.n - 1))
-        return inverse_dynamics(arm, np.concatenate([others, link_parameters(arm, parameters)]))
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         mass = max(float(x[0]), 1e-3)
@@ -86,7 +91,7 @@ class Payload(Effect):
         return f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m"
 
 
-def link_parameters(arm: Arm, parameters: dict[str, Value]) -> Array:
+def link_parameters(arm: Arm, parameters: Mapping[str, Value]) -> Array:
     """(10,) parameters about the last link's origin, in its frame."""
     mass, com_tool = number(parameters["mass"]), np.asarray(parameters["com"], dtype=float)
     com = arm.X_tool[:3, :3] @ com_tool + arm.X_tool[:3, 3]

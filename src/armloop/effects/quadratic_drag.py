@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from armloop.effects.base import Array, LinearJointEffect
-from armloop.motion import Motion
+from armloop.effects.base import Parameter
+from armloop.effects.law import Law
 
 
-class QuadraticDrag(LinearJointEffect):
+class QuadraticDrag(Law):
     """tau_j += c v_j |v_j|."""
 
     name = "quadratic_drag"
-    parameter = "coefficient"
-    unit = "TAU*s^2/POS^2"
+    parameters = (Parameter("coefficient", "TAU*s^2/POS^2", least=0.0),)
     law = "c v |v|"
-
-    def column(self, motion: Motion, joint: int) -> Array:
-        v = motion.v[:, joint]
-        return v * np.abs(v)
+    elements = ("quadratic",)

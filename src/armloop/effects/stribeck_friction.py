@@ -6,19 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.effects.base import Array, Context, ProfiledJointEffect
-from armloop.motion import Motion
+from armloop.effects.base import Context, Parameter
+from armloop.effects.law import Law
 
 
-class StribeckFriction(ProfiledJointEffect):
+class StribeckFriction(Law):
     """tau_j += d exp(-(v_j/v_s)^2) sign(v_j)."""
 
     name = "stribeck_friction"
-    parameter = "static_excess"
-    shape_name = "velocity"
-    unit = "TAU"
-    shape_unit = "POS/s"
+    parameters = (
+        Parameter("static_excess", "TAU", least=0.0, positive=True),
+        Parameter("velocity", "POS/s", above=0.0, shape="continuous"),
+    )
     law = "d exp(-(v/vs)^2) sign(v)"
+    elements = ("stribeck_peak",)
 
     def shapes(self, context: Context) -> Sequence[float]:
         assert self.joint is not None
@@ -27,7 +28,3 @@ class StribeckFriction(ProfiledJointEffect):
         # Below the slowest speeds an exponential cannot be seen, beyond half the fastest it is a level with drag.
         low, high = max(float(slowest), 1e-3 * float(fastest)), 0.5 * float(fastest)
         return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
-
-    def column(self, motion: Motion, joint: int, shape: float) -> Array:
-        v = motion.v[:, joint]
-        return np.exp(-((v / shape) ** 2)) * np.sign(v)

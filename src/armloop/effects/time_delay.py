@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.effects.base import Array, Context, Effect, Estimate, Parameter, Value, number
 
 
 class TimeDelay(Effect):
     """recorded tau(t) = true tau(t - d), all joints alike: a fault of the recording."""
 
     name = "time_delay"
-    joint_wise = False
-    sensor = True
+    scope = "arm"
+    role = "sensor"
+    fault_order = 3
+    parameters = (Parameter("seconds", "s"),)
 
     def shapes(self, context: Context) -> Sequence[float]:
         # Delays of some milliseconds to a fifth of a second, either way; at each the column is exact.
@@ -33,19 +35,18 @@ class TimeDelay(Effect):
         return self._late(context, number(parameters["seconds"]))
 
     def _late(self, context: Context, delay: float) -> Array:
-        """tau(t - d) - tau(t), run by run; what was before a run is taken to be as at its start."""
+        """tau(t - d) - tau(t), run by run."""
         assert context.predicted is not None
         motion, tau = context.motion, context.predicted
         late = np.empty_like(tau)
         for run in motion.runs():
-            t = motion.time[run]
-            for j in range(tau.shape[1]):
-                late[run, j] = np.interp(t - delay, t, tau[run, j])
+            late[run] = _later(motion.time[run], tau[run], delay)
         return late - tau
 
-    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        error = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return {"seconds": Estimate(float(x[0]), error, "s")}
+    def falsified(
+        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
+    ) -> tuple[Array, Array]:
+        return q, _later(time, tau, number(parameters["seconds"]))
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return abs(number(parameters["seconds"].value)) < 0.3
@@ -57,3 +58,15 @@ class TimeDelay(Effect):
             f"the torque is recorded {1e3 * abs(number(e.value)):.3g} ± {1e3 * number(e.std_error):.2g} ms {way} than "
             "the motion: the recording, not the arm"
         )
+
+    def remedy(self, parameters: dict[str, Estimate]) -> str:
+        seconds = number(parameters["seconds"].value)
+        return (
+            f"Shift the torque record by {1e3 * abs(seconds):.3g} ms {'back' if seconds > 0 else 'forward'} before it is "
+            "compared with the motion. The feedforward is not shifted: a record cannot tell whether commands are late, too"
+        )
+
+
+def _later(time: Array, tau: Array, delay: float) -> Array:
+    """tau(t - d) of one run; what was before it is taken to be as at its start."""
+    return np.column_stack([np.interp(time - delay, time, column) for column in tau.T])

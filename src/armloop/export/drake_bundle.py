@@ -124,7 +124,7 @@ def _smoothed(model: ReconstructedModel, what: Said, motion: Motion, smoothing: 
     rows = what.torque(motion.q, motion.v, motion.vdot, frozenset())
     still = [0.0] * model.arm.n
     for k, (q, v) in enumerate(zip(motion.q.tolist(), motion.v.tolist(), strict=True)):
-        rows[k] += whole.friction(v, whole.load(q, v, still))
+        rows[k] += whole.friction(v, whole.load(q, v, still), 0.0, q)
         rows[k] += np.subtract(whole.rigid(q, v, still), rigid.rigid(q, v, still))
         for e in elements:
             x = v[e.joint - 1]

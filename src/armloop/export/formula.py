@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.dynamics import ModelEquations, effect_law
+from armloop.dynamics import ModelEquations
 from armloop.effects.base import number
 from armloop.effects.listed import EFFECTS
 from armloop.export.tracing import Graph, Node
-from armloop.functions import Functions
 from armloop.library.friction import FrictionLaw
 from armloop.model import AddedEffect, ReconstructedModel
 
@@ -66,19 +64,16 @@ def formula(model: ReconstructedModel) -> Formula:
     q = [graph.input(f"q[{j}]", j if model.arm.revolute[j] else None) for j in range(n)]
     v = [graph.input(f"v[{j}]") for j in range(n)]
     vdot = [graph.input(f"vdot[{j}]") for j in range(n)]
-    functions = graph.functions()
-    plain, couplings, left_out = _split(model)
+    plain, left_out = _split(model)
     stops: list[Stop] = []
 
     def torques(kept: ReconstructedModel, t: Node) -> tuple[list[Node], list[Node]]:
-        equations = ModelEquations(kept, functions)
+        equations = ModelEquations(kept, graph.functions())
         load = equations.load(q, v, vdot)
         tau = [
             graph.node(x) + y
-            for x, y in zip(equations.rigid(q, v, vdot), equations.friction(v, load, t), strict=True)
+            for x, y in zip(equations.rigid(q, v, vdot), equations.friction(v, load, t, q), strict=True)
         ]
-        for added in couplings:
-            tau = [x + y for x, y in zip(tau, _coupling(model, added, functions, q, v, vdot), strict=True)]
         return tau, [graph.node(x) for x in load]
 
     late = graph.constant(_LATE)
@@ -103,39 +98,20 @@ def _exact_quarters(arm: Arm) -> Arm:
     return replace(arm, X_PF=X_PF, axis=axis)
 
 
-def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[AddedEffect], list[str]]:
-    """The model without what is no law of its own state, its shared motors apart, and what was left out."""
-    kept, couplings, left_out = [], [], []
+def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[str]]:
+    """The model without what is no law of its own state, and what was left out."""
+    kept, left_out = [], []
     for added in model.effects:
         effect = added.effect
         if effect.sensor:
             left_out.append(f"{effect.label()}: a fault of the record, which no controller supplies")
         elif not effect.searched:
             left_out.append(f"{effect.label()}: an event of one run")
-        elif effect.name not in EFFECTS:
+        elif effect.name not in EFFECTS and added.placed() is None:
             left_out.append(f"{effect.label()}: a law in Python, not one that can be written out")
-        elif effect.name == "transmission_coupling":
-            couplings.append(added)
         else:
             kept.append(added)
-    return replace(model, effects=tuple(kept)), couplings, left_out
-
-
-def _coupling(
-    model: ReconstructedModel,
-    added: AddedEffect,
-    functions: Functions,
-    q: Sequence[Node],
-    v: Sequence[Node],
-    vdot: Sequence[Node],
-) -> list[Node]:
-    """A shared motor with the sign itself, as a controller's feedforward has it, where a plant takes it smoothed."""
-    sharp = replace(functions, tanh=functions.sign)
-    parameters = {key: e.value for key, e in added.parameters.items()}
-    effect = added.effect
-    law = effect_law(model.arm, effect.name, effect.joint, parameters, sharp, None, effect.other_joint)
-    assert law.equations is not None
-    return law.equations.torque(q, v, vdot)
+    return replace(model, effects=tuple(kept)), left_out
 
 
 def _without_memory(

@@ -72,6 +72,10 @@ class Node:
         raise TypeError("a law that branches on its arguments cannot be written as one formula")
 
 
+def _branches(x: Any, lower: Any, upper: Any) -> Any:
+    raise TypeError("a law that branches on its arguments cannot be written as one formula")
+
+
 class Graph:
     """The operations of one formula."""
 
@@ -106,6 +110,7 @@ class Graph:
             tanh=lambda x: self.call("tanh", x),
             sqrt=lambda x: self.call("sqrt", x),
             sign=lambda x: self.call("sgn", x),
+            clip=_branches,
         )
 
     def add(self, a: Any, b: Any) -> Node:

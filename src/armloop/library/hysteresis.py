@@ -16,8 +16,12 @@ model", IEEE Trans. Automatic Control 50(11), 2005; Krejci, Hysteresis, Convexit
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from armloop.functions import Functions
 
 Array = NDArray[np.float64]
 #: Maps z -> clip(z + shift, lower, upper), one per sample, arrays of one shape.
@@ -54,6 +58,11 @@ def stop_operator(q: Array, width: float, starts: ArrayLike = (0,), initial: Arr
     lower[first] = upper[first] = width * np.asarray(initial, dtype=float)
     shift, lower, upper = _compose_all((np.diff(q, axis=0, prepend=q[:1]), lower, upper))
     return np.clip(shift, lower, upper) / width
+
+
+def stop_step(z: Any, shift: Any, width: Any, functions: Functions) -> Any:
+    """The stretch of an element of a width, z before, after the joint has moved by ``shift``: one sample's step."""
+    return functions.clip(z + shift, -width, width)
 
 
 def _compose(inner: _Maps, outer: _Maps) -> _Maps:

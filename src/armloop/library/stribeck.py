@@ -18,6 +18,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Lasso
 
 from armloop.errors import ExcitationError
+from armloop.library.friction import stribeck_fall
 
 Array = NDArray[np.float64]
 
@@ -94,7 +95,7 @@ def compare_stribeck(
     for sign in (1.0, -1.0):
         rows = sign * velocity > 0
         v, tau = sign * velocity[rows], sign * torque[rows]
-        X = np.column_stack([np.ones_like(v), v, np.exp(-((v[:, None] / PAPER_SPEEDS) ** 2))])
+        X = np.column_stack([np.ones_like(v), v, stribeck_fall(v[:, None], PAPER_SPEEDS)])
         scale = np.sqrt(np.mean(X**2, axis=0))
         if sign > 0:
             condition = float(np.linalg.cond(X / scale))
@@ -121,7 +122,7 @@ def _reliable(velocity: Array, torque: Array, speed_noise: float) -> tuple[Array
 def _projected(log_speed: float, v: Array, tau: Array) -> tuple[float, list[float]]:
     """Squared error of the best law with this v_s, and its f_s, f_c − f_s, f_v and offset."""
     sign = np.sign(v)
-    fall = -np.expm1(-((v / np.exp(log_speed)) ** 2)) * sign
+    fall = (1.0 - stribeck_fall(v, np.exp(log_speed))) * sign
     X = np.column_stack([sign, fall, v, np.ones_like(v)])
     theta = np.linalg.lstsq(X, tau, rcond=None)[0]
     return float(np.sum((tau - X @ theta) ** 2)), theta.tolist()
@@ -131,7 +132,7 @@ def _of_exponentials(theta: Array) -> Stribeck:
     """Constant, viscous and a hundred exponentials read as Eq. (34), in one direction."""
     excess = float(theta[2:].sum())
     speeds = np.linspace(0, 2 * PAPER_SPEEDS[-1], 2000)
-    curve = np.exp(-((speeds[1:, None] / PAPER_SPEEDS) ** 2)) @ theta[2:]
+    curve = stribeck_fall(speeds[1:, None], PAPER_SPEEDS) @ theta[2:]
     below = np.flatnonzero(np.abs(curve) < abs(excess) / np.e)
     reach = float(speeds[1:][below[0]]) if len(below) else np.inf
     return Stribeck(float(theta[0]) + excess, float(theta[0]), reach, float(theta[1]))

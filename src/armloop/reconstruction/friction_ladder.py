@@ -10,7 +10,7 @@ hands back the rungs it does not miss.
 
 Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
 
-A user may restrict the ladder to some laws, by the names in :data:`LAWS`.
+A user may restrict the ladder to some laws, by the names in :data:`armloop.library.friction.FRICTION_LAWS`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import block_numbers
 from armloop.errors import InputError
-from armloop.library.friction import FrictionTerm
+from armloop.library.friction import FRICTION_LAWS, FrictionTerm
 from armloop.motion import Motion, Samples
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.pooled import Choice, Pooled, Prior
@@ -44,20 +44,6 @@ _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
 _FADES = (0.003, 0.01, 0.03, 0.1)
 _WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
-#: What a user calls the laws, and the kinds of elements that each consists of. Of the directions that fade in, plain
-#: Coulomb friction is the sharpest: the others stand in for what happens before the joint slides.
-LAWS = {
-    "coulomb": ("smooth_sign",),
-    "coulomb_fading": ("smooth_sign",),
-    "viscous": ("viscous",),
-    "offset": ("offset",),
-    "stribeck": ("stribeck_peak",),
-    "nonlinear_viscous": ("root", "quadratic", "cubic"),
-    "viscous_by_direction": ("viscous_forward", "viscous_backward"),
-    "coulomb_by_load": ("load_smooth_sign",),
-    "presliding": ("hysteresis",),
-    "presliding_by_load": ("load_hysteresis",),
-}
 #: The slowest motion is this quantile of the speeds; it is so much faster than the fade that reaches down to it.
 _CREEP, _SHARPER = 0.005, 4.0
 #: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
@@ -127,8 +113,8 @@ def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
         for unit, c in zip(units, creep, strict=True)
     ]
 
-    def same(*kinds: str) -> list[list[FrictionTerm]]:
-        return [[FrictionTerm(kind) for kind in kinds] for _ in units]
+    def same(law: str) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind) for kind in FRICTION_LAWS[law]] for _ in units]
 
     def scaled(kind: str, sizes: tuple[float, ...]) -> list[list[FrictionTerm]]:
         return [[FrictionTerm(kind, parameter=float(unit * size)) for size in sizes] for unit in units]
@@ -142,8 +128,8 @@ def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
         Rung("Coulomb and viscous", coulomb),
         Rung("offset (levels by direction)", same("offset")),
         Rung("Stribeck", falls),
-        Rung("nonlinear viscous", same("root", "quadratic", "cubic")),
-        Rung("viscous by direction", same("viscous_forward", "viscous_backward")),
+        Rung("nonlinear viscous", same("nonlinear_viscous")),
+        Rung("viscous by direction", same("viscous_by_direction")),
         Rung("Coulomb by load", fading("load_smooth_sign")),
         Rung("presliding", scaled("hysteresis", _WIDTHS)),
         Rung("presliding by load", scaled("load_hysteresis", _WIDTHS)),
@@ -151,21 +137,21 @@ def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
 
 
 def check_laws(names: Sequence[str] | None) -> None:
-    """Raise ``InputError`` unless every name is one of :data:`LAWS`, and there is one; None stands for all of them."""
+    """Raise ``InputError`` unless every name is one of :data:`FRICTION_LAWS`, and there is one; None for all."""
     if names is None:
         return
     for name in names:
-        if name not in LAWS:
-            raise InputError(f"unknown friction law {name!r}; there are: {', '.join(LAWS)}")
+        if name not in FRICTION_LAWS:
+            raise InputError(f"unknown friction law {name!r}; there are: {', '.join(FRICTION_LAWS)}")
     if not names:
-        raise InputError(f"no friction law is named; there are: {', '.join(LAWS)}")
+        raise InputError(f"no friction law is named; there are: {', '.join(FRICTION_LAWS)}")
 
 
 def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
     """The rungs with the elements of some laws alone; all of them for None. Rungs left empty are dropped."""
     if names is None:
         return ladder
-    kinds = {kind: name for name in names for kind in LAWS[name]}
+    kinds = {kind: name for name in names for kind in FRICTION_LAWS[name]}
 
     def allowed(own: list[FrictionTerm]) -> list[FrictionTerm]:
         named = [term for term in own if term.kind in kinds]

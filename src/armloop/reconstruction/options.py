@@ -25,7 +25,7 @@ class Options:
         physical: keep friction from driving, and M(q) positive definite unless the data contradict that, where the
             library knows how to.
         friction: the laws of the friction ladder that may be chosen, by their names
-            (:data:`armloop.reconstruction.friction_ladder.LAWS`); None for all. The double feature set has its own.
+            (:data:`armloop.library.friction.FRICTION_LAWS`); None for all. The double feature set has its own.
         insist: keep M(q) positive definite even then.
         standard_errors: estimate those of the coefficients, which takes longer than the coefficients do.
         parts: tell what of the residual a flexible regression still predicts.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from armloop.library.friction import stribeck_fall
 from armloop.library.stribeck import Stribeck, compare_stribeck
 from armloop.reports.html import Section
 from armloop.reports.tables import make_table
@@ -56,7 +57,7 @@ def _trial(seed: int) -> tuple[dict[str, list[float]], float]:
     rng = np.random.default_rng(seed)
     speed = np.exp(rng.uniform(np.log(_SLOWEST), np.log(_FASTEST), _SAMPLES))
     v = speed * rng.choice([-1.0, 1.0], _SAMPLES)
-    level = _TRUE.coulomb + (_TRUE.static - _TRUE.coulomb) * np.exp(-((v / _TRUE.velocity) ** 2))
+    level = _TRUE.coulomb + (_TRUE.static - _TRUE.coulomb) * stribeck_fall(v, _TRUE.velocity)
     tau = level * np.sign(v) + _TRUE.viscous * v
     ratio = 10 ** (-_SNR / 20)
     speed_noise = float(ratio * np.sqrt(np.mean(v**2)))

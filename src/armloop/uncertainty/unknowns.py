@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armloop.components import Lagrangian, RigidBody, SparseTerms
 from armloop.library.double_feature_set import products
-from armloop.library.friction import FrictionTerm
+from armloop.library.friction import FrictionTerm, stribeck_fall
 from armloop.library.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
@@ -154,6 +154,6 @@ def _friction_columns(
         columns.append(term.column(motion, joint, load))
         if term.kind == "stribeck":
             v, vs = motion.v[:, joint], term.parameter
-            slope = -2 * v**2 / vs**3 * np.exp(-((v / vs) ** 2)) * np.sign(v)
+            slope = -2 * v**2 / vs**3 * stribeck_fall(v, vs) * np.sign(v)
             columns.append(term.coefficient * slope)
     return columns

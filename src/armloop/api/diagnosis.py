@@ -1,0 +1,106 @@
+"""What a model lacks on a run, as an object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armloop.api.model import Model
+from armloop.api.reading import as_logs
+from armloop.api.score import logs_for
+from armloop.api.shown import page
+from armloop.diagnosis import Diagnosis as Found
+from armloop.diagnosis import close
+from armloop.diagnosis import diagnose as run
+from armloop.diagnosis.closing import Closing
+from armloop.files import write_json, write_text
+from armloop.log import MotionLog
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.progress import Progress, silent
+from armloop.reports.diagnosis_tables import diagnosis_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Diagnosis:
+    """The verdict on a run.
+
+    Attributes:
+        verdict: "no_effect", "effects_found", "unlisted_effect" or "cannot_tell".
+        effects: what was found, each with ``.effect`` (its ``name``, ``joint``), ``.parameters`` (by name: ``value``,
+            ``std_error``, ``unit``) and ``.torque(context)``.
+        model: the model with the effects found.
+        error: RMSE per joint on data not fitted: ``before``, ``after``, ``noise_floor``.
+        before: the model that was diagnosed.
+    """
+
+    def __init__(
+        self, found: Found, before: ReconstructedModel, logs: Sequence[MotionLog], closing: Closing
+    ) -> None:
+        self._found, self._closing = found, closing
+        self._names = [log.name for log in logs]
+        self.before = Model.of(before)
+        self.verdict: str = found.verdict
+        self.model = Model.of(found.model)
+        self.effects: list[AddedEffect] = list(found.model.effects[len(before.effects) :])
+        self.error: dict[str, Any] = found.errors()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``diagnosis.json``."""
+        return {**self._found.to_dict(), **self._closing.to_dict()}
+
+    def report(self, path: str | Path) -> Path:
+        """Write the page of ``armloop diagnose``, without a network; raises ``InputError`` if it cannot be written."""
+        from armloop.reports.diagnosis_report import diagnosis_report
+
+        write_text(path, diagnosis_report(self._found, self.before, self._names, self._closing))
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``armloop diagnose --out`` does: diagnosis.json, model.json (augmented), report.html."""
+        place = Path(folder)
+        write_json(place / "diagnosis.json", self.to_dict())
+        self.model.save(place / "model.json")
+        self.report(place / "report.html")
+        return place
+
+    def plot(self) -> Figure:
+        """The residual of the strongest joint over time, before and after, a matplotlib figure."""
+        from armloop.reports.plots import residual_time_figure
+
+        return residual_time_figure(self._found)
+
+    def __repr__(self) -> str:
+        found = ", ".join(added.effect.label() for added in self.effects)
+        return f"<armloop.Diagnosis {self.verdict}{': ' + found if found else ''}>"
+
+    def __str__(self) -> str:
+        return diagnosis_table(self._found, self._closing)
+
+    def _repr_html_(self) -> str:
+        return page(str(self), self.plot())
+
+
+def diagnose(
+    model: ReconstructedModel,
+    logs: MotionLog | Sequence[MotionLog],
+    *,
+    held_out: MotionLog | Sequence[MotionLog] = (),
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Find what a model lacks on a measured run, trace it to a physical effect, and add it; see ``armloop diagnose``.
+
+    Args:
+        logs: the run, or several of the same arm.
+        held_out: further runs of the arm as it is now, never fitted: error before and after on each.
+
+    Raises:
+        InputError: a log does not fit the model, or holds too little motion.
+    """
+    runs = logs_for(model, as_logs(logs))
+    plain = Model.of(model).plain()
+    found = run(plain, runs, progress)
+    closing = close(plain, found.model, found.samples, logs_for(model, as_logs(held_out)))
+    return Diagnosis(found, model, runs, closing)

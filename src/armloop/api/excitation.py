@@ -1,0 +1,147 @@
+"""An exciting reference, as an object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armloop.api.reading import as_arm
+from armloop.api.shown import page
+from armloop.arm import Arm, load_arm
+from armloop.design import Excitation, Settings
+from armloop.design import excite as run
+from armloop.errors import InputError
+from armloop.excitation import MotionRanges, ranges_with, write_reference
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress, silent
+from armloop.reconstruction.reconstruct import default_conditioning, default_library
+from armloop.reports.excitation_tables import measures_table, use_table
+from armloop.resources import urdf_names
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Reference:
+    """An optimised exciting reference.
+
+    Attributes:
+        result: the account of it: limits used, measures of it and of random references, notes.
+    """
+
+    def __init__(self, result: Excitation) -> None:
+        self.result = result
+
+    def save(self, path: str | Path, *, rate: float = 500.0) -> int:
+        """Write it as a table (CSV or Parquet) with so many rows per second; returns their number."""
+        return write_reference(str(path), self.result.reference, rate)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of ``armloop excite --json``."""
+        return self.result.to_dict()
+
+    def plot(self) -> Figure:
+        """Positions, velocities and accelerations over a period, a matplotlib figure."""
+        from armloop.reports.plots.excitation import reference_figure
+
+        return reference_figure(self.result)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the page of ``armloop excite --report``, without a network."""
+        from armloop.files import write_text
+        from armloop.reports.excitation_report import excitation_report
+
+        write_text(path, excitation_report(self.result, None))
+        return Path(path)
+
+    def __repr__(self) -> str:
+        timing, found = self.result.timing, self.result.measure
+        return f"<armloop.Reference of {self.result.arm.name}, {timing.duration:g} s, condition {found.condition:.3g}>"
+
+    def __str__(self) -> str:
+        notes = "".join(f"\nnote: {note}" for note in self.result.notes)
+        return f"{measures_table(self.result)}\n\n{use_table(self.result)}{notes}"
+
+    def _repr_html_(self) -> str:
+        return page(str(self), self.plot())
+
+
+def excite(
+    arm: Arm | str | Path,
+    *,
+    library: str | None = None,
+    criterion: str = "variance",
+    duration: float | None = None,
+    base_frequency: float | None = None,
+    harmonics: int | None = None,
+    order: int = 1,
+    lower: Sequence[float] | None = None,
+    upper: Sequence[float] | None = None,
+    velocity: Sequence[float] | None = None,
+    acceleration: Sequence[float] | None = None,
+    reserve: float = 0.2,
+    model: ReconstructedModel | None = None,
+    noise: Sequence[float] | None = None,
+    starts: int | None = None,
+    random: int = 20,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Reference:
+    """Design an optimised exciting reference within an arm's limits; the options of ``armloop excite``.
+
+    Args:
+        library: what is to be regressed; by the number of joints if None.
+        criterion: "variance" (of the coefficients), "logdet" (of the information) or "condition".
+        duration: s; by the library if None. base_frequency: Hz, and harmonics of it.
+        order: N1 of the double feature set's candidates.
+        lower, upper, velocity, acceleration: (n,) rad, rad/s, rad/s² (m, ..); those of a built-in arm's plant, or nine
+            tenths of the URDF's travel and half its speed, if None.
+        reserve: part of the effort limits that is kept free.
+        model: predicts the torque that must keep within the drives' limits; the URDF's inertias if None.
+        noise: (n,) standard deviation of each joint's torque, N·m (N); the model's baseline error if None.
+        starts: of the optimiser. random: references to compare with. seed: of both.
+
+    Raises:
+        InputError: settings out of range, or limits that exclude any motion.
+    """
+    arm = as_arm(arm)
+    chosen = library or default_library(arm)
+    settings = Settings(
+        library=chosen,
+        criterion=criterion,
+        duration=duration,
+        base_frequency=base_frequency,
+        harmonics=harmonics,
+        order=order,
+        reserve=reserve,
+        noise=_noise(noise, model),
+        cutoff_hz=default_conditioning(chosen).cutoff_hz,
+        starts=starts,
+        random=random,
+        seed=seed,
+    )
+    stated = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
+    for name, values in stated.items():
+        if values is not None and len(values) != arm.n:
+            raise InputError(f"{name}: give {arm.n} numbers, one per joint of {arm.name}")
+    ranges = ranges_with(
+        arm, _plants(arm), **{key: None if x is None else tuple(map(float, x)) for key, x in stated.items()}
+    )
+    return Reference(run(arm, ranges, settings, model.predict if model else None, progress))
+
+
+def _plants(arm: Arm) -> MotionRanges | None:
+    """The ranges of a built-in arm's plant; None for any other."""
+    if arm.name not in urdf_names() or load_arm(arm.name).fingerprint() != arm.fingerprint():
+        return None
+    from armloop.drake_systems.scenarios import load_plant
+
+    return load_plant(arm.name).config.ranges
+
+
+def _noise(noise: Sequence[float] | None, model: ReconstructedModel | None) -> tuple[float, ...] | None:
+    if noise is not None:
+        return tuple(map(float, noise))
+    rmse = [] if model is None else model.baseline.get("rmse") or []
+    return tuple(float(x) for x in rmse) if rmse and all(rmse) else None

@@ -1,0 +1,192 @@
+"""A reconstructed model that scores, plots and shows itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armloop.api.reading import as_arm, as_logs
+from armloop.api.score import Score, evaluate, samples_for
+from armloop.api.shown import page
+from armloop.arm import Arm
+from armloop.errors import InputError
+from armloop.export import Exported, states_of
+from armloop.export import export as write_export
+from armloop.files import write_text
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.model import load_model as read_model
+from armloop.progress import Progress, silent
+from armloop.reconstruction import Options
+from armloop.reconstruction import reconstruct as run
+from armloop.reconstruction.reconstruct import Reconstruction
+from armloop.regression.sparse import Sparse
+from armloop.reports.tables import formulas, score_table, steps_table
+from armloop.signals import Conditioning
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(ReconstructedModel):
+    """A reconstructed model of an arm's joint torques.
+
+    ``predict(motion)`` gives torques (N, n) for arrays of samples, ``feedforward(q, v, vdot)`` (n,) for one;
+    ``formulas()`` one readable formula per joint; ``save(path)`` writes the file that commands read. Without the logs
+    it was made of (a model read from its file) ``account`` is None, and ``report`` has nothing to tell.
+    """
+
+    account: Reconstruction | None = None
+    logs: tuple[MotionLog, ...] = ()
+
+    @staticmethod
+    def of(model: ReconstructedModel) -> Model:
+        """The same model with what this class adds."""
+        if isinstance(model, Model):
+            return model
+        return Model(**{f.name: getattr(model, f.name) for f in fields(ReconstructedModel)})
+
+    def score(self, logs: MotionLog | Sequence[MotionLog]) -> Score:
+        """Errors on logs; see :func:`armloop.evaluate`."""
+        return evaluate(self, logs)
+
+    def plot(self, logs: MotionLog | Sequence[MotionLog] | None = None, *, seconds: float = 20.0) -> Figure:
+        """Measured and predicted torque of each joint over the first seconds of the longest run, a matplotlib figure.
+
+        Without logs, of those that the model was made of.
+        """
+        from armloop.reports.plots.torque import torque_figure
+
+        chosen = self.logs if logs is None else as_logs(logs)
+        if not chosen:
+            raise InputError(
+                "plot: give a log; a model read from its file does not know those it was made of"
+            )
+        return torque_figure(self, samples_for(self, chosen), seconds)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the page of ``armloop reconstruct --report``, without a network.
+
+        Raises:
+            InputError: the model comes from a file, or the place cannot be written to.
+        """
+        from armloop.reports.reconstruction_report import reconstruction_report
+
+        if self.account is None:
+            raise InputError(
+                "report: only a model of armloop.reconstruct has an account to give; plot(log) shows any"
+            )
+        write_text(path, reconstruction_report(self.account, list(self.logs)))
+        return Path(path)
+
+    def export(
+        self, to: str, path: str | Path, *, log: MotionLog | Sequence[MotionLog] | None = None
+    ) -> Exported:
+        """Write the model for another tool and read it back; see ``armloop export``.
+
+        Args:
+            to: "urdf", "sdf", "mjcf", "drake" (a folder) or "c".
+            log: compare on its motion instead of random states within the training range.
+
+        Raises:
+            InputError: the target is unknown, or the place cannot be written to.
+            ModelError: the model cannot be said in this form.
+        """
+        samples = None if log is None else samples_for(self, as_logs(log))
+        motion = None if samples is None else states_of(samples.motion, samples.moving)
+        return write_export(self.plain(), to, path, motion)
+
+    def plain(self) -> ReconstructedModel:
+        """The model without the logs it was made of."""
+        return ReconstructedModel(**{f.name: getattr(self, f.name) for f in fields(ReconstructedModel)})
+
+    def __repr__(self) -> str:
+        nrmse = [x for x in self.baseline.get("nrmse", []) if x is not None]
+        held_out = f", held-out nRMSE {np.mean(nrmse):.3g}" if nrmse else ""
+        kinds = ", ".join(dict.fromkeys(component.kind for component in self.components))
+        more = f", {len(self.effects)} effects added" if self.effects else ""
+        return f"<armloop.Model of {self.arm.name}, {self.arm.n} joints: {kinds}{more}{held_out}>"
+
+    def __str__(self) -> str:
+        parts = [repr(self).strip("<>")]
+        if self.account is not None:
+            parts += [
+                str(steps_table(self.account.reports)),
+                str(score_table(self.account.held_out, self.arm)),
+            ]
+        parts.append("\n".join([formulas(self), *self.legend()]))
+        parts += [added.effect.sentence(added.parameters) for added in self.effects]
+        return "\n\n".join(parts)
+
+    def _repr_html_(self) -> str:
+        return page(str(self), self.plot() if self.logs else None)
+
+
+def load_model(path: str | Path, arm: Arm | str | Path | None = None) -> Model:
+    """Read a model file.
+
+    Args:
+        arm: refuse the model unless it was made for this one.
+
+    Raises:
+        ModelError: the file is no model; ``ArmError``: it is that of another arm.
+    """
+    return Model.of(read_model(path, None if arm is None else as_arm(arm)))
+
+
+def reconstruct(
+    logs: MotionLog | Sequence[MotionLog],
+    arm: Arm | str | Path,
+    *,
+    method: str = "stepwise",
+    library: str | None = None,
+    estimator: str = "evidence",
+    penalty: float | None = None,
+    snr: tuple[float, float, float] | None = None,
+    max_order: int = 4,
+    cutoff: float | None = None,
+    friction: Sequence[str] | None = None,
+    physical: bool = True,
+    progress: Progress = silent,
+) -> Model:
+    """Reconstruct a model of an arm's joint torques from its logs; the options of ``armloop reconstruct``.
+
+    Args:
+        method: "stepwise" or "sindy", the one-shot baseline.
+        library: "double-feature-set" (default up to four joints), "rigid-body" (default beyond) or "lagrangian".
+        estimator: how terms are chosen.
+        penalty: of the Lassos, or the threshold; by held-out error if None.
+        snr: signal-to-noise ratios in dB of q, v, vdot of samples that are no time series.
+        max_order: largest truncation order tried.
+        cutoff: low-pass in Hz, 0 for none; by library if None.
+        friction: laws that may be chosen with rigid-body and lagrangian; None for all.
+        physical: keep M(q) positive definite and friction from driving.
+        progress: is told where the work stands.
+
+    Raises:
+        InputError: logs that do not fit the arm, an unknown option, or too little excitation.
+    """
+    given, arm = as_logs(logs), as_arm(arm)
+    units = {log.tau_unit for log in given}
+    if len(units) != 1:
+        raise InputError("reconstruct: give logs, all of them with torques or all with currents")
+    if cutoff is not None and not 0 <= cutoff < 1e4:
+        raise InputError(f"cutoff {cutoff}: give a frequency in Hz, or 0 for no filter")
+    options = Options(
+        sparse=Sparse(estimator, penalty),
+        max_order=max_order,
+        physical=physical,
+        snr=snr,
+        friction=None if friction is None else tuple(friction),
+    )
+    conditioning = None if cutoff is None else Conditioning(cutoff_hz=cutoff)
+    recorded: dict[str, Any] = {"unit": units.pop(), "drive_gains": None}
+    account = run(given, arm, method, library, conditioning, options, progress, recorded)
+    made = account.model
+    kept = {f.name: getattr(made, f.name) for f in fields(ReconstructedModel)}
+    return Model(**kept, account=account, logs=tuple(given))

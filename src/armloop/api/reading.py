@@ -1,0 +1,70 @@
+"""Reading logs, one or many."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from armloop.arm import Arm, load_arm
+from armloop.errors import LogError
+from armloop.log import MotionLog
+from armloop.log import read_log as read_file
+
+
+def read_log(
+    path: str | Path,
+    arm: Arm | str | Path | None = None,
+    *,
+    tau_unit: str = "N*m",
+    drive_gains: Sequence[float] | None = None,
+) -> MotionLog:
+    """Read a motion log, CSV or Parquet.
+
+    Args:
+        arm: whose log it is: one of :func:`armloop.load_arm`, a built-in name or the path of a URDF; its number of
+            joints is checked. None takes what the file has.
+        tau_unit: what the columns tau hold, "N*m" or "A" (motor current).
+        drive_gains: (n,) N·m/A (N/A): currents become torques.
+
+    Returns:
+        The log, SI units, (N, n) arrays.
+
+    Raises:
+        LogError: one line that names the file, the column or row, what is wrong and what would be right.
+    """
+    joints = None if arm is None else as_arm(arm).n
+    unit = "A" if drive_gains is not None else tau_unit
+    return read_file(path, joints=joints, tau_unit=unit, drive_gains=drive_gains)
+
+
+def read_logs(
+    paths: str | Path | Iterable[str | Path],
+    arm: Arm | str | Path | None = None,
+    *,
+    tau_unit: str = "N*m",
+    drive_gains: Sequence[float] | None = None,
+) -> list[MotionLog]:
+    """Read several logs: paths, or a pattern such as ``"logs/*.csv"`` (in the order of their names).
+
+    Arguments and errors as of :func:`read_log`; a pattern that matches nothing raises ``LogError``.
+    """
+    if isinstance(paths, str | Path):
+        pattern = str(paths)
+        found: list[str | Path] = [*sorted(glob.glob(pattern))] if glob.has_magic(pattern) else [pattern]
+        if not found:
+            raise LogError(f"{pattern}: matches no file; give the paths of CSV or Parquet motion logs")
+    else:
+        found = list(paths)
+    arm = None if arm is None else as_arm(arm)
+    return [read_log(path, arm, tau_unit=tau_unit, drive_gains=drive_gains) for path in found]
+
+
+def as_arm(arm: Arm | str | Path) -> Arm:
+    """The arm itself, or the one of a name or URDF."""
+    return arm if isinstance(arm, Arm) else load_arm(arm)
+
+
+def as_logs(logs: MotionLog | Sequence[MotionLog]) -> list[MotionLog]:
+    """One log or several, as a list."""
+    return [logs] if isinstance(logs, MotionLog) else list(logs)

@@ -1,0 +1,83 @@
+"""How well a model predicts logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from armloop.api.reading import as_logs
+from armloop.api.shown import page
+from armloop.arm import Arm
+from armloop.errors import InputError
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.motion import Samples
+from armloop.reports.tables import score_table
+from armloop.scoring import Score as Numbers
+from armloop.scoring import score
+from armloop.signals import condition
+
+
+@dataclass(frozen=True, repr=False)
+class Score(Numbers):
+    """Errors per joint: ``overall``, ``moving`` and ``standstill``, each with lists ``rmse`` and ``nrmse``."""
+
+    arm: Arm | None = None
+
+    @property
+    def rmse(self) -> list[float | None]:
+        """(n,) RMSE of the moving joints, N·m (N, A); None for one that does not move."""
+        return list(self.moving["rmse"])
+
+    @property
+    def nrmse(self) -> list[float | None]:
+        """(n,) RMSE over the RMS of the measured torque, of the moving joints."""
+        return list(self.moving["nrmse"])
+
+    def __repr__(self) -> str:
+        shown = ", ".join("–" if x is None else f"{x:.3g}" for x in self.nrmse)
+        return f"<armloop.Score of {self.samples} samples, nRMSE {shown}>"
+
+    def __str__(self) -> str:
+        assert self.arm is not None
+        return str(score_table(self, self.arm))
+
+    def _repr_html_(self) -> str:
+        return page(str(self))
+
+
+def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Score:
+    """Compare a model's prediction with logs: RMSE and nRMSE per joint, standstill apart.
+
+    Raises:
+        InputError: a log does not fit the model's arm or its unit of torque.
+    """
+    found = score(model, samples_for(model, as_logs(logs)))
+    return Score(**{f.name: getattr(found, f.name) for f in fields(Numbers)}, arm=model.arm)
+
+
+def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[MotionLog]:
+    """The logs in the unit that the model predicts; raises ``InputError`` where they cannot be."""
+    gains = model.recorded["drive_gains"]
+    predicts = "A" if model.recorded["unit"] == "A" and gains is None else "N*m"
+    fitting = []
+    for log in logs:
+        if log.joints != model.arm.n:
+            raise InputError(
+                f"{log.name}: {log.joints} joints, the model's arm {model.arm.name} has {model.arm.n}"
+            )
+        if log.tau_unit == "A" and gains is not None:
+            log = replace(log, tau=log.tau * np.asarray(gains, dtype=np.float64), tau_unit="N*m")
+        if log.tau_unit != predicts:
+            raise InputError(
+                f"{log.name}: tau is in {log.tau_unit}, but the model predicts {predicts}; read it with drive_gains"
+            )
+        fitting.append(log)
+    return fitting
+
+
+def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples:
+    """The logs conditioned as the model's training logs were."""
+    return condition(logs_for(model, logs), model.conditioning)

@@ -1,0 +1,103 @@
+"""Controllers compared in closed loop, as an object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armloop.api.shown import page
+from armloop.arm import Arm
+from armloop.errors import InputError
+from armloop.model import ReconstructedModel
+from armloop.progress import Progress, silent
+from armloop.reports.tables import eta_table
+from armloop.reports.tracking_tables import metrics_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from armloop.drake_systems.tracking import TrackingResult
+
+
+class Tracking:
+    """How the controllers of a scenario tracked.
+
+    Attributes:
+        results: by controller: ``time``, ``q_ref``, ``q``, ``tau`` arrays, ``eta`` (n,) in ``unit`` (deg, mm).
+    """
+
+    def __init__(self, answer: dict[str, Any], results: Mapping[str, TrackingResult], paper: bool) -> None:
+        self._answer, self._paper = answer, paper
+        self.results = dict(results)
+
+    @property
+    def eta(self) -> dict[str, list[float]]:
+        """Mean absolute tracking error per joint by controller, deg (mm)."""
+        return {name: [float(x) for x in result.eta] for name, result in self.results.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``tracking.json``."""
+        return dict(self._answer)
+
+    def plot(self) -> Figure:
+        """Reference, positions and errors of each joint, a matplotlib figure."""
+        from armloop.reports.plots import tracking_figure
+
+        return tracking_figure(self.results)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the figure and the tables as a page of its own, without a network."""
+        from armloop.files import write_text
+
+        head = (
+            '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Tracking</title></head><body>'
+        )
+        write_text(path, f"{head}{self._repr_html_()}</body></html>\n")
+        return Path(path)
+
+    def __repr__(self) -> str:
+        parts = (f"{name} {'/'.join(f'{x:.3g}' for x in eta)}" for name, eta in self.eta.items())
+        return f"<armloop.Tracking η: {', '.join(parts)}>"
+
+    def __str__(self) -> str:
+        return f"{eta_table(self.results, paper=self._paper)}\n\n{metrics_table(self.results)}"
+
+    def _repr_html_(self) -> str:
+        return page(str(self), self.plot())
+
+
+def track(
+    scenario: str | Path,
+    model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
+    *,
+    arm: str | Path | None = None,
+    out: str | Path | None = None,
+    progress: Progress = silent,
+) -> Tracking:
+    """Compare controllers in closed loop in Drake; see ``armloop track``.
+
+    Args:
+        scenario: a built-in name, a YAML file, or FILE:NAME.
+        model: serves all controllers of the scenario; or several by name, as ``--model NAME=…``. Without any, one is
+            reconstructed first from data collected on the scenario's arm, if a controller needs one.
+        arm: the URDF of a scenario that leaves its arm open.
+        out: folder for tracking.json, tracking.png and replay.html.
+
+    Raises:
+        InputError: the scenario is wrong or of another kind (payload_pickup, friction_wear: use the command), or the
+            model is of another arm.
+    """
+    from armloop.drake_systems.scenarios import load_tracking
+    from armloop.loop import run_scenario
+
+    if isinstance(arm, Arm):
+        raise InputError("track: arm must be the path of a URDF; the scenario reads it itself")
+    plan = load_tracking(scenario, arm)
+    if plan.pickup is not None or plan.wear is not None:
+        raise InputError(f"{scenario}: is of a kind of its own; run `armloop track {scenario}`")
+    models = {"model": model} if isinstance(model, ReconstructedModel) else dict(model or {})
+    for name, each in models.items():
+        each.arm.require_same(plan.plant.arm, f"model {name}")
+    answer, results = run_scenario(plan, models, None if out is None else Path(out), progress)
+    return Tracking(answer, results, plan.name.startswith("three_axis_tracking"))

@@ -1,0 +1,202 @@
+"""The package as Python: cheap to import, the commands' defaults, and results that show themselves."""
+
+import argparse
+import inspect
+import subprocess
+import sys
+from importlib import import_module
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+import armloop as al
+from armloop.errors import InputError, LogError
+from armloop.log import MotionLog
+
+PUBLIC = (
+    "MotionLog", "diagnose", "evaluate", "excite", "load_arm", "load_model", "read_log", "read_logs", "reconstruct", "track",
+)  # fmt: skip
+
+
+def run(seconds: float, seed: int, offset: float = 0.0) -> MotionLog:
+    motion = fourier_motion(seconds, 200.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    tau[:, 1] += offset * motion.v[:, 1]
+    return measured(motion, tau, seed, 0.005, f"run_{seed}")
+
+
+@pytest.fixture(scope="module")
+def model() -> "al.Model":
+    return al.reconstruct(
+        [run(40, 1), run(40, 2)],
+        three_axis(),
+        library="rigid-body",
+        friction=["coulomb", "viscous", "stribeck"],
+    )
+
+
+@pytest.fixture(scope="module")
+def found(model) -> "al.Diagnosis":
+    return al.diagnose(model, run(40, 3, offset=0.8))
+
+
+def test_every_public_name_loads_says_what_it_is_and_stands_in_the_documents(repository):
+    document = (repository / "docs" / "api.md").read_text(encoding="utf-8")
+    assert set(PUBLIC) < set(al.__all__)
+    for name in al.__all__:
+        assert name in dir(al)
+        assert name == "__version__" or inspect.getdoc(getattr(al, name))
+        assert f"`{name}" in document, name
+    with pytest.raises(AttributeError, match="public are"):
+        _ = al.bogus
+    stubs = (repository / "src" / "armloop" / "__init__.pyi").read_text(encoding="utf-8")
+    assert all(name in stubs for name in al.__all__)
+
+
+def test_options_can_only_be_given_by_name():
+    for function in (al.reconstruct, al.diagnose, al.track, al.excite, al.read_log, al.read_logs):
+        parameters = inspect.signature(function).parameters.values()
+        for parameter in parameters:
+            if parameter.default is not inspect.Parameter.empty and parameter.name not in ("arm", "model"):
+                assert parameter.kind is inspect.Parameter.KEYWORD_ONLY, (
+                    f"{function.__name__}: {parameter.name}"
+                )
+
+
+@pytest.mark.parametrize("name", ["reconstruct", "excite"])
+def test_defaults_are_the_commands(name):
+    parser = argparse.ArgumentParser()
+    import_module(f"armloop.commands.{name}").arguments(parser)
+    words = {
+        "reconstruct": ["x.csv", "--arm", "scara", "--out", "m.json"],
+        "excite": ["scara", "--out", "r.csv"],
+    }
+    options = vars(parser.parse_args(words[name])) | {"physical": True}
+    compared = 0
+    for parameter in inspect.signature(getattr(al, name)).parameters.values():
+        if (
+            parameter.kind is inspect.Parameter.KEYWORD_ONLY
+            and parameter.name in options
+            and parameter.name != "model"
+        ):
+            assert parameter.default == options[parameter.name], parameter.name
+            compared += 1
+    assert compared >= 8
+
+
+def test_a_model_scores_plots_and_shows_itself(model, tmp_path):
+    test = run(20, 4)
+    score = model.score(test)
+    assert max(score.nrmse) < 0.1 and repr(score).count("\n") == 0 and "nRMSE" in str(score)
+    assert len(model.plot(test).axes) == 6
+    assert repr(model).startswith("<armloop.Model of") and "\n" not in repr(model)
+    assert "tau1 =" in str(model)
+    assert "<img" in model._repr_html_() and "<pre" in score._repr_html_()
+    assert model.report(tmp_path / "report.html").read_text().startswith("<!")
+    model.save(tmp_path / "model.json")
+    again = al.load_model(tmp_path / "model.json", "three_axis")
+    assert again.score(test).nrmse == score.nrmse
+    with pytest.raises(InputError, match="plot"):
+        again.plot()
+    with pytest.raises(InputError, match="report"):
+        again.report(tmp_path / "other.html")
+    assert again.export("c", tmp_path / "arm.c").files == [tmp_path / "arm.c"]
+
+
+def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
+    assert found.verdict == "effects_found"
+    (added,) = found.effects
+    assert (added.effect.name, added.effect.joint) == ("viscous_friction", 2)
+    assert added.parameters["coefficient"].value == pytest.approx(0.8, abs=0.08)
+    assert found.error["after"][1] < 0.5 * found.error["before"][1]
+    assert isinstance(found.model, al.Model) and len(found.model.effects) == 1
+    assert found.model.score(run(20, 5, 0.8)).rmse[1] < model.score(run(20, 5, 0.8)).rmse[1]
+    assert "\n" not in repr(found) and "viscous_friction at joint 2" in repr(found)
+    assert "viscous" in str(found) and "<img" in found._repr_html_() and found.plot().axes
+    assert "viscous" in found.report(tmp_path / "page.html").read_text()
+    assert sorted(p.name for p in found.save(tmp_path / "out").iterdir()) == [
+        "diagnosis.json",
+        "model.json",
+        "report.html",
+    ]
+
+
+def test_currents_and_torques_do_not_mix(model):
+    log = run(10, 6)
+    amperes = MotionLog(log.time, log.q, log.v, log.tau, tau_unit="A")
+    with pytest.raises(InputError, match="drive_gains"):
+        model.score(amperes)
+    with pytest.raises(InputError, match="all of them"):
+        al.reconstruct([log, amperes], "three_axis")
+    with pytest.raises(InputError, match="joints"):
+        model.score(MotionLog(log.time, log.q[:, :2], log.v[:, :2], log.tau[:, :2]))
+
+
+def test_logs_are_read_by_pattern(tmp_path):
+    for k in (2, 1):
+        al.write_log(tmp_path / f"run_{k}.csv", run(5, k))
+    logs = al.read_logs(str(tmp_path / "run_*.csv"), "three_axis")
+    assert [log.name for log in logs] == ["run_1", "run_2"]
+    assert al.read_log(tmp_path / "run_1.csv", drive_gains=[2, 2, 2]).tau[0, 0] == 2 * logs[0].tau[0, 0]
+    with pytest.raises(LogError, match="matches no file"):
+        al.read_logs(str(tmp_path / "no_*.csv"))
+    with pytest.raises(LogError, match="joints"):
+        al.read_log(tmp_path / "run_1.csv", "scara")
+
+
+class Frame:
+    """What pandas and polars have in common: names of columns, and columns that are arrays."""
+
+    def __init__(self, columns):
+        self.columns, self._cells = list(columns), columns
+
+    def __getitem__(self, name):
+        return self._cells[name]
+
+
+def test_a_log_of_a_data_frame():
+    import pyarrow as pa
+
+    log = run(5, 1)
+    cells = {"time": log.time, "temperature": log.time + 30}
+    for kind in ("q", "v", "tau"):
+        cells |= {f"{kind}{j + 1}": getattr(log, kind)[:, j] for j in range(3)}
+    for frame in (Frame(cells), pa.table(cells)):
+        found = MotionLog.from_frame(frame, joints=3)
+        np.testing.assert_array_equal(found.tau, log.tau)
+    del cells["v1"], cells["v2"], cells["v3"]
+    assert MotionLog.from_frame(Frame(cells)).v_derived
+    with pytest.raises(LogError, match="tau1"):
+        MotionLog.from_frame(Frame({"time": log.time, "q1": log.q[:, 0]}))
+    with pytest.raises(LogError, match="joints"):
+        MotionLog.from_frame(Frame(cells), joints=4)
+
+
+@pytest.mark.parametrize("package", ["pandas", "polars"])
+def test_a_log_of_pandas_or_polars(package):
+    library = pytest.importorskip(package)
+    log = run(5, 1)
+    cells = {"time": log.time} | {
+        f"{kind}{j + 1}": getattr(log, kind)[:, j] for kind in ("q", "v", "tau") for j in range(3)
+    }
+    np.testing.assert_array_equal(MotionLog.from_frame(library.DataFrame(cells)).q, log.q)
+
+
+@pytest.mark.slow
+def test_tracking_and_excitation_show_themselves(tmp_path):
+    tracked = al.track("scara_pick_and_place", out=tmp_path / "track")
+    assert set(tracked.eta) >= {"pid"} and (tmp_path / "track" / "tracking.json").exists()
+    assert "\n" not in repr(tracked) and "η" in str(tracked) and tracked.plot().axes
+    assert "<img" in tracked.report(tmp_path / "page.html").read_text()
+    reference = al.excite("three_axis", library="rigid-body", duration=10, starts=1, random=4)
+    assert reference.save(tmp_path / "ref.csv") > 1000 and reference.plot().axes
+    assert "condition" in repr(reference) and str(reference)
+    with pytest.raises(InputError, match="armloop track"):
+        al.track("payload_pickup")
+
+
+def test_the_bare_import_is_cheap():
+    program = "import armloop, sys; dir(armloop); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not {"numpy", "pydrake", "matplotlib", "scipy"} & set(done.stdout.split())
