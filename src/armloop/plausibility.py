@@ -342,8 +342,10 @@ def _disagreements(log: Recorded) -> Iterator[Finding]:
         size = float(np.mean(np.square(windows.change[:, j])))
         errors = [_error(log, windows, j, float(lag)) for lag in _LAGS]
         best = int(np.argmin(errors))
+        # A steady speed says nothing of a lag: shifting v must explain a good part of what differs.
         if 0 < best < len(_LAGS) - 1:
-            lags.append(_vertex(_LAGS, errors, best))
+            clear = errors[best] < 0.75 * errors[len(_LAGS) // 2]
+            lags.append(_vertex(_LAGS, errors, best) if clear else 0.0)
         left = float(np.sqrt(errors[best] / size))
         if left > 0.2:
             yield Finding(

@@ -30,7 +30,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--library", default=None, help="as of armloop reconstruct (default: by number of joints)")
     p.add_argument(
-        "--cutoff", type=float, default=None, help="low-pass in Hz, 0 for none (default: by library)"
+        "--cutoff",
+        type=float,
+        default=None,
+        help="low-pass in Hz, 0 for none (default: by held-out error, at most 10)",
     )
     p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
     choice = p.add_mutually_exclusive_group()
