@@ -72,3 +72,17 @@ def test_without_dask_or_a_scheduler_one_line_says_what_to_do(monkeypatch: pytes
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"install the extra: armloop\[dask\]"):
         Cluster("tcp://127.0.0.1:9")
+
+
+def test_however_many_work_each_has_one_blas_thread() -> None:
+    """The number of threads decides in which order a product is summed, and so its last digits."""
+    import numpy as np
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads(chunk: int) -> int:
+        np.ones((2, 2)) @ np.ones((2, 2))
+        return max(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+
+    with threadpool_limits(2):
+        for workers in (Serial(), Processes(1), Processes(2)):
+            assert list(workers.map(threads, [0, 1])) == [1, 1]

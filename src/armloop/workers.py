@@ -56,7 +56,8 @@ class Serial:
     """In this process."""
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
-        return map(function, chunks)
+        # With one BLAS thread, as in every other worker: how many there are decides the order of a product's sums.
+        return (_apply(function, chunk) for chunk in chunks)
 
     def close(self) -> None:
         pass
@@ -126,7 +127,7 @@ class Processes:
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         jobs = min(self.jobs, len(chunks))
         if jobs <= 1:
-            yield from map(function, chunks)
+            yield from Serial().map(function, chunks)
             return
         with _inherited(function, chunks) as key:
             with Pool(jobs) as pool:

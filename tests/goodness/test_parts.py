@@ -10,7 +10,7 @@ from synthetic import fourier_motion
 
 from armloop.goodness import Parts, outside_trained_range, parts_of, witness
 from armloop.goodness import parts as parts_module
-from armloop.goodness.split import Split, correlation_time, split
+from armloop.goodness.split import FOLDS, Split, correlation_time, split
 from armloop.motion import Motion, Samples
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def test_without_a_gap_memory_would_pass_for_a_law(monkeypatch: pytest.MonkeyPat
     noise = remembering(given, 1, 1.0)
 
     def leaking(place: Array, run: NDArray[np.intp], gap: float) -> Split:
-        return Split(np.arange(len(place)) % 5, np.arange(len(place)), place, 0.0, True)
+        return Split(np.arange(len(place)) % FOLDS, np.arange(len(place)), place, 0.0, True)
 
     monkeypatch.setattr(parts_module, "split", leaking)
     assert min(one.predictable_left for one in parts(noise, given)) > 0.2
@@ -160,7 +160,7 @@ def test_fitted_samples_keep_the_gap() -> None:
     run = (place > 40).astype(np.intp)
     cut = split(place, run, 0.7)
     assert cut.enough
-    for fold in range(5):
+    for fold in range(FOLDS):
         judged, fitted = place[cut.fold == fold], place[cut.fitted(fold)]
         assert np.abs(judged[:, None] - fitted[None, :]).min() >= 0.7
         assert len(fitted) > 0.3 * len(place)

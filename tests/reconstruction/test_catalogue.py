@@ -80,6 +80,19 @@ def test_the_energies_find_it_too() -> None:
     assert named(made([coupled], library="lagrangian")) == [("transmission_coupling", 2, 3)]
 
 
+def rippled(motion: Motion) -> Array:
+    """A hundred teeth: beyond the low-pass as soon as the joint turns with 0.6 rad/s."""
+    return np.outer(0.3 * np.sin(100 * motion.q[:, 2] + 0.7), [0, 0, 1])
+
+
+def test_a_ripple_beyond_the_low_pass_is_found() -> None:
+    found = made([rippled])
+    assert named(found) == [("torque_ripple", 3, None)]
+    parameters = found.model.effects[0].parameters
+    assert parameters["order"].value == 100
+    check(found.model.effects[0], {"amplitude": 0.3, "phase": 0.7})
+
+
 def test_two_laws_are_both_found() -> None:
     found = made([sprung, coupled])
     assert sorted(named(found)) == [("joint_spring", 2, None), ("transmission_coupling", 2, 3)]

@@ -151,7 +151,7 @@ def test_link_parameters_follow_from_the_energies(result: Reconstruction):
 def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: pytest.MonkeyPatch):
     def no_room_for_mass(solution: Solution, *_) -> PhysicalSolution:
         negative = np.where(np.arange(len(solution.theta)) < 3, -1.0, solution.theta)
-        return PhysicalSolution(negative, 0, contradicted=True)
+        return PhysicalSolution(negative, 0, where="free")
 
     monkeypatch.setattr("armloop.reconstruction.lagrangian.physical_solution", no_room_for_mass)
     notes = reconstruct([a_run(1)], three_axis(), library="lagrangian").notes

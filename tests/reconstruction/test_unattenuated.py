@@ -26,3 +26,32 @@ def test_known_noise_is_corrected(seed):
         errors.append(np.sqrt(np.mean((tau - exact.tau[:200]) ** 2, axis=0)))
     plain, corrected = errors
     assert (corrected < 0.5 * plain).all()
+
+
+def test_the_order_of_a_support_does_not_matter():
+    from armloop.library.angle_sums import AngleSums
+    from armloop.library.friction import FrictionTerm
+    from armloop.library.wave_moments import WaveProducts
+    from armloop.reconstruction.data import Data
+    from armloop.reconstruction.found import Found
+    from armloop.reconstruction.sums import Choice, Columns
+    from armloop.reconstruction.trials import Fit
+    from armloop.reconstruction.unattenuated import unattenuated
+    from armloop.signals import condition
+
+    arm, ranges = load_arm("scara"), load_plant("scara").config.ranges
+    logs = list(inverse_dynamics_samples(arm, ranges, (50, 200, 400), 0, SNR).values())
+    data = Data.of(condition(logs, Conditioning(cutoff_hz=0.0)), Options())
+    library = AngleSums(tuple(map(bool, arm.revolute)), 1, 1, "acceleration")
+    columns = Columns(WaveProducts(library.factors, library.index), ((FrictionTerm("viscous"),),) * arm.n)
+    choice = Choice(None, (1, 2, 3), Found(arm, friction=[[] for _ in arm.joints]))
+    support = np.array([1, 3, 6, library.size])
+    mixed = np.array([2, 0, 3, 1])
+
+    def corrected(support):
+        fits = [Fit(support, np.zeros(len(support))) for _ in arm.joints]
+        return [fit.beta for fit in unattenuated(data, choice, columns, fits, SNR)]
+
+    for straight, shuffled in zip(corrected(support), corrected(support[mixed]), strict=True):
+        assert np.abs(straight).max() > 0
+        np.testing.assert_allclose(shuffled, straight[mixed], rtol=1e-9, atol=1e-12)

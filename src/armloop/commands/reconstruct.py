@@ -23,8 +23,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--library",
         default=None,
-        help="double-feature-set (default up to four joints), rigid-body (default beyond; base parameters of the "
-        "URDF's chain) or lagrangian (few terms of the energies, found without the URDF's lengths)",
+        help="double-feature-set (the paper's, up to four joints), rigid-body (base parameters of the URDF's chain) or "
+        "lagrangian (few terms of the energies, found without the URDF's lengths); default: all of them, and of those "
+        "that pass the checks of physics the best on blocks held out for this choice",
     )
     p.add_argument(
         "--estimator",
@@ -98,7 +99,7 @@ def run(options: argparse.Namespace) -> None:
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
     from armloop.regression.sparse import ESTIMATORS, Sparse
-    from armloop.reports.tables import formulas, parts_table, score_table, steps_table
+    from armloop.reports.tables import formulas, libraries_table, parts_table, score_table, steps_table
     from armloop.signals import Conditioning
     from armloop.workers import Cluster, Processes
 
@@ -150,6 +151,8 @@ def run(options: argparse.Namespace) -> None:
         return
     for warning in result.warnings:
         print(f"WARNING: {warning}")
+    if len(result.libraries) > 1:
+        print(libraries_table(result.libraries), end="\n\n")
     print(steps_table(result.reports))
     print()
     print(formulas(result.model), *result.model.legend(), sep="\n")

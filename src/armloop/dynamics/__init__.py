@@ -3,12 +3,15 @@
 from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
 from armloop.dynamics.effects import EffectLaw, effect_law
 from armloop.dynamics.model import ModelEquations
+from armloop.dynamics.physics import PhysicsChecks, check_physics
 from armloop.dynamics.rigid import nearest_rigid_body, with_mass_matrix
 
 __all__ = [
     "Dynamics",
     "EffectLaw",
     "ModelEquations",
+    "PhysicsChecks",
+    "check_physics",
     "effect_law",
     "nearest_rigid_body",
     "require_mass_matrix",

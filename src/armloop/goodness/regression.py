@@ -64,8 +64,8 @@ def _trees(X: Array, y: Array, asked: Array) -> Array:
     from threadpoolctl import threadpool_limits
 
     trees = HistGradientBoostingRegressor(
-        max_iter=30,
-        learning_rate=0.2,
+        max_iter=22,
+        learning_rate=0.25,
         max_leaf_nodes=12,
         min_samples_leaf=20,
         l2_regularization=1.0,

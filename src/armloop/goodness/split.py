@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-FOLDS = 5
+FOLDS = 4
 #: A block is so many times as long as the gap beside it; there are at least so many blocks, however long the gap
 #: would have to be for it.
 _BLOCK_PER_GAP, _FEWEST = 3.0, 12

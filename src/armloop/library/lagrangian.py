@@ -179,7 +179,7 @@ def candidates(arm: Arm) -> EnergyTerms:
                     rows += [(degrees, sine, (i, j)) for sine in _phases(degrees, revolute)]
     if arm.gravity.any():
         limits = [1] * n
-        limits[0] = int(_gravity_sees_first_joint(arm))
+        limits[0] = int(gravity_sees_first_joint(arm))
         for degrees in _degrees(limits, revolute):
             if degrees != none:
                 rows += [(degrees, sine, (-1, -1)) for sine in _phases(degrees, revolute)]
@@ -216,7 +216,7 @@ def _within_reach(degrees: tuple[int, ...], n: int) -> bool:
     return reach <= _REACH or (falling and reach <= _FALLING_REACH)
 
 
-def _gravity_sees_first_joint(arm: Arm) -> bool:
+def gravity_sees_first_joint(arm: Arm) -> bool:
     """Whether moving the whole arm by its first joint changes its height."""
     axis = arm.X_PF[0, :3, :3] @ arm.axis[0]
     change = np.cross(axis, arm.gravity) if arm.revolute[0] else axis @ arm.gravity

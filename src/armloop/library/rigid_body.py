@@ -106,6 +106,14 @@ class BaseParameters:
         return len(self.kept)
 
     @property
+    def positive(self) -> NDArray[np.bool_]:
+        """(r,) sums that no arm makes negative: of masses, principal and rotor inertias, each times a positive number."""
+        links = self.grouping.shape[1] // (11 if self.rotors else 10)
+        never = [name in ("m", "Ixx", "Iyy", "Izz") for _ in range(links) for name in LINK_PARAMETERS]
+        never += [True] * (links if self.rotors else 0)
+        return np.asarray(((self.grouping == 0) | ((self.grouping > 0) & np.array(never))).all(axis=1))
+
+    @property
     def names(self) -> list[str]:
         """Every sum in readable form, such as ``"Izz1 + Iyy2 + 0.376 m3"`` (SI units)."""
         labels = parameter_names(self.grouping.shape[1] // (11 if self.rotors else 10), self.rotors)

@@ -184,7 +184,8 @@ def _measure_with_effect(scenario: TrackingScenario, seed: int, path: Path) -> U
 
 
 def _reconstruct(logs: list[MotionLog], arm: Arm, method: str) -> Reconstruction:
-    return reconstruct(logs, arm, method)
+    # The paper's own library: its three steps, and what each of them is worth to a controller, are what is shown.
+    return reconstruct(logs, arm, method, "double-feature-set")
 
 
 def _diagnose(folder: Path, progress: Progress) -> Diagnosis:

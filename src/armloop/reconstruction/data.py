@@ -40,6 +40,7 @@ class Chunk:
         held_out: (N,) those that no step may fit.
         validation: (N,) those that choose orders; they are used for the final fit, too.
         independent: (N,) so many of them that four are left per period of the filter's corner.
+        folds: number of folds that the blocks are dealt into.
     """
 
     samples: Samples
@@ -47,6 +48,23 @@ class Chunk:
     held_out: Mask
     validation: Mask
     independent: Mask
+    folds: int = 5
+
+    def judging(self, part: str, margin: float = 0.0) -> Mask:
+        """(N,) held-out samples that judge: ``"all"``, ``"selection"`` (they choose the library) or ``"test"``.
+
+        Every other held-out block chooses the library, so that the rest of them chooses nothing.
+
+        Args:
+            margin: seconds from a sample in a block of another part within which none judges.
+        """
+        turn = self.blocks // self.folds % 2
+        own = self.held_out.copy()
+        if part != "all":
+            own &= turn == (0 if part == "selection" else 1)
+        if margin > 0:
+            own &= ~_near(~own, self.samples.motion, margin)
+        return own
 
     @staticmethod
     def of(samples: Samples, options: Options, first: int = 0, held_out: Mask | None = None) -> Chunk:
@@ -54,7 +72,7 @@ class Chunk:
         blocks = first + block_numbers(samples.motion, options.block_seconds)
         fold = blocks % options.folds
         held_out = fold == 0 if held_out is None else held_out
-        return Chunk(samples, blocks, held_out, fold == 1, independent_rows(samples))
+        return Chunk(samples, blocks, held_out, fold == 1, independent_rows(samples), options.folds)
 
     def take(self, rows: NDArray[np.intp]) -> Chunk:
         """Some samples, in order; each run keeps at least one."""
@@ -63,7 +81,12 @@ class Chunk:
         taken = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
         samples = Samples(taken, old.tau[rows], old.moving[rows], old.period, old.cutoff_hz)
         return Chunk(
-            samples, self.blocks[rows], self.held_out[rows], self.validation[rows], self.independent[rows]
+            samples,
+            self.blocks[rows],
+            self.held_out[rows],
+            self.validation[rows],
+            self.independent[rows],
+            self.folds,
         )
 
 
@@ -161,6 +184,20 @@ class Data:
         return map_reduce(self.workers, partial(_on_chunk, function), self.parts)
 
 
+def _near(rows: Mask, motion: Motion, seconds: float) -> Mask:
+    """(N,) samples of the same run within so many seconds of one in ``rows`` (N,)."""
+    near = np.zeros(len(rows), dtype=bool)
+    for run in motion.runs():
+        time, others = motion.time[run], np.flatnonzero(rows[run])
+        if len(others) == 0:
+            continue
+        place = np.searchsorted(others, np.arange(len(time)))
+        after = time[others[np.minimum(place, len(others) - 1)]] - time
+        before = time - time[others[np.maximum(place - 1, 0)]]
+        near[run] = (np.abs(after) <= seconds) | (np.abs(before) <= seconds)
+    return near
+
+
 def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | _Kept) -> Answer:
     chunk = part.chunk()
     assert chunk is not None, "a log changed between two passes"
@@ -199,4 +236,5 @@ def _joined(chunks: Sequence[Chunk]) -> Chunk:
         np.concatenate([c.held_out for c in chunks]),
         np.concatenate([c.validation for c in chunks]),
         np.concatenate([c.independent for c in chunks]),
+        chunks[0].folds,
     )

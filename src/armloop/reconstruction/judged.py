@@ -12,25 +12,29 @@ from armloop.goodness.features import Scales
 from armloop.goodness.witness import MOST, Witness
 from armloop.model import ReconstructedModel
 from armloop.reconstruction.data import Chunk, Data
+from armloop.reconstruction.tally import Part
 from armloop.scoring import residual
 
 #: Of streamed logs, so many chunks stand for all.
 _CHUNKS = 16
 
 
-def held_out_parts(model: ReconstructedModel, data: Data) -> list[Parts]:
+def held_out_parts(model: ReconstructedModel, data: Data, part: Part = "all") -> list[Parts]:
     """Parts of each joint's torque that a model explains, could explain, and cannot, on the held-out blocks.
 
     Args:
         model: one that has not been fitted on them.
+        part: which of the held-out blocks.
     """
     parts = data.parts[:: max(1, -(-len(data.parts) // _CHUNKS))]
     scales = Scales.of(data.reference.samples.motion)
     most = max(1, MOST // len(parts))
-    return parts_of(replace(data, parts=parts).sum(partial(_witness, model=model, scales=scales, most=most)))
+    return parts_of(
+        replace(data, parts=parts).sum(partial(_witness, model=model, part=part, scales=scales, most=most))
+    )
 
 
-def _witness(chunk: Chunk, model: ReconstructedModel, scales: Scales, most: int) -> Witness:
+def _witness(chunk: Chunk, model: ReconstructedModel, part: Part, scales: Scales, most: int) -> Witness:
     samples = chunk.samples
     load = model.rigid_body(samples.motion)
-    return witness(residual(model, samples), samples, load, np.asarray(chunk.held_out), scales, most)
+    return witness(residual(model, samples), samples, load, np.asarray(chunk.judging(part)), scales, most)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.blocks import folds
 from armloop.components import Lagrangian
+from armloop.dynamics.physics import joint_limits
 from armloop.errors import ExcitationError
 from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
@@ -26,7 +27,7 @@ from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.physical import physical_solution, physics_notes, postures
+from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
 from armloop.reconstruction.pooled import Pooled
 from armloop.reconstruction.shared import (
     FRICTION,
@@ -35,6 +36,7 @@ from armloop.reconstruction.shared import (
     check_rank,
     fast_rows,
     found_friction,
+    motion_range,
     sliding_rows,
 )
 from armloop.regression.moments import Moments
@@ -86,8 +88,13 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     fitting = Fitting(arm, samples, smoothed, rows, load, {}, options, progress)
     ladder, laws = fitting.with_laws(ladder, lambda theta: columns @ theta[: energy.count])
     smoothed, load = fitting.columns, fitting.load
-    mass = np.concatenate([energy.mass(postures(motion)), laws.mass(arm, postures(motion))], axis=3)
     r = energy.count + laws.count
+    shape = Body(
+        lambda q: np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.zeros(r, dtype=bool),
+    )
 
     def regressed(rows: Rows) -> Found:
         pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
@@ -95,9 +102,13 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, mass, ladder.laws, options.insist)
+                physical = physical_solution(solution, shape, ladder.laws, options.insist)
                 theta = physical.theta
-                physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
+                physics = {
+                    "constraints": physical.binding,
+                    "contradicted": physical.contradicted,
+                    "kept_positive": physical.where,
+                }
             except (
                 ExcitationError
             ):  # terms found in little data may leave no room for M; the notes then say so

@@ -157,7 +157,10 @@ class Pooled:
         μ is the posterior mean (Bishop, Pattern Recognition and Machine Learning, 2006, Sect. 3.5).
         """
         G, b = self._equations(self._wholes, choice, weights / self._repeats, None)
-        r, scale = self.shared, 1 / np.sqrt(np.diag(G))
+        r, sizes = self.shared, np.diag(G).copy()
+        # what the motion does not show has no size of its own
+        sizes[:r] += np.diag(prior.precision)
+        scale = 1 / np.sqrt(np.maximum(sizes, 1e-300))
         precision = prior.precision * np.outer(scale[:r], scale[:r])
         centre = prior.centre / scale[:r]
         posterior, b = G * np.outer(scale, scale), b * scale

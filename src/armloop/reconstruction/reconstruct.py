@@ -11,34 +11,47 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.blocks import folds
+from armloop.dynamics.physics import check_physics
 from armloop.errors import InputError
 from armloop.goodness import Parts, merged
 from armloop.log import require_different
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
+from armloop.motion import Samples
 from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
+from armloop.reconstruction.apart import Apart, independent_blocks
 from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
+from armloop.reconstruction.fitted import in_memory as kept_in_memory
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
 from armloop.reconstruction.judged import held_out_parts
 from armloop.reconstruction.lagrangian import lagrangian
+from armloop.reconstruction.libraries import (
+    LIBRARIES,
+    MOST_JOINTS,
+    Attempt,
+    Contender,
+    choose,
+    comparison_notes,
+    contender,
+)
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
-from armloop.reconstruction.rival import Attempt, better
-from armloop.reconstruction.shared import SHARED_CONDITIONING
+from armloop.reconstruction.ripple import find_ripple
+from armloop.reconstruction.ripple import notes as ripple_notes
+from armloop.reconstruction.shared import SHARED_CONDITIONING, motion_range
 from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.stepwise import stepwise_on
+from armloop.reconstruction.tally import Part
 from armloop.reconstruction.torque_checks import check_torques
 from armloop.scoring import Score
 from armloop.signals import Conditioning, condition
 from armloop.workers import Workers
 
 METHODS = ("stepwise", "sindy")
-LIBRARIES = ("double-feature-set", "rigid-body", "lagrangian")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +60,9 @@ class Reconstruction:
 
     Attributes:
         reports: one per step.
-        held_out: score on blocks that no step has seen.
+        held_out: score on blocks that no step has seen, and that chose nothing: no term, no orders, no library.
         notes: what the user should know.
+        libraries: those that were compared; the one taken alone where the user named it.
         parts: how much of each joint's torque is explained, predictable but not explained, and noise, on the same
             blocks; empty where nobody asked.
     """
@@ -57,6 +71,7 @@ class Reconstruction:
     reports: list[StepReport]
     held_out: Score
     notes: list[str]
+    libraries: list[Contender] = field(default_factory=list)
     parts: list[Parts] = field(default_factory=list)
 
     @property
@@ -69,15 +84,28 @@ class Reconstruction:
         return {
             "steps": [report.to_dict() for report in self.reports],
             "held_out": self.held_out.moving,
+            "library": self.model.history["library"],
+            "libraries": [one.to_dict() for one in self.libraries],
+            "physics": self.model.history["physics"],
             "joints": merged(self.parts),
             "warnings": self.warnings,
             "notes": self.notes,
         }
 
 
+def candidates(arm: Arm, options: Options) -> list[str]:
+    """Libraries that are compared where the user names none.
+
+    The double feature set only up to four joints, beyond which it explodes, and not where friction laws are asked for,
+    which it has of its own.
+    """
+    symbolic = arm.n <= MOST_JOINTS and options.friction is None
+    return [library for library in LIBRARIES if symbolic or library != "double-feature-set"]
+
+
 def default_library(arm: Arm) -> str:
-    """The double feature set up to four joints, beyond which it explodes; then rigid-body."""
-    return "double-feature-set" if arm.n <= 4 else "rigid-body"
+    """The library that a motion is designed for where none is named: the richest that is compared."""
+    return candidates(arm, Options())[0]
 
 
 def default_conditioning(library: str) -> Conditioning:
@@ -103,15 +131,15 @@ def reconstruct(
         logs: runs of the same arm, in memory or read when needed (:mod:`armloop.pieces`); which sample serves
             which step is found from the samples.
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
-        library: one of :data:`LIBRARIES`; by default what suits the number of joints, or rigid-body where the double
-            feature set turns out to be much worse (:mod:`armloop.reconstruction.rival`) and no option speaks of it.
+        library: one of :data:`LIBRARIES`; by default the best of them (:mod:`armloop.reconstruction.libraries`), unless
+            an option speaks of the double feature set.
         conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
             (:mod:`armloop.reconstruction.bandwidth`).
         recorded: how the logs recorded the torque, kept in the model for later logs.
         workers: who passes over logs that are not kept in memory; by default this process.
         in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
             every pass by the stepwise method on the double feature set, in memory that does not grow with them;
-            the other libraries read everything.
+            the other libraries read everything, and are not compared with it.
 
     Raises:
         InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
@@ -119,26 +147,29 @@ def reconstruct(
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
-    asked = library is not None or (options is not None and options.of_double_feature_set)
-    library = library or default_library(arm)
-    if library not in LIBRARIES:
+    settings = options or Options()
+    if library is None and (method == "sindy" or settings.of_double_feature_set):
+        library = "double-feature-set"
+    if library is not None and library not in LIBRARIES:
         raise InputError(f"unknown library {library!r}; there are: {', '.join(LIBRARIES)}")
     if method == "sindy" and library != "double-feature-set":
         raise InputError(f"method 'sindy' works on the library double-feature-set, not on {library!r}")
-    options = options or Options()
-    if options.friction is not None and library == "double-feature-set":
+    if settings.friction is not None and library == "double-feature-set":
         raise InputError(
             "the double feature set has friction of its own (Coulomb, Stribeck, terms of the velocities); "
             "laws are chosen with --library rigid-body or lagrangian"
         )
-    check_laws(options.friction)
+    check_laws(settings.friction)
     for log in logs:
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
-
     large = sum(log.samples for log in logs) > in_memory
     kept = [] if large and method == "stepwise" else [log.read() for log in logs]
     require_different(kept)
+    time_series = conditioning is None or conditioning.cutoff_hz > 0
+    if library is None and (not time_series or (large and arm.n <= MOST_JOINTS)):
+        library = candidates(arm, settings)[0]
+    apart: Apart | None = None
 
     if conditioning is None:
         progress("choosing the low-pass on held-out blocks")
@@ -149,24 +180,28 @@ def reconstruct(
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
     def attempt(library: str) -> Attempt:
+        nonlocal apart, settings
         how = conditioning or bandwidth.suited(default_conditioning(library))
-        progress(f"conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        if apart is None:
+            apart = independent_blocks(arm, kept or logs, how, settings.block_seconds, settings.folds)
+            settings = replace(settings, block_seconds=apart.seconds)
         if large and method == "stepwise" and library == "double-feature-set":
-            data = Data.streamed(logs, how, options, workers)
+            data = Data.streamed(logs, how, settings, workers)
         else:
-            data = Data.of(condition(kept or [log.read() for log in logs], how), options)
+            data = Data.of(condition(kept or [log.read() for log in logs], how), settings)
         check_recorded(arm, data.reference.samples)
-        found = _found(arm, data, method, library, options, progress)
+        found = _found(arm, data, method, library, settings, progress)
         if bandwidth.trials:
             found.history["bandwidth"] = bandwidth.to_dict()
         found.notes += bandwidth.notes()
-        return Attempt(library, how, data, found)
+        return Attempt(library, how, data, found, apart.margin)
 
-    tried = attempt(library)
-    if not asked and method == "stepwise" and tried.may_have_rival:
-        progress("the same with the base parameters of the URDF, for comparison")
-        tried = better(tried, attempt)
-    return _finished(tried, arm, method, logs, options, progress, recorded)
+    if library is not None:
+        tried = [Contender(library, attempt(library), chosen=True)]
+    else:
+        tried = choose([contender(one, attempt) for one in candidates(arm, settings)])
+    return _finished(tried, arm, method, logs, settings, progress, recorded, apart)
 
 
 def _found(arm: Arm, data: Data, method: str, library: str, options: Options, progress: Progress) -> Found:
@@ -181,16 +216,34 @@ def _found(arm: Arm, data: Data, method: str, library: str, options: Options, pr
 
 
 def _finished(
-    tried: Attempt,
+    libraries: list[Contender],
     arm: Arm,
     method: str,
     logs: Sequence[LogSource],
     options: Options,
     progress: Progress,
     recorded: dict[str, Any] | None,
+    apart: Apart | None,
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
-    found, data = tried.found, tried.data
+    (tried,) = [one.attempt for one in libraries if one.chosen]
+    assert tried is not None
+    found, data, compared = tried.found, tried.data, len(libraries) > 1
+    if method == "stepwise" and kept_in_memory(data):
+        bare = ReconstructedModel(
+            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
+        )
+        chunk = data.reference
+        ripple = find_ripple(bare, [log.read() for log in logs], chunk.samples, chunk.held_out)
+        found.notes += ripple_notes(ripple)
+        for one in (found, *([] if found.final is None else [found.final])):
+            one.effects = (*one.effects, *ripple)
+    notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
+    if apart is not None and apart.too_short:
+        notes.append(
+            f"the residual remembers for {apart.correlation:.2g} s, and the logs are too short for held-out blocks of more "
+            f"than {apart.seconds:.2g} s: the held-out error may be too good"
+        )
     model = ReconstructedModel(
         arm=arm,
         components=tuple(found.components),
@@ -203,36 +256,35 @@ def _finished(
             "library": tried.library,
             "logs": list(dict.fromkeys(log.name for log in logs)),
             "steps": [report.to_dict() for report in found.reports],
-            "notes": found.notes,
-            "range": _range(data.reference.samples.motion),
+            "range": motion_range(data.reference.samples.motion),
             **found.history,
         },
     )
-    tally = tried.tally(found.sorter)
+    part: Part = "test" if compared else "all"
+    tally = tried.tally(found.sorter, part)
     parts = []
     if options.parts:
         progress("what a flexible regression still finds in what the model leaves")
-        parts = held_out_parts(model, data)
+        parts = held_out_parts(model, data, part)
     model = replace(model, baseline={**tally.baseline(), "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)
-        final = found.final
+        last = found.final
         model = replace(
-            model, components=components, friction=final.law, effects=final.effects, history=history
+            model, components=components, friction=last.law, effects=last.effects, history=history
         )
+    checks = check_physics(model)
+    notes += checks.faults()
+    history = {**model.history, "physics": checks.to_dict(), "notes": notes}
+    if compared:
+        history["libraries"] = [one.to_dict() for one in libraries]
+    model = replace(model, history=history)
     if options.standard_errors:
         progress("standard errors of the coefficients")
         shared = tried.library in ("rigid-body", "lagrangian")
         model = replace(model, uncertainty=uncertainty(model, data, found, shared))
-    return Reconstruction(model, found.reports, tally.score(), found.notes, parts)
-
-
-def _range(motion: Motion) -> list[list[float]]:
-    """Half ranges of q, v, vdot, then the centre of q: where the model knows the arm."""
-    low, high = np.quantile(motion.q, 0.005, axis=0), np.quantile(motion.q, 0.995, axis=0)
-    rates = [np.quantile(np.abs(x), 0.995, axis=0).tolist() for x in (motion.v, motion.vdot)]
-    return [(0.5 * (high - low)).tolist(), *rates, (0.5 * (high + low)).tolist()]
+    return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
 
 
 def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:

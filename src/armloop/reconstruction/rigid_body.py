@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.components import RigidBody
+from armloop.dynamics.physics import joint_limits
 from armloop.kinematics import nominal_parameters
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
@@ -22,15 +23,17 @@ from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import climb
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.physical import physical_solution, physics_notes, postures
+from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
 from armloop.reconstruction.pooled import Pooled, Prior
 from armloop.reconstruction.shared import (
     PLAIN_FRICTION,
     check_moves,
-    check_rank,
     fast_rows,
     found_friction,
+    motion_range,
+    products_of,
     sliding_rows,
+    undetermined_notes,
 )
 from armloop.signals import smooth
 
@@ -50,7 +53,7 @@ def rigid_body(
     What physics demands (M(q) positive definite, friction that never drives) is kept as constraints.
 
     Raises:
-        ExcitationError: a joint does not move, or the motion leaves base parameters undetermined.
+        ExcitationError: a joint does not move.
     """
     motion = samples.motion
     sliding = sliding_rows(samples)
@@ -59,7 +62,7 @@ def rigid_body(
     base = BaseParameters.of_arm(arm, rotors=True)
     raw = base.columns(arm, motion)
     columns = smooth(samples, raw)
-    check_rank(columns, rows, base)
+    unknown = undetermined_notes(products_of(columns, rows), base)
     plain = Pooled(samples, columns, [list(PLAIN_FRICTION) for _ in arm.joints], rows & fast_rows(samples))
     load = raw @ plain.solve(plain.everything).theta[: base.count]
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
@@ -69,19 +72,30 @@ def rigid_body(
     fitting = Fitting(arm, samples, columns, rows, load, priors, options, progress)
     ladder, laws = fitting.with_laws(ladder, lambda theta: raw @ theta[: base.count])
     columns, load = fitting.columns, fitting.load
-    mass = np.concatenate(
-        [mass_columns(arm, base, postures(motion)), laws.mass(arm, postures(motion))], axis=3
-    )
     r = base.count + laws.count
+    shape = Body(
+        lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
+    )
 
     def regressed(rows: NDArray[np.bool_]) -> Found:
         pooled = Pooled(samples, columns, ladder.laws, rows, load, passive=options.physical)
         solution = pooled.solve(pooled.everything, ladder.prior)
         theta, physics = solution.theta, {}
         if options.physical:
-            physical = physical_solution(solution, mass, ladder.laws, options.insist)
+            physical = physical_solution(solution, shape, ladder.laws, options.insist)
             theta = physical.theta
-            physics = {"constraints": physical.binding, "contradicted": physical.contradicted}
+            physics = {
+                "constraints": physical.binding,
+                "contradicted": physical.contradicted,
+                "kept_positive": physical.where,
+            }
+            held = np.flatnonzero(
+                base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
+            )
+            physics["held"] = {base.names[k]: float(solution.theta[k]) for k in held}
         values = theta[: base.count]
         body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
         inertial = body.parameters[: 10 * arm.n].tolist()
@@ -104,6 +118,7 @@ def rigid_body(
     found.notes = [
         "the steps share one set of parameters: they were regressed together and are told apart on prediction",
         "the held-out blocks judged a model without them; the model itself was then regressed on all data",
+        *unknown,
         *ladder.notes,
         *laws.notes(final.effects),
     ]

@@ -14,7 +14,8 @@ from armloop.arm import Arm
 from armloop.errors import ExcitationError
 from armloop.library.friction import FrictionTerm
 from armloop.library.rigid_body import BaseParameters
-from armloop.motion import Samples
+from armloop.motion import Motion, Samples
+from armloop.regression.determined import combination, told_apart
 from armloop.signals import Conditioning, at_least
 
 Array = NDArray[np.float64]
@@ -66,6 +67,13 @@ def _steady(samples: Samples) -> NDArray[np.bool_]:
     return steady
 
 
+def motion_range(motion: Motion) -> list[list[float]]:
+    """Half ranges of q, v, vdot, then the centre of q: where a model knows the arm."""
+    low, high = np.quantile(motion.q, 0.005, axis=0), np.quantile(motion.q, 0.995, axis=0)
+    rates = [np.quantile(np.abs(x), 0.995, axis=0).tolist() for x in (motion.v, motion.vdot)]
+    return [(0.5 * (high - low)).tolist(), *rates, (0.5 * (high + low)).tolist()]
+
+
 def check_moves(arm: Arm, rows: NDArray[np.bool_]) -> None:
     """Raise unless every joint moves in the rows (N, n) that are fitted."""
     for j, joint in enumerate(arm.joints):
@@ -94,13 +102,38 @@ def found_friction(laws: list[list[FrictionTerm]], values: Array) -> list[list[F
 
 def check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) -> None:
     """Raise unless the motion tells most base parameters apart; the ridge takes care of the last few."""
-    stacked = np.concatenate([columns[rows[:, j], j] for j in range(columns.shape[1])])
-    scale = np.linalg.norm(stacked, axis=0)
-    scaled = stacked / np.maximum(scale, 1e-12)
-    eigenvalues = np.linalg.eigvalsh(scaled.T @ scaled)
-    weak = int(np.count_nonzero(eigenvalues < 1e-8 * eigenvalues[-1]))
+    weak = base.count - len(told_apart(products_of(columns, rows))[0])
     if weak > base.count // 3:
         raise ExcitationError(
             f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
             "joints"
         )
+
+
+def products_of(columns: Array, rows: NDArray[np.bool_]) -> Array:
+    """(r, r) products of shared columns (N, n, r), summed over the rows (N, n) that are fitted."""
+    parts = [columns[rows[:, j], j] for j in range(columns.shape[1])]
+    return np.asarray(sum(part.T @ part for part in parts))
+
+
+def undetermined_notes(G: Array, base: BaseParameters) -> list[str]:
+    """Which base parameters a motion does not determine by themselves, and the sums that it does, in a line.
+
+    Args:
+        G: (r, r) of :func:`products_of` the base parameters' columns.
+    """
+    kept, sums = told_apart(G)
+    if len(kept) == base.count:
+        return []
+    leads = [name.split(" ")[0] for name in base.names]
+    lost = [leads[k] for k in range(base.count) if k not in kept]
+    known = [
+        combination(row, leads, int(k))
+        for k, row in zip(kept, sums, strict=True)
+        if np.count_nonzero(row) > 1
+    ]
+    line = (
+        f"the motion does not determine {len(lost)} of {base.count} inertial parameters by themselves: {', '.join(lost)} "
+        "were taken from the URDF"
+    )
+    return [line + (f"; what it determines is {', '.join(known)}" if known else "")]

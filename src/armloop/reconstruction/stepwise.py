@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.conditions import Clusters, Condition, sort_samples
+from armloop.errors import ExcitationError
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.motion import Motion, Samples
 from armloop.progress import Progress
@@ -34,37 +35,58 @@ def stepwise(
 def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
     """Reconstruct in three steps (Sect. 3.2, 3.3).
 
-    Where the log has no clean static or constant-velocity data, hard clusters would feed a step with
-    what it must not see; then the three libraries are regressed together on all samples, their terms
-    still labelled by step, and a note says so. So they are where the steps leave more than noise
+    Where the log has no clean static or constant-velocity data, or a joint hardly moves in them, hard clusters would
+    feed a step with what it must not see, or with nothing; then the three libraries are regressed together on all
+    samples, their terms still labelled by step, and a note says so. So they are where the steps leave more than noise
     (:mod:`armloop.reconstruction.revision`).
 
     Raises:
-        ExcitationError: a joint does not move, or a condition has too few samples.
+        ExcitationError: a joint does not move.
     """
     samples = data.reference.samples
     check_excitation(arm, samples)
     clusters = sort_samples(samples.motion, seed=options.seed)
     note = _impure(samples.motion, clusters)
-    found = Found(arm, friction=[[] for _ in arm.joints], notes=[note] if note else [])
     sorter = Sorter(samples.motion, clusters.condition)
-    if not note:
-        found.sorter = sorter
     revolute = tuple(bool(r) for r in arm.revolute)
-    for plan in _together(revolute, options) if note else steps(revolute, options):
+    if not note:
+        try:
+            found = _in_steps(arm, data, steps(revolute, options), sorter, clusters, options, progress)
+            found.sorter = sorter
+        except ExcitationError as error:
+            note = f"{error}; all three steps are regressed together instead"
+    if note:
+        found = _in_steps(arm, data, _together(revolute, options), None, clusters, options, progress)
+        found.notes.append(note)
+    if refit(found, data, options.sparse.estimator):
+        found.notes.append(REFITTED)
+    return revised(found, data, revolute, options, progress)
+
+
+def _in_steps(
+    arm: Arm,
+    data: Data,
+    plans: list[StepPlan],
+    sorter: Sorter | None,
+    clusters: Clusters,
+    options: Options,
+    progress: Progress,
+) -> Found:
+    """One regression after the other, each on the samples of its condition; on all of them without a sorter."""
+    found = Found(arm, friction=[[] for _ in arm.joints])
+    revolute = tuple(bool(r) for r in arm.revolute)
+    for plan in plans:
         share = float(np.isin(clusters.condition, plan.conditions).mean())
         progress(f"{plan.name}: {share:.0%} of the samples")
         # A copy: what is found now must not be inherited by itself.
         inherited = Found(arm, list(found.components), [list(law) for law in found.friction])
-        choice = Choice(None if note else sorter, plan.conditions, inherited)
+        choice = Choice(sorter, plan.conditions, inherited)
         terms, friction, report = regress_step(data, revolute, choice, plan, options)
         found.components += terms
         for law, more in zip(found.friction, friction, strict=True):
             law += more
         found.reports += report
-    if refit(found, data, options.sparse.estimator):
-        found.notes.append(REFITTED)
-    return revised(found, data, revolute, options, progress)
+    return found
 
 
 def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,10 @@ from armloop.reconstruction.sorter import Sorter
 from armloop.scoring import Score, residual
 
 Array = NDArray[np.float64]
+
+#: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
+Part = Literal["all", "selection", "test"]
+SELECTION: Part = "selection"
 
 #: Moving samples that make a block's error one.
 _FEWEST = 20
@@ -42,9 +46,20 @@ class Tally:
         return Tally(sums, np.concatenate([self.blocks, other.blocks]), self.samples + other.samples)
 
     @staticmethod
-    def of(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None) -> Tally:
-        """Sums of one chunk, of all runs as they are: prediction and filter need every sample."""
-        samples, held = chunk.samples, chunk.held_out
+    def of(
+        chunk: Chunk,
+        model: ReconstructedModel,
+        sorter: Sorter | None,
+        part: Part = "all",
+        margin: float = 0.0,
+    ) -> Tally:
+        """Sums of one chunk, of all runs as they are: prediction and filter need every sample.
+
+        Args:
+            part: which of the held-out blocks judge.
+            margin: seconds from a block that was fitted, or that chose, within which samples do not judge.
+        """
+        samples, held = chunk.samples, chunk.judging(part, margin)
         squares = residual(model, samples)[held] ** 2
         torques, moving = samples.tau[held] ** 2, samples.moving[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples.motion)
@@ -86,6 +101,18 @@ class Tally:
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
         return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "samples": self.samples}
+
+    def relative_blocks(self) -> Array:
+        """(B,) mean square of each block's error relative to the torque, mean over the joints that move in it.
+
+        NaN where none does.
+        """
+        scale = np.array([x if x else np.nan for x in self.score().rms]) ** 2
+        errors, counts = self.blocks[:, 0], self.blocks[:, 1]
+        relative = np.where(counts >= _FEWEST, errors / np.maximum(counts, 1.0), np.nan) / scale
+        known = np.isfinite(relative)
+        sums = np.where(known, relative, 0.0).sum(axis=1)
+        return np.where(known.any(axis=1), sums / np.maximum(known.sum(axis=1), 1), np.nan)
 
     def _worst(self) -> list[float | None]:
         """RMSE per joint that one block in ten exceeds: a run may consist of such motion."""

@@ -75,12 +75,13 @@ def _of(chunk: Chunk, choice: Choice, columns: Columns, fits: Sequence[Fit], noi
     for joint, fit in enumerate(fits):
         part = usable.take(usable.moving[:, joint])
         inherited, weights = _inherited(choice, joint)
-        rows = columns.library.index[fit.support[fit.support < size]]
+        # One order throughout, waves first and then friction; what is returned is in that of the fit again.
+        support = np.sort(fit.support)
+        rows = columns.library.index[support[support < size]]
         own = wave_terms(columns.library.factors, rows)
         terms = UnbiasedTerms([*own, *inherited], noise)
         waves, gram = terms.columns(part.motion), terms.gram(part.motion)
-        # Chosen columns in the order of the support: waves first, then friction.
-        X = columns.chosen(part, joint, np.sort(fit.support))
+        X = columns.chosen(part, joint, support)
         k, beside = len(own), X[:, len(own) :]
         load = part.tau - part.rest
         tau = part.tau[:, joint] - friction.torque(part.motion, load=load)[:, joint]

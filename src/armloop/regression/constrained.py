@@ -23,6 +23,8 @@ Cuts = Callable[[Array], Array]
 
 _ROUNDS = 20
 _TOLERANCE = 1e-9
+#: What a constraint may be violated by in the end, relative to the size of its addends: what osqp leaves.
+_FEASIBLE = 1e-6
 #: Steps of osqp before the active-set method takes over.
 _STEPS = 2000
 
@@ -42,7 +44,7 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
         θ, and the number of constraints that were needed (0: ``start`` itself).
 
     Raises:
-        ArithmeticError: no solution is found.
+        ArithmeticError: no solution is found, or the last one still violates a constraint.
     """
     # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
     # In coordinates z = Lᵀθ with G = LLᵀ the cost is ‖z − z₀‖²: as well conditioned as it can be.
@@ -53,12 +55,20 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
     for _ in range(_ROUNDS):
         violated = cuts(theta)
         if len(violated) == 0:
-            break
+            return theta, len(rows)
         rows = np.vstack([rows, violated])
         A = solve_triangular(L, (rows * scale).T, lower=True).T
         A /= np.linalg.norm(A, axis=1, keepdims=True)
         z = _nearest(target, A)
         theta = scale * solve_triangular(L, z, lower=True, trans="T")
+    left = cuts(theta)
+    if len(left):
+        sizes = np.maximum(np.abs(left * theta).sum(axis=1), 1e-300)
+        worst = float((left @ theta / sizes).min())
+        if worst < -_FEASIBLE:
+            raise ArithmeticError(
+                f"after {_ROUNDS} rounds of new constraints {len(left)} are still violated, by {-worst:.1g} at worst"
+            )
     return theta, len(rows)
 
 

@@ -25,15 +25,26 @@ def coefficients_table(model: ReconstructedModel, title: str | None = "Coefficie
     if not errors:
         return None
     rows: list[list[object]] = []
-    shared = _shared_values(model)
+    shared, lost = _shared_values(model), _undetermined(model)
     rows += [
-        ["", name, *_cells(shared[name], entry)] for name, entry in errors["shared"].items() if name in shared
+        ["", name, *_cells(shared[name], entry, (None, name) in lost)]
+        for name, entry in errors["shared"].items()
+        if name in shared
     ]
     for j in range(model.arm.n):
         values = {name: c for component in model.components for _, c, name in component.terms(model.arm, j)}
         values |= {term.name(j + 1): term.coefficient for term in model.friction.terms[j]}
         entries = {**errors["joints"][j], **errors["friction"][j]}
-        rows += [[j + 1, name, *_cells(values[name], e)] for name, e in entries.items() if name in values]
+        rows += [
+            [j + 1, name, *_cells(values[name], e, (j + 1, name) in lost)]
+            for name, e in entries.items()
+            if name in values
+        ]
+    for group in errors.get("undetermined", []):
+        rows += [
+            [group["joint"] or "", one["sum"], with_error(one["value"], one["std_error"]), *[MISSING] * 3]
+            for one in group["sums"]
+        ]
     headers = ["joint", "term", "value ± error", "t", "95 % interval", "degrees of freedom"]
     return make_table(headers, rows, title, left=(0, 1))
 
@@ -66,7 +77,15 @@ def _shared_values(model: ReconstructedModel) -> dict[str, float]:
     return {}
 
 
-def _cells(value: float, entry: dict[str, float]) -> list[str]:
+def _undetermined(model: ReconstructedModel) -> set[tuple[int | None, str]]:
+    """Joint (from 1) and name of the coefficients that the training data do not tell from others."""
+    groups = model.uncertainty.get("undetermined", [])
+    return {(group["joint"], name) for group in groups for name in group["coefficients"]}
+
+
+def _cells(value: float, entry: dict[str, float], lost: bool) -> list[str]:
+    if lost:
+        return ["not determined", *[MISSING] * 3]
     error, freedom = entry["std_error"], entry["degrees_of_freedom"]
     half = error * float(student.ppf(0.975, freedom))
     ratio = number(value / error) if error > 0 else MISSING

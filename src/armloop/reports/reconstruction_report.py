@@ -14,7 +14,15 @@ from armloop.reconstruction import Reconstruction, StepReport
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import clusters_figure, friction_figure, has_trials, orders_figure, torque_figure
-from armloop.reports.tables import Table, formulas, make_table, parts_table, score_table, steps_table
+from armloop.reports.tables import (
+    Table,
+    formulas,
+    libraries_table,
+    make_table,
+    parts_table,
+    score_table,
+    steps_table,
+)
 from armloop.reports.words import counted, number, percent
 from armloop.scoring import Score
 from armloop.signals import condition
@@ -115,13 +123,15 @@ def reconstruction_sections(
         pictures.append(Picture(torque_figure(model, samples), _TORQUE))
         pictures.append(Picture(friction_figure(model, samples), _FRICTION))
     tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
+    if len(reconstruction.libraries) > 1:
+        tables.insert(0, libraries_table(reconstruction.libraries))
     text = [
         f"The model was reconstructed from {counted(len(history.get('logs', [])), 'log')} with the method "
         f"{history.get('method', 'unknown')} on the library {history.get('library', 'unknown')}: from many "
         "candidate functions a sparse regression keeps those that lower the error on data it was not "
         "fitted on.",
-        f"On the {counted(reconstruction.held_out.samples, 'sample')} that no step has seen, it is off by "
-        f"{percent(mean_nrmse(reconstruction.held_out))} of the measured torque (nRMSE of moving samples, "
+        f"On the {counted(reconstruction.held_out.samples, 'sample')} that no step has seen and that chose nothing, it "
+        f"is off by {percent(mean_nrmse(reconstruction.held_out))} of the measured torque (nRMSE of moving samples, "
         "mean of the joints).",
     ]
     if reconstruction.parts:

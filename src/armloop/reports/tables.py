@@ -24,6 +24,7 @@ if TYPE_CHECKING:  # what makes the results need not be loaded to print them
     from armloop.goodness import Parts
     from armloop.model import ReconstructedModel
     from armloop.reconstruction import StepReport
+    from armloop.reconstruction.libraries import Contender
     from armloop.scoring import Score
 
 
@@ -98,7 +99,10 @@ def eta_table(
 
 
 def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the reconstruction") -> Table:
-    """Orders, library sizes, terms kept per joint, samples per joint and held-out error of each step."""
+    """Orders, library sizes, terms kept per joint, samples per joint of each step, and the error that chose its orders.
+
+    It is one on blocks that were not fitted, but it is the least of several: no measure of the model.
+    """
     rows = []
     for report in reports:
         chosen = [error for orders, error in report.trials if report.orders and orders[0] == report.orders[0]]
@@ -120,7 +124,40 @@ def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the
         "independent",
         "terms per joint",
         "samples per joint",
-        "held-out error",
+        "error choosing orders",
+    ]
+    return make_table(headers, rows, title)
+
+
+def libraries_table(libraries: Sequence[Contender], title: str | None = "Libraries compared") -> Table:
+    """Error on the blocks that choose the library, number of coefficients, and the checks of physics of each library."""
+    rows: list[list[object]] = []
+    for one in libraries:
+        name = f"{one.library} (taken)" if one.chosen else one.library
+        if one.checks is None:
+            rows.append([name, *[MISSING] * 6])
+            continue
+        checks = one.checks
+        drives = [str(j + 1) for j, torque in enumerate(checks.driving) if torque]
+        rows.append(
+            [
+                name,
+                percent(one.error),
+                one.coefficients,
+                checks.least,
+                percent(checks.asymmetry),
+                f"drives joint {', '.join(drives)}" if drives else "passive",
+                MISSING if checks.yaw is None else percent(checks.yaw),
+            ]
+        )
+    headers = [
+        "library",
+        "nRMSE choosing it",
+        "coefficients",
+        "least eigenvalue of M",
+        "asymmetry of M",
+        "friction",
+        "torque by yaw",
     ]
     return make_table(headers, rows, title)
 

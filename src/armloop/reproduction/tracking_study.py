@@ -51,7 +51,7 @@ def _run(seed: int) -> Run:
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant
     logs = collect(plant.arm, plant.config, load_plan("paper"), seed)
-    model = reconstruct(list(logs.values()), plant.arm).model
+    model = reconstruct(list(logs.values()), plant.arm, library="double-feature-set").model
     reference = paper_reference(periods=1)
     measured = measure_run(plant.arm, plant.config, seed + 100, rate=250.0, reference=reference)
     samples = condition([measured], model.conditioning)

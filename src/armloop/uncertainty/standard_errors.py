@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
+from armloop.regression.determined import combination, told_apart
 from armloop.uncertainty.blocking import block_length, correlation_time, covered_time, independent_blocks
+from armloop.uncertainty.friction_lines import friction_line
 from armloop.uncertainty.sandwich import Equations
 from armloop.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 
@@ -56,6 +58,38 @@ class Errors:
         """(p,) standard errors."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
+    def undetermined(self) -> list[dict[str, Any]]:
+        """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
+
+        A joint's own friction stays, of two terms that are one function on these samples.
+        """
+        own = self.equations.stage[:, None] == self.equations.stage
+        G = np.where(own, self.equations.jacobian.sum(axis=0), 0.0)
+        order = np.argsort([unknown.kind != "friction" for unknown in self.unknowns], kind="stable")
+        kept, sums = told_apart(G[np.ix_(order, order)])
+        lost = sorted(set(range(len(order))) - set(kept.tolist()))
+        if not lost:
+            return []
+        names = [self.unknowns[k].name for k in order]
+        values = np.array([self.unknowns[k].value for k in order])
+        covariance = self.covariance[np.ix_(order, order)]
+        mixed = [(int(k), row) for k, row in zip(kept, sums, strict=True) if np.count_nonzero(row) > 1]
+        joint = self.unknowns[order[lost[0]]].joint
+        return [
+            {
+                "joint": None if joint is None else joint + 1,
+                "coefficients": [names[k] for k in lost],
+                "sums": [
+                    {
+                        "sum": combination(row, names, k),
+                        "value": float(row @ values),
+                        "std_error": float(np.sqrt(max(row @ covariance @ row, 0.0))),
+                    }
+                    for k, row in mixed
+                ],
+            }
+        ]
+
 
 def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> dict[str, Any]:
     """What the model file keeps under ``uncertainty``.
@@ -67,7 +101,9 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
     Returns:
         ``joints`` and ``friction``: per joint, for every term's name (and ``v_s``) its ``std_error`` and
         ``degrees_of_freedom`` of Student's t; ``shared``: the same for terms that serve all joints;
+        ``undetermined``: coefficients that these samples do not tell apart, and the sums of them that they determine;
         ``stribeck``: per joint f_s, f_c, f_v, v_s of Eq. (34), where the law has that form;
+        ``friction_line``: per joint f_c, f_v of the straight line nearest to any law;
         ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
     """
     parts, seconds, correlation = covariances(model, samples, fitted)
@@ -84,7 +120,10 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
             # what the fitted samples do not determine has no error; it must not spoil the model's file
             if np.isfinite(error) and np.isfinite(freedom):
                 where[unknown.name] = _entry(error, freedom)
+    table["undetermined"] = [entry for part in parts for entry in part.undetermined()]
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
+    rows = np.logical_or.reduce([one.rows for one in fitted])
+    table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
         "block_seconds": seconds,
@@ -318,3 +357,18 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
                 if np.isfinite(error) and np.isfinite(freedom):
                     found[key] = {"value": float(value), **_entry(error, freedom)}
     return found
+
+
+def _line(
+    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """:func:`friction_line` of a joint, whose friction is all in one problem."""
+    for part in parts:
+        own = np.array([u.kind == "friction" and u.joint == joint for u in part.unknowns], dtype=bool)
+        if own.any():
+            names = [u.name for u, mine in zip(part.unknowns, own, strict=True) if mine]
+            covariance = part.covariance[np.ix_(own, own)]
+            return friction_line(
+                model, joint, names, covariance, float(part.freedom[own].min()), samples, rows
+            )
+    return {}

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.dynamics.physics import mass_matrix
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
 from armloop.progress import Progress, silent
 from armloop.reconstruction import Options
 from armloop.signals import condition
@@ -101,17 +101,6 @@ def compare_physical(
         for at in (near, far)
     )
     return PhysicalComparison(runs, within, beyond, constraints)
-
-
-def mass_matrix(model: ReconstructedModel, q: Array) -> Array:
-    """(P, n, n) mass matrix of a model's rigid body at postures q (P, n): torques of unit accelerations at rest."""
-    P, n = q.shape
-    repeated = np.repeat(q, n + 1, axis=0)
-    vdot = np.tile(np.vstack([np.eye(n), np.zeros(n)]), (P, 1))
-    still = np.zeros_like(repeated)
-    motion = Motion(np.arange(float(len(repeated))), repeated, still, vdot, np.array([0]))
-    tau = model.rigid_body(motion).reshape(P, n + 1, n)
-    return (tau[:, :n] - tau[:, n:]).transpose(0, 2, 1)
 
 
 def check_mass_matrix(model: ReconstructedModel, q: Array) -> MassMatrixCheck:
