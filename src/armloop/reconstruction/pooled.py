@@ -144,7 +144,11 @@ class Pooled:
         """(folds, n) squared errors on every fold, of a regression on the others."""
         errors = np.empty((self.folds, len(choice)))
         for fold in range(self.folds):
-            rest = [whole - parts[fold] for whole, parts in zip(self._wholes, self._parts, strict=True)]
+            # Added up anew: a difference would leave round-off of columns that this fold alone excites.
+            rest = [
+                total([part for k, part in enumerate(parts) if k != fold] or [parts[fold] - parts[fold]])
+                for parts in self._parts
+            ]
             theta = self._solved(*self._equations(rest, choice, weights, prior), choice)
             for j, own in enumerate(self._spread(theta, choice)):
                 errors[fold, j] = self._judges[j][fold].squared_error(own)
