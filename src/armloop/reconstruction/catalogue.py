@@ -239,12 +239,11 @@ def _best_shape(own: Projected, effect: Effect, columns: _Columns) -> tuple[floa
 
 
 class _Columns:
-    """Columns of the laws on the training motion, each computed once."""
+    """Columns of the laws on the training motion; kept for nobody, for all of them together may be more than the log."""
 
     def __init__(self, arm: Arm, samples: Samples) -> None:
         self._samples = samples
         self.context = Context(arm, samples.motion, period=samples.period)
-        self._smoothed: dict[tuple[object, float], Array] = {}
 
     def raw(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) unfiltered."""
@@ -252,21 +251,16 @@ class _Columns:
 
     def smoothed(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) through the samples' filter."""
-        key = (effect.place, shape)
-        if key not in self._smoothed:
-            columns = self.raw(effect, shape)
-            acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
-            if not acts:
-                return columns
-            first, *others = acts
-            # what acts alike, or against each other, on several joints is filtered once
-            like = {j: _ratio(columns[:, j], columns[:, first]) for j in others}
-            columns[:, first] = smooth(self._samples, columns[:, first])
-            for j, ratio in like.items():
-                whole = columns[:, j]
-                columns[:, j] = smooth(self._samples, whole) if ratio is None else ratio * columns[:, first]
-            self._smoothed[key] = columns
-        return self._smoothed[key]
+        columns = self.raw(effect, shape)
+        acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
+        # what acts alike, or against each other, on several joints is filtered once
+        like = {j: _ratio(columns[:, j], columns[:, acts[0]]) for j in acts[1:]}
+        for j in acts:
+            ratio = like.get(j)
+            columns[:, j] = (
+                smooth(self._samples, columns[:, j]) if ratio is None else ratio * columns[:, acts[0]]
+            )
+        return columns
 
 
 def _ratio(x: Array, y: Array) -> float | None:
