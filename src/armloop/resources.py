@@ -20,6 +20,17 @@ def urdf_path(name: str) -> Path:
     return _find("urdf", ".urdf", name, "arm", ArmError)
 
 
+def measured_folder(name: str) -> Path:
+    """Return the folder of measured logs that come with armloop (`ur5`), with licence and source.
+
+    Raises `InputError` when there is none of that name.
+    """
+    folder = _folder("scenarios") / "measured" / name
+    if folder.is_dir():
+        return folder
+    raise InputError(f"{name}: no measured logs of that name come with armloop; there are: ur5")
+
+
 def scenario_path(name: str) -> Path:
     """Return the YAML file of the built-in scenario `name` (such as `three_axis_tracking`).
 

@@ -110,6 +110,10 @@ CASES: dict[tuple[str, int | None], tuple[Law, dict[str, object]]] = {
         lambda m: on_joint(m, 2, 0.08 * np.abs(load(m)[:, 1]) * np.sign(m.v[:, 1])),
         {"coefficient": 0.08},
     ),
+    ("viscous_asymmetry", 1): (
+        lambda m: on_joint(m, 1, 0.25 * np.abs(m.v[:, 0])),
+        {"coefficient": 0.25},
+    ),
     ("quadratic_drag", 3): (
         lambda m: on_joint(m, 3, 0.4 * m.v[:, 2] * np.abs(m.v[:, 2])),
         {"coefficient": 0.4},

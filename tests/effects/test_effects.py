@@ -80,6 +80,7 @@ LAWS: dict[str, tuple[Law, dict[str, float], float]] = {
         {"coefficient": 0.4},
         0.0,
     ),
+    "viscous_asymmetry": (on_joint_2(lambda m: 0.3 * np.abs(m.v[:, 1])), {"coefficient": 0.3}, 0.0),
     "stribeck_friction": (
         on_joint_2(lambda m: 0.5 * np.exp(-((m.v[:, 1] / 0.1) ** 2)) * np.sign(m.v[:, 1])),
         {"static_excess": 0.5, "velocity": 0.1},
@@ -136,14 +137,14 @@ def fitted(kind: Effect, context: Context, tau: np.ndarray, shape: float) -> dic
 
 
 def test_the_published_effects_are_there():
-    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 19
+    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 20
     assert all(EFFECTS[name].joint_wise for name in LAWS)
     whole = {"payload", "gravity_tilt", "time_delay", "external_contact"}
     assert {name for name, kind in EFFECTS.items() if not kind.joint_wise} == whole
     sensors = {"torque_offset", "torque_gain", "encoder_offset", "time_delay"}
     assert {name for name, kind in EFFECTS.items() if kind.sensor} == sensors
     labels = [h.label() for h in hypotheses(an_arm())]
-    assert len(labels) == len(set(labels)) == 14 * 3 + 3 + 3
+    assert len(labels) == len(set(labels)) == 15 * 3 + 3 + 3
     assert "viscous_friction at joint 3" in labels and "payload" in labels
     assert "transmission_coupling of joints 1 and 3" in labels
     assert "external_contact" not in labels  # an event: sought before everything else

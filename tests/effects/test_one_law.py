@@ -40,6 +40,7 @@ PARAMETERS = {
     "load_dependent_friction": {"coefficient": 0.1},
     "quadratic_drag": {"coefficient": 0.2},
     "friction_drift": {"level": 0.3, "time_constant": 5.0},
+    "viscous_asymmetry": {"coefficient": -0.25},
     "joint_spring": {"stiffness": 1.5, "rest": 0.3},
     "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
     "presliding_hysteresis": {"level": 0.2, "width": 0.01},

@@ -6,14 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from exact_parts import model_of
+from pydrake.systems.analysis import Simulator
 from synthetic import fourier_motion, three_axis
 
 from armloop.drake_systems.effects import UndeclaredEffect, realise
 from armloop.drake_systems.speed_mode import Instruments, SpeedModeArm
 from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import (
+    INERTIA,
     Effect,
+    Element,
+    Law,
     LinearJointEffect,
+    Parameter,
     effect,
     hypotheses,
     own,
@@ -211,6 +216,84 @@ def test_symbols_are_refused_in_one_line():
     speeds = [Variable("v") + 0.0, 0.0, 0.0]
     with pytest.raises(ModelError, match="plain numbers only, not for AutoDiffXd or Expression"):
         law.equations.rest([0.0] * 3, speeds)
+
+
+class Seal(Law):
+    """A lip seal: it holds a joint up to a level and drags on it."""
+
+    name = "seal"
+    parameters = (
+        Parameter("level", "TAU", least=0.0),
+        Parameter("drag", "TAU*s/POS", least=0.0),
+        Parameter("inertia", "INERTIA", least=0.0),
+    )
+    law = "f sign(v) + c v^3 + I vdot"
+    elements = ("sign", Element(lambda x, p, f: x.v * x.v * x.v, "v{j}^3"), INERTIA)
+
+
+SEAL = {"level": 0.6, "drag": 0.2, "inertia": 0.03}
+
+
+def test_a_law_of_elements_has_all_scalar_types():
+    from pydrake.autodiffutils import AutoDiffXd
+    from pydrake.symbolic import Expression, Variable
+
+    from armloop.drake_systems import EffectTorque_
+
+    register(Seal)
+    v, vdot = [0.7, -1.1, 0.4], [0.3, 0.2, -0.9]
+    torque = 0.6 * np.tanh(-110) + 0.2 * (-1.1) ** 3 + 0.03 * 0.2
+    for T, number in (
+        (float, float),
+        (AutoDiffXd, lambda x: AutoDiffXd(x, np.eye(3)[1])),
+        (Expression, Expression),
+    ):
+        system = EffectTorque_[T](three_axis(), "seal", 2, SEAL)
+        context = system.CreateDefaultContext()
+        speeds = [number(x) for x in v]
+        if T is Expression:
+            speed = Variable("speed")
+            speeds[1] = Expression(speed)
+        system.GetInputPort("state").FixValue(context, [number(0.0)] * 3 + speeds)
+        system.GetInputPort("vdot").FixValue(context, [T(x) for x in vdot])
+        tau = system.GetOutputPort("tau").Eval(context)[1]
+        if T is AutoDiffXd:
+            assert tau.derivatives()[1] == pytest.approx(0.6 * (1 - np.tanh(110) ** 2) / 0.01 + 0.6 * 1.1**2)
+            tau = tau.value()
+        if T is Expression:
+            tau = tau.Evaluate({speed: v[1]})
+        assert float(tau) == pytest.approx(torque)
+
+
+def test_the_plant_sticks_by_a_law_of_elements():
+    from armloop.drake_systems.friction import JointFriction
+    from armloop.drake_systems.plant import ArmPlant
+
+    register(Seal)
+    arm = three_axis()
+    plant = ArmPlant(
+        arm, (JointFriction(0.0, 0.0, 0.1, 0.0),) * 3, effects=[UndeclaredEffect("seal", 1, SEAL)]
+    )
+    for push, moves in ((0.55, False), (0.65, True)):
+        simulator = Simulator(plant)
+        context = simulator.get_mutable_context()
+        plant.set_state(context, np.array([0.3, -np.pi / 2, 0.0]), np.zeros(3))
+        held = Dynamics(model_of(arm, friction=())).gravity(np.array([0.3, -np.pi / 2, 0.0]))
+        plant.GetInputPort("tau").FixValue(context, held + np.array([push, 0.0, 0.0]))
+        simulator.AdvanceTo(0.2)
+        speed = plant.GetOutputPort("state").Eval(context)[3]
+        assert (abs(speed) > 1e-2) == moves and (moves or abs(speed) < 1e-7)
+
+
+def test_the_parameters_of_a_law_are_checked():
+    register(Seal)
+    for parameters, says in (
+        ({"level": 0.1}, "parameters are level; they must be level, drag, inertia"),
+        ({**SEAL, "drag": -1.0}, "drag is -1.0; it must not be negative"),
+        ({**SEAL, "drag": "much"}, "drag is 'much'; it must be a number"),
+    ):
+        with pytest.raises(ScenarioError, match=says):
+            UndeclaredEffect("seal", 1, parameters)
 
 
 MOTION = FourierReference(

@@ -58,8 +58,10 @@ class Law(Effect):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if any(element.by_load for element in cls._parts()):
-            cls.needs_model = True
+        parts = cls._parts()
+        cls.needs_model = cls.needs_model or any(element.by_load for element in parts)
+        cls.rubs = cls.scope == "joint" and cls.role == "mechanical" and bool(parts)
+        cls.rubs = cls.rubs and all(element.part == "friction" for element in parts)
 
     @classmethod
     def _parts(cls) -> list[Element]:

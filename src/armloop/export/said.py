@@ -122,7 +122,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             total = stiffness[joint] + k
             rest[joint] = (stiffness[joint] * rest[joint] + k * q0) / total if total else 0.0
             stiffness[joint] = total
-        elif name not in _FRICTION_EFFECTS:
+        elif not added.effect.rubs:
             why = "a fault of the record" if added.effect.sensor else "not in any description"
             missing.append(f"{added.effect.label()}: {why}")
     damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
@@ -172,18 +172,6 @@ def random_motion(model: ReconstructedModel, samples: int, seed: int) -> Motion:
     v = rng.uniform(0.05, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape) * size[1]
     vdot = rng.uniform(-1.0, 1.0, q.shape) * size[2]
     return Motion(np.arange(float(samples)), q, v, vdot, np.array([0]))
-
-
-_FRICTION_EFFECTS = {
-    "viscous_friction",
-    "coulomb_friction",
-    "stribeck_friction",
-    "friction_asymmetry",
-    "load_dependent_friction",
-    "quadratic_drag",
-    "friction_drift",
-    "presliding_hysteresis",
-}
 
 
 def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Array]:
@@ -237,15 +225,12 @@ def _viscous(model: ReconstructedModel) -> Array:
 def _other_laws(model: ReconstructedModel) -> list[list[str]]:
     """What each joint's friction has beside Coulomb and viscous terms, in words."""
     found = [
-        [_WORDS[t.kind] for t in terms if t.kind not in ("sign", "viscous")] for terms in model.friction.terms
+        [_WORDS.get(t.kind, t.kind) for t in terms if t.kind not in ("sign", "viscous")]
+        for terms in model.friction.terms
     ]
     for added in model.effects:
         name, joint = added.effect.name, added.effect.joint
-        if (
-            name in _FRICTION_EFFECTS
-            and name not in ("viscous_friction", "coulomb_friction")
-            and joint is not None
-        ):
+        if added.effect.rubs and name not in ("viscous_friction", "coulomb_friction") and joint is not None:
             found[joint - 1].append(name.replace("_", " "))
     return found
 
@@ -253,7 +238,7 @@ def _other_laws(model: ReconstructedModel) -> list[list[str]]:
 def friction_torques(model: ReconstructedModel) -> tuple[Array, Array]:
     """Speeds (N, n) within the training range and the friction there, (N, n), fully slid and warm."""
     motion = random_motion(model, _STATES, seed=2)
-    kept = tuple(a for a in model.effects if a.effect.name in _FRICTION_EFFECTS)
+    kept = tuple(a for a in model.effects if a.effect.rubs)
     equations = ModelEquations(replace(model, effects=kept), NUMPY)
     q, v, vdot = ([x[:, j] for j in range(model.arm.n)] for x in (motion.q, motion.v, motion.vdot))
     friction = equations.friction(v, equations.load(q, v, vdot), _WARM, q)

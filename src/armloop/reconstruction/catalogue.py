@@ -39,16 +39,6 @@ _CHANCE = 1e-3
 _AS_GOOD = 0.9
 #: Part of a law's column beside all that the model can say, below which it says nothing new.
 _NEW = 2e-3
-#: Laws of a joint's friction: they are rungs of the friction ladder, which has had its say.
-_ON_THE_LADDER = (
-    "coulomb_friction",
-    "viscous_friction",
-    "stribeck_friction",
-    "friction_asymmetry",
-    "load_dependent_friction",
-    "quadratic_drag",
-    "presliding_hysteresis",
-)
 #: What comes and goes: the arm as it was trained carries what it carries.
 _OF_A_RUN = ("payload", "friction_drift")
 _MOST = 6
@@ -165,9 +155,11 @@ class Laws:
 
 
 def permanent(arm: Arm) -> list[Effect]:
-    """Laws that an arm may have had all along and that fit beside others as linear columns."""
-    left_out = (*_ON_THE_LADDER, *_OF_A_RUN)
-    return [effect for effect in hypotheses(arm) if effect.name not in left_out and not effect.memory]
+    """Laws that an arm may have had all along and that fit beside others as linear columns.
+
+    A joint's friction is none of them: it has rungs of the friction ladder, which has had its say.
+    """
+    return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
 
 
 def search(
@@ -247,12 +239,11 @@ def _best_shape(own: Projected, effect: Effect, columns: _Columns) -> tuple[floa
 
 
 class _Columns:
-    """Columns of the laws on the training motion, each computed once."""
+    """Columns of the laws on the training motion; kept for nobody, for all of them together may be more than the log."""
 
     def __init__(self, arm: Arm, samples: Samples) -> None:
         self._samples = samples
         self.context = Context(arm, samples.motion, period=samples.period)
-        self._smoothed: dict[tuple[object, float], Array] = {}
 
     def raw(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) unfiltered."""
@@ -260,21 +251,16 @@ class _Columns:
 
     def smoothed(self, effect: Effect, shape: float) -> Array:
         """(N, n, p) through the samples' filter."""
-        key = (effect.place, shape)
-        if key not in self._smoothed:
-            columns = self.raw(effect, shape)
-            acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
-            if not acts:
-                return columns
-            first, *others = acts
-            # what acts alike, or against each other, on several joints is filtered once
-            like = {j: _ratio(columns[:, j], columns[:, first]) for j in others}
-            columns[:, first] = smooth(self._samples, columns[:, first])
-            for j, ratio in like.items():
-                whole = columns[:, j]
-                columns[:, j] = smooth(self._samples, whole) if ratio is None else ratio * columns[:, first]
-            self._smoothed[key] = columns
-        return self._smoothed[key]
+        columns = self.raw(effect, shape)
+        acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
+        # what acts alike, or against each other, on several joints is filtered once
+        like = {j: _ratio(columns[:, j], columns[:, acts[0]]) for j in acts[1:]}
+        for j in acts:
+            ratio = like.get(j)
+            columns[:, j] = (
+                smooth(self._samples, columns[:, j]) if ratio is None else ratio * columns[:, acts[0]]
+            )
+        return columns
 
 
 def _ratio(x: Array, y: Array) -> float | None:
