@@ -3,6 +3,7 @@
 # make test    style, types and tests
 # make bench   the benchmarks' ratios
 # make blind   how often the verdict on an undeclared effect is right
+# make mutants how many changes of the numerics the quick tests see
 
 PYTHON ?= python3
 VENV := .venv
@@ -13,7 +14,7 @@ INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: setup loop test bench blind clean
+.PHONY: setup loop test bench blind mutants clean
 
 setup: $(INSTALLED)
 
@@ -52,6 +53,10 @@ test: setup $(TESTING)
 
 bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
+
+# How many of the changes of one place in the numerics the quick tests see (hours; it goes on where it was ended).
+mutants: setup $(TESTING)
+	$(BIN)/python tests/mutants/run.py --mutants 200
 
 # Whole loops with an effect hidden from a seed, and clean ones: how often the verdict is right (about ten minutes).
 blind: setup $(TESTING)

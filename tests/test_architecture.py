@@ -19,7 +19,7 @@ LAYERS = (
     {"errors"},
     {"functions", "motion", "outputs", "progress", "resources", "voices", "workers"},
     {"files", "reading"},
-    {"schemas"},
+    {"keeping", "schemas"},
     {"blocks", "plausibility", "regression", "tables", "urdf"},
     {"arm", "log"},
     {"convert", "kinematics", "newton_euler", "pieces", "signals"},

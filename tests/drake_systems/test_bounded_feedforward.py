@@ -141,9 +141,9 @@ def test_what_is_wrong_with_limits_is_told(tmp_path):
     path = tmp_path / "mine.yaml"
     for fields, message in (
         ("effort: [1.0, 2.0]", "limits.effort has 2 numbers"),
-        ("effort: [0.0]", "limits.effort must be above 0"),
+        ("effort: [0.0]", r"limits.effort\[1\] is 0.0; it must be a finite number above 0"),
         ("effort: [9.0], used: 2.0", "limits.used is 2.0"),
-        ("rate: [9.0, -1.0, 9.0]", "limits.rate must be above 0"),
+        ("rate: [9.0, -1.0, 9.0]", r"limits.rate\[2\] is -1.0; it must be a finite number above 0"),
         ("used: 0.9", "limits needs an effort or a rate"),
     ):
         path.write_text(f"plant: three_axis\nlimits: {{{fields}}}\n")

@@ -69,7 +69,7 @@ def test_what_is_wrong_with_a_pickup_is_told(tmp_path):
     for fields, message in (
         ("{at: 20.0, diagnose_at: 30.0}", "14 s or more between them"),
         ("{at: 20.0, diagnose_at: 40.0}", "must lie within 0 and 40 s"),
-        ("{at: 5.0, diagnose_at: 30.0, mass: 0}", "mass must be above 0 kg"),
+        ("{at: 5.0, diagnose_at: 30.0, mass: 0}", "mass is 0; it must be a finite number above 0"),
     ):
         path.write_text(f"{text}pickup: {fields}\n")
         with pytest.raises(ScenarioError, match=rf"mine.yaml: pickup.*{message}"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from armloop.commands.arguments import add_json
 
@@ -29,10 +30,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the items, print and write what they come to."""
     import time
+    from functools import partial
 
     from armloop.commands.shared import out_folder, print_json, progress
     from armloop.errors import InputError
     from armloop.files import write_json, write_text
+    from armloop.keeping import Kept
+    from armloop.reports.html import Section
     from armloop.reports.reproduction_report import reproduction_report, terminal_text
     from armloop.reproduction import Context, chosen, run_item
 
@@ -42,18 +46,30 @@ def run(options: argparse.Namespace) -> None:
     folder = out_folder(options.out, ("reproduction.json", "report.html"))
     tell = progress(options)
     context = Context(draws=options.draws, progress=tell)
+    kept = Kept(folder, {"draws": options.draws})
     answer, seconds, entries = {}, {}, []
-    for name in names:
+
+    def item(name: str) -> dict[str, Any]:
         tell(f"{name} …")
         start = time.perf_counter()
         outcome = run_item(name, context)
-        seconds[name] = time.perf_counter() - start
-        answer[name] = outcome.to_dict()
-        entries.append((name, outcome.headline, outcome.verdict, outcome.section))
+        return {
+            "answer": outcome.to_dict(),
+            "headline": outcome.headline,
+            "section": outcome.section.to_dict(),
+            "seconds": time.perf_counter() - start,
+        }
+
+    for name in names:
+        found = kept.once(name, partial(item, name))
+        section, verdict = Section.from_dict(found["section"]), found["answer"]["verdict"]
+        seconds[name], answer[name] = found["seconds"], found["answer"]
+        entries.append((name, found["headline"], verdict, section))
         if not options.json:
-            print(terminal_text(name, outcome.section, outcome.verdict, seconds[name]), flush=True)
+            print(terminal_text(name, section, verdict, seconds[name]), flush=True)
     write_json(folder / "reproduction.json", answer)
     write_text(folder / "report.html", reproduction_report(entries, seconds))
+    kept.clear()
     if options.json:
         print_json(answer)
     else:

@@ -30,6 +30,18 @@ def per_joint(values: list[float], n: int, where: str, *, spread: bool = True) -
     return array
 
 
+def beside(path: Path, name: str, where: str) -> Path:
+    """Return the file that a scenario names, which must lie in the scenario's folder or below it, links followed."""
+    folder = path.resolve().parent
+    try:
+        found = (folder / name).resolve()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ScenarioError(f"{where}: {name[:60]!r} is the path of no file") from error
+    if not found.is_relative_to(folder):
+        raise ScenarioError(f"{where}: {name[:60]!r} lies outside the scenario's folder; put the file there")
+    return found
+
+
 def read(path: Path) -> Mapping[str, Any]:
     """Return the file as a mapping."""
     raw = read_yaml(path, ScenarioError, "a scenario's YAML file")

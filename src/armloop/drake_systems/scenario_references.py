@@ -8,6 +8,7 @@ import numpy as np
 
 from armloop.arm import Arm
 from armloop.drake_systems.scenario_data import ReferenceData
+from armloop.drake_systems.scenario_files import beside
 from armloop.errors import LogError, ScenarioError
 from armloop.excitation import (
     MotionRanges,
@@ -56,7 +57,7 @@ def _table(file: str, arm: Arm, path: Path, where: str) -> Reference:
     if not file:
         raise ScenarioError(f"{where}: reference.file is missing; a csv reference needs the path of its file")
     try:
-        reference = read_reference(path.parent / file, arm.n)
+        reference = read_reference(beside(path, file, f"{where}: reference.file"), arm.n)
     except LogError as error:
         raise ScenarioError(f"{where}: reference.file: {error}") from error
     if not reference.duration <= LONGEST:

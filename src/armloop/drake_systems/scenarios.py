@@ -28,12 +28,12 @@ from armloop.drake_systems.scenario_data import (
     TrackingData,
     WearData,
 )
-from armloop.drake_systems.scenario_files import entry, per_joint, read, scenario_entry
+from armloop.drake_systems.scenario_files import beside, entry, per_joint, read, scenario_entry
 from armloop.drake_systems.scenario_references import reference_of
 from armloop.drake_systems.speed_mode import Instruments
 from armloop.errors import ArmError, ScenarioError
 from armloop.excitation import MotionRanges, Reference
-from armloop.resources import scenario_path
+from armloop.resources import scenario_path, urdf_names
 
 _LEAST_LOG = 14.0  # s, what a diagnosis needs and a little more
 
@@ -215,6 +215,8 @@ def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | 
             )
         return load_plant(data.plant)
     own = data.own_plant
+    if arm is None and own.arm and own.arm not in urdf_names():
+        own = replace(own, arm=str(beside(path, own.arm, f"{where}: own_plant: arm")))
     if arm is not None:
         # a path from where the user stands, not from the scenario's folder
         given = Path(arm)
@@ -228,9 +230,8 @@ def _plant(name: str, data: PlantData, path: Path, file: str, field: str) -> Pla
         raise ScenarioError(
             f"{where}: arm is missing; give a built-in name or the path of a URDF here, or by --arm"
         )
-    beside = path.parent / data.arm
     try:
-        arm = load_arm(beside if beside.is_file() else data.arm)
+        arm = load_arm(data.arm)
     except ArmError as error:
         raise ScenarioError(f"{where}: arm: {error}") from error
     if len(data.friction) != arm.n:

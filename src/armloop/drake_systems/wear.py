@@ -12,6 +12,7 @@ from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.tracking import controllers_for, track
+from armloop.keeping import Kept
 from armloop.workers import Processes
 
 Array = NDArray[np.float64]
@@ -51,12 +52,17 @@ def draw_friction(friction: tuple[JointFriction, ...], spread: float, seed: int)
 
 
 def run_wear(
-    scenario: TrackingScenario, models: Mapping[str, FeedforwardModel], *, processes: int | None = None
+    scenario: TrackingScenario,
+    models: Mapping[str, FeedforwardModel],
+    *,
+    processes: int | None = None,
+    kept: Kept | None = None,
 ) -> WearResult:
     """Track a scenario that has a `wear` once per draw and controller; the answer depends on its seed alone.
 
     models : as in `run_tracking`, made for the friction as it is in the scenario
     processes : how many run at once; all cores by default
+    kept : where finished runs are kept, and taken from
     """
     wear, plant = scenario.wear, scenario.plant
     if wear is None:
@@ -71,7 +77,13 @@ def run_wear(
         config = replace(plant.config, friction=drawn[k])
         return track(replace(scenario, plant=replace(plant, config=config)), name, models).eta
 
-    answers = np.array(list(Processes(processes).map(eta, jobs))).reshape(wear.samples, len(names), -1)
+    kept = kept or Kept(None, None)
+    found = {job: kept.get(job) for job in jobs}
+    missing = [job for job in jobs if found[job] is None]
+    for job, answer in zip(missing, Processes(processes).map(eta, missing), strict=True):
+        found[job] = answer.tolist()
+        kept.put(job, found[job])
+    answers = np.array([found[job] for job in jobs]).reshape(wear.samples, len(names), -1)
     return WearResult(
         {name: answers[:, c] for c, name in enumerate(names)},
         tuple("deg" if turns else "mm" for turns in plant.arm.revolute),

@@ -11,6 +11,7 @@ import numpy as np
 from armloop.drake_systems.scenarios import TrackingScenario
 from armloop.drake_systems.wear import WearResult, run_wear
 from armloop.files import write_figure, write_json
+from armloop.keeping import Kept, digest
 from armloop.loop.tracking import SCHEMA, models_for, save_made
 from armloop.model import ReconstructedModel
 from armloop.progress import Progress
@@ -30,7 +31,8 @@ def run_wear_scenario(
     chosen = models_for(scenario, models, progress)
     assert scenario.wear is not None
     progress(f"tracking {scenario.wear.samples} times with each controller, on all cores")
-    result = run_wear(scenario, chosen)
+    kept = Kept(folder, _depends(scenario, chosen))
+    result = run_wear(scenario, chosen, kept=kept)
     answer = {
         "schema": SCHEMA,
         "scenario": scenario.name,
@@ -46,7 +48,28 @@ def run_wear_scenario(
         write_json(folder / "tracking.json", answer)
         save_made(folder, chosen, models)
         write_figure(folder / "spread.png", spread_figure(result), facecolor="white")
+    kept.clear()
     return answer, result
+
+
+def _depends(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> list[Any]:
+    """All that a run with drawn friction depends on."""
+    plant = scenario.plant
+    motion = scenario.reference.evaluate(np.linspace(0.0, scenario.reference.duration, 2001))
+    return [
+        repr(
+            (scenario.name, scenario.score, scenario.seed, scenario.bandwidth, scenario.used, scenario.wear)
+        ),
+        repr((plant.config.friction, plant.config.instruments, plant.config.time_step)),
+        repr([(joint.kind, joint.effort) for joint in plant.arm.joints]),
+        {key: value for key, value in plant.arm.to_dict().items() if key != "fingerprint"},
+        digest(*motion, scenario.gains.kp, scenario.gains.ki, scenario.gains.kd, *_given(scenario.rate)),
+        {name: model.to_dict() for name, model in models.items()},
+    ]
+
+
+def _given(array: np.ndarray | None) -> list[np.ndarray]:
+    return [] if array is None else [array]
 
 
 def _spread(eta: np.ndarray) -> dict[str, Any]:

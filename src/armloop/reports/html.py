@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import re
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import matplotlib
 from jinja2 import Environment, PackageLoader
@@ -31,9 +32,12 @@ _REM_PER_INCH = 6.4
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with a caption that says what it shows; with a ``summary``, folded away behind it until asked for."""
+    """A figure with a caption that says what it shows; with a ``summary``, folded away behind it until asked for.
 
-    figure: Figure
+    ``figure`` may be drawn already: the text of :func:`svg`.
+    """
+
+    figure: Figure | str
     caption: str = ""
     summary: str = ""
 
@@ -66,6 +70,32 @@ class Section:
     tables: list[Table] = field(default_factory=list)
     formulas: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values, figures drawn."""
+        return {
+            "title": self.title,
+            "text": self.text,
+            "pictures": [[svg(p.figure), p.caption, p.summary] for p in self.pictures],
+            "tables": [asdict(table) for table in self.tables],
+            "formulas": self.formulas,
+            "notes": self.notes,
+        }
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Section:
+        """Rebuild from :meth:`to_dict`."""
+        return Section(
+            data["title"],
+            data["text"],
+            [Picture(*parts) for parts in data["pictures"]],
+            [
+                Table(tuple(t["headers"]), tuple(map(tuple, t["rows"])), t["title"], tuple(t["left"]))
+                for t in data["tables"]
+            ],
+            [(summary, text) for summary, text in data["formulas"]],
+            data["notes"],
+        )
 
     @property
     def anchor(self) -> str:
@@ -100,8 +130,10 @@ def tied(text: str) -> str:
     return _TIES.sub("\u00a0", text)
 
 
-def svg(figure: Figure) -> str:
-    """A figure as an ``<svg>`` element that takes its frame colours from the page."""
+def svg(figure: Figure | str) -> str:
+    """A figure as an ``<svg>`` element that takes its frame colours from the page; one drawn already as it is."""
+    if isinstance(figure, str):
+        return figure
     text = io.StringIO()
     # a fixed salt makes equal figures equal text; without a date the file does not change from run to run
     with matplotlib.rc_context({"svg.hashsalt": "armloop", "svg.fonttype": "path"}):
