@@ -45,7 +45,7 @@ def test_every_coefficient_has_one_and_the_file_keeps_it(fit, tmp_path):
     assert load_model(tmp_path / "old.json").uncertainty == {}
     data["uncertainty"] = {**errors, "joints": errors["joints"][:2]}
     (tmp_path / "broken.json").write_text(json.dumps(data))
-    with pytest.raises(ModelError, match="uncertainty: joints has 2 joints, the arm has 3"):
+    with pytest.raises(ModelError, match="uncertainty.joints: 2 joints, the arm has 3"):
         load_model(tmp_path / "broken.json")
 
 
