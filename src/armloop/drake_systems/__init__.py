@@ -4,6 +4,7 @@ The only room that imports pydrake's systems. A diagram of one's own starts with
 the systems it is made of. Names that end in an underscore are templates, `Feedforward_[AutoDiffXd]` for instance.
 """
 
+from armloop.drake_systems.adaptive_feedforward import AdaptiveFeedforward
 from armloop.drake_systems.beyond_bodies import BeyondBodies, BeyondBodies_, friction_systems
 from armloop.drake_systems.closed_loop import CONTROLLERS, ControlledArm, add_arm_with_controller
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque, ComputedTorque_
@@ -24,11 +25,13 @@ from armloop.drake_systems.pid import PidController, PidGains
 from armloop.drake_systems.plant import ArmPlant
 from armloop.drake_systems.rate_limiter import RateLimiter, RateLimiter_
 from armloop.drake_systems.reference import ReferenceSource
+from armloop.drake_systems.residual_monitor import ResidualMonitor
 from armloop.drake_systems.sticking import StickingForwardDynamics, StickingForwardDynamics_
 
 __all__ = [
     "CONTROLLERS",
     "AccelerationGains",
+    "AdaptiveFeedforward",
     "ArmPlant",
     "BeyondBodies",
     "BeyondBodies_",
@@ -52,6 +55,7 @@ __all__ = [
     "RateLimiter",
     "RateLimiter_",
     "ReferenceSource",
+    "ResidualMonitor",
     "StickingForwardDynamics",
     "StickingForwardDynamics_",
     "Stop",

@@ -182,6 +182,11 @@ def JointLoads_(T: type) -> Any:
                 )
             )
 
+        def predict_with(self, inertia: Any, damping: Sequence[float]) -> None:
+            """Let the last link have another spatial inertia, and the joints another damping (n,); float only."""
+            self._plant.GetBodyByName(f"link_{self._n}").SetSpatialInertiaInBodyFrame(self._scratch, inertia)
+            self._damping = [self._step * d for d in damping]
+
         def _calc_load(self, context: Any, output: Any) -> None:
             # Called every step: for a handful of joints plain floats are several times faster than arrays.
             known = self._state.Eval(context)

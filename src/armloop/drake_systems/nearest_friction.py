@@ -9,6 +9,7 @@ from scipy.optimize import nnls
 from armloop.drake_systems.friction import JointFriction
 from armloop.dynamics import ModelEquations, training_range
 from armloop.functions import NUMPY
+from armloop.library.friction import stribeck_fall
 from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def _fitted(v: Array, friction: Array) -> JointFriction:
     best: tuple[float, float, Array] | None = None
     for part in _VELOCITIES:
         v_s = part * v.max()
-        x, left = nnls(np.column_stack([np.exp(-((v / v_s) ** 2)), np.ones_like(v), v]), friction)
+        x, left = nnls(np.column_stack([stribeck_fall(v, v_s), np.ones_like(v), v]), friction)
         if best is None or left < best[0]:
             best = float(left), float(v_s), x
     assert best is not None

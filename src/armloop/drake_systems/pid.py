@@ -50,9 +50,10 @@ class PidController(Diagram):
     q is read through encoders of the given resolution; v is the joint module's own velocity signal. The
     integral is the sum of e times the period (forward Euler).
 
-    Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output port: `tau` (n,), held by the discrete
-    plant, whose time step must be `period`. One discrete state (n,), the integral. Scalar types float, AutoDiffXd
-    (in which reading an encoder has the derivative 1, as if it were ideal) and, with ideal encoders, Expression.
+    Input ports: `q_ref`, `v_ref`, `tau_ff` (n,), `state` (2n,). Output ports: `tau` (n,), held by the discrete plant,
+    whose time step must be `period`; `integral` (n,), integral(e) in rad s (m s). One discrete state (n,), the integral.
+    Scalar types float, AutoDiffXd (in which reading an encoder has the derivative 1, as if it were ideal) and, with
+    ideal encoders, Expression.
 
     Not supported: a bound on the integral (the plant clamps the torque; a controller that asks for more winds up), and a
     filter on v, which is taken as it is.
@@ -73,6 +74,7 @@ class PidController(Diagram):
         builder.Connect(split.get_output_port(1), integral.get_input_port())
         builder.Connect(integral.get_output_port(), law.GetInputPort("integral"))
         builder.ExportOutput(split.get_output_port(0), "tau")
+        builder.ExportOutput(integral.get_output_port(), "integral")
         builder.BuildInto(self)
 
 

@@ -29,7 +29,7 @@ from armloop.arm import Arm
 from armloop.drake_systems.effects import Realisation, UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.joint_loads import JointLoads, Law, ServoGains
-from armloop.errors import ArmError
+from armloop.errors import ArmError, ScenarioError
 
 Array = NDArray[np.float64]
 
@@ -149,6 +149,32 @@ class ArmPlant(Diagram):
         context = self.plant.GetMyMutableContextFromRoot(root_context)
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
         self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
+
+    def begin(self, root_context: Context, effects: Sequence[UndeclaredEffect]) -> None:
+        """Let effects begin in a running simulation: payloads, viscous friction; in addition to those there are.
+
+        They stay with this plant: a simulation from the start needs a new one.
+
+        Raises `ScenarioError` for any other effect, which a plant has to be built with.
+        """
+        for effect in effects:
+            if effect.name not in ("payload", "viscous_friction"):
+                raise ScenarioError(
+                    f"effect {effect.name}: cannot begin in a running simulation; payload and viscous_friction can"
+                )
+        more = realise(self.arm, effects)
+        context = self.plant.GetMyMutableContextFromRoot(root_context)
+        last = self.plant.GetBodyByName(f"link_{self.arm.n}")
+        inertia = last.CalcSpatialInertiaInBodyFrame(context)
+        for mass, com, own in more.payloads:
+            inertia += _payload(mass, com, own)
+        last.SetSpatialInertiaInBodyFrame(context, inertia)
+        damping = []
+        for joint, viscous in zip(self.arm.joints, more.viscous, strict=True):
+            moving = self.plant.GetJointByName(joint.name)
+            moving.SetDamping(context, moving.GetDamping(context) + viscous)
+            damping.append(moving.GetDamping(context))
+        self._loads.predict_with(inertia, damping)
 
 
 def add_links(plant: MultibodyPlant, arm: Arm, effects: Realisation | None = None) -> None:

@@ -105,8 +105,8 @@ def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, win
         ]
         if not equals:
             equals = [best]
-        # of those that explain as much, the fewest parameters
-        pick = min(equals, key=lambda place: (len(places[place]), -gain[place]))
+        # of those that explain as much, the fewest parameters, and a law of the motion alone before one of the load
+        pick = min(equals, key=lambda place: (*_simplicity(columns, places[place]), -gain[place]))
         chosen.append(pick)
         rivals.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
         gains.append(gain[pick])
@@ -116,6 +116,10 @@ def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, win
         _named(arm, columns, rest, chosen, place, gain / whole if whole > 0 else 0.0, others)
         for place, gain, others in zip(chosen, gains, rivals, strict=True)
     ]
+
+
+def _simplicity(columns: Sequence[Column], index: NDArray[np.intp]) -> tuple[int, bool]:
+    return len(index), columns[index[0]].effect.needs_model
 
 
 def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
@@ -162,6 +166,14 @@ def _possible(
     x, covariance, shape = _solved(rest, columns, [*chosen, place], place)
     effect = Column(*place, 0, shape).effect
     return effect.plausible(arm, effect.estimates(arm, x, covariance, shape))
+
+
+def later_part(since: int, last: int) -> range:
+    """The units of a window that surely lie after its change: the last two thirds.
+
+    When the change began is an estimate, and a healthy unit among few would spoil the parameters.
+    """
+    return range(since + (last - since + 1) // 3, last + 1)
 
 
 def _named(

@@ -120,11 +120,7 @@ def log_sums(model: ReconstructedModel, log: MotionLog, extra: Mapping[str, Arra
         sums["torque"][b] = ((samples.tau[kept[here]] / scale * count) ** 2).sum(axis=0)
         sums["speed"][b] = (motion.v[kept[here]] ** 2 * count).sum(axis=0)
         sums["load"][b] = (known.load[here] ** 2 * count).sum(axis=0)
-        for j in range(n):
-            X = x[here, j][on[:, j]]
-            used = np.flatnonzero(X.any(axis=0))
-            gram[b][np.ix_(used, used)] += X[:, used].T @ X[:, used]
-            moment[b, used] += X[:, used].T @ ub[on[:, j], j]
+        gram[b], moment[b] = joint_sums(x[here], ub, on)
         times = motion.time[number == present[b]]
         start[b], seconds[b] = times[0], times[-1] - times[0]
     temperature, since = _known(log, motion.time[kept], edges, dict(extra or {}), n)
@@ -138,6 +134,18 @@ def log_sums(model: ReconstructedModel, log: MotionLog, extra: Mapping[str, Arra
         since_start=since,
         **sums,
     )
+
+
+def joint_sums(x: Array, u: Array, slides: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Σ x xᵀ (p, p) and Σ x u (p,) of columns x (N, n, p) and residual u (N, n), over the samples that count."""
+    p = x.shape[2]
+    gram, moment = np.zeros((p, p)), np.zeros(p)
+    for j in range(x.shape[1]):
+        X = x[slides[:, j], j]
+        used = np.flatnonzero(X.any(axis=0))
+        gram[np.ix_(used, used)] += X[:, used].T @ X[:, used]
+        moment[used] += X[:, used].T @ u[slides[:, j], j]
+    return gram, moment
 
 
 def _known(

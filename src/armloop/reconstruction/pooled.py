@@ -144,7 +144,11 @@ class Pooled:
         """(folds, n) squared errors on every fold, of a regression on the others."""
         errors = np.empty((self.folds, len(choice)))
         for fold in range(self.folds):
-            rest = [whole - parts[fold] for whole, parts in zip(self._wholes, self._parts, strict=True)]
+            # Added up anew: a difference would leave round-off of columns that this fold alone excites.
+            rest = [
+                total([part for k, part in enumerate(parts) if k != fold] or [parts[fold] - parts[fold]])
+                for parts in self._parts
+            ]
             theta = self._solved(*self._equations(rest, choice, weights, prior), choice)
             for j, own in enumerate(self._spread(theta, choice)):
                 errors[fold, j] = self._judges[j][fold].squared_error(own)
@@ -209,7 +213,10 @@ class Pooled:
         ):  # the free coefficients are eliminated, the others are a problem of non-negative squares
             link = cho_solve(factor, G[np.ix_(~bound, bound)])
             H = G[np.ix_(bound, bound)] - G[np.ix_(bound, ~bound)] @ link
-            H[np.diag_indices(len(H))] += max(0.0, 2 * _ROUND_OFF - float(np.linalg.eigvalsh(H)[0]))
+            # Differences of nearly equal numbers are neither symmetric nor positive to the last digit.
+            H = 0.5 * (H + H.T)
+            least = 2 * _ROUND_OFF * max(1.0, float(np.diag(H).max()))
+            H[np.diag_indices(len(H))] += max(0.0, least - float(np.linalg.eigvalsh(H)[0]))
             R = cholesky(H)
             target = solve_triangular(R, b[bound] - link.T @ b[~bound], trans="T")
             theta[bound] = nnls(R, target, maxiter=30 * len(H))[0]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.library.friction import FrictionTerm
+from armloop.library.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.uncertainty.unknowns import STRIBECK_VELOCITY
@@ -62,7 +62,7 @@ def friction_line(
             weights[:, k] = line[:, places[name]]
         elif name == STRIBECK_VELOCITY:
             own = next(t for t in terms if t.kind == "stribeck")
-            slope = -2 * v**2 / own.parameter**3 * np.exp(-((v / own.parameter) ** 2))
+            slope = -2 * v**2 / own.parameter**3 * stribeck_fall(v, own.parameter)
             weights[:, k] = np.linalg.pinv(np.column_stack([np.ones_like(v), v])) @ (own.coefficient * slope)
     values = line @ [t.coefficient for t in terms]
     errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))

@@ -17,7 +17,7 @@ from armloop.errors import InputError
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
-from armloop.monitoring.naming import Named, name_change
+from armloop.monitoring.naming import Named, later_part, name_change
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import FRICTION, Adjusted, adjust
@@ -165,7 +165,7 @@ def _explain(
     history, units = tested.history, tested.history.units
     until = next((a.unit for a in tested.watched.alarms if a.unit > alarm.unit), units.count - 1)
     before = range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)
-    window = range(alarm.since, alarm.unit + 1)
+    window = later_part(alarm.since, alarm.unit)
     named = name_change(
         model.arm, units.columns, history.normal(before) if len(before) else None, history.normal(window)
     )
