@@ -41,11 +41,12 @@ def test_every_coefficient_has_one_and_the_file_keeps_it(fit, tmp_path):
     # files from before there were standard errors, and files somebody broke
     data = json.loads((tmp_path / "model.json").read_text())
     del data["uncertainty"]
+    data["schema"] = "armloop/model/1"
     (tmp_path / "old.json").write_text(json.dumps(data))
     assert load_model(tmp_path / "old.json").uncertainty == {}
     data["uncertainty"] = {**errors, "joints": errors["joints"][:2]}
     (tmp_path / "broken.json").write_text(json.dumps(data))
-    with pytest.raises(ModelError, match="uncertainty: joints has 2 joints, the arm has 3"):
+    with pytest.raises(ModelError, match=r"uncertainty\.joints: 2 joints, the arm has 3"):
         load_model(tmp_path / "broken.json")
 
 
