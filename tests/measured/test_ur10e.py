@@ -53,7 +53,9 @@ def test_the_load_is_a_payload_of_its_mass(
     assert np.mean(found["error"]["nrmse"]["after"]) <= 0.055
     assert found["error"]["held_out"] is True
 
-    assert json.loads((tmp_path / "diagnosis.json").read_text()) == found
+    written = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert written.pop("written_by") == "armloop diagnose"
+    assert written == found
     assert (tmp_path / "report.html").stat().st_size > 1000
     augmented = tmp_path / "model.json"
     before, after = (

@@ -10,6 +10,8 @@ from armloop.errors import InputError, LogError
 from armloop.excitation import MotionRanges
 from armloop.log import MotionLog
 from armloop.reconstruction import Options, Reconstruction, reconstruct
+from armloop.reconstruction.apart import independent_blocks
+from armloop.reconstruction.data import Data
 from armloop.reconstruction.reconstruct import default_library, held_out_rows
 from armloop.reconstruction.rigid_body import rigid_body
 from armloop.reconstruction.shared import SHARED_CONDITIONING
@@ -27,11 +29,13 @@ def a_run(seed: int, seconds: float = 40.0) -> MotionLog:
 @pytest.fixture(scope="module")
 def together() -> Reconstruction:
     """From Fourier motion alone, which has neither static nor constant-velocity data."""
-    return reconstruct([a_run(1), a_run(2)], three_axis(), options=Options(max_order=2))
+    options = Options(max_order=2)
+    return reconstruct([a_run(1), a_run(2)], three_axis(), library="double-feature-set", options=options)
 
 
 def test_data_without_clean_conditions_are_said_to_be_regressed_together(together: Reconstruction):
-    note, refitted = together.notes
+    note, refitted, *physics = together.notes
+    assert physics == together.model.history["physics"]["faults"]
     assert "regressed together" in note and "static" in note and "filtered" in refitted
     assert together.model.history["notes"] == together.notes
     assert [report.step for report in together.reports] == [1, 2, 3]
@@ -46,8 +50,11 @@ def test_regressed_together_the_model_still_predicts_a_run_it_never_saw(together
 
 def test_the_held_out_score_is_the_baseline_of_the_model(together: Reconstruction):
     held = together.held_out.moving
-    samples = condition([a_run(1), a_run(2)], together.model.conditioning)
-    rows = held_out_rows(samples, Options())
+    logs, how, options = [a_run(1), a_run(2)], together.model.conditioning, Options()
+    samples = condition(logs, how)
+    apart = independent_blocks(three_axis(), logs, how, options.block_seconds, options.folds)
+    data = Data.of(samples, replace(options, block_seconds=apart.seconds))
+    rows = data.reference.judging("all", apart.margin)
     assert together.held_out.samples == rows.sum() < 0.3 * samples.motion.samples
     scored = score(together.model, samples, rows).moving
     assert {key: pytest.approx(values, rel=1e-12) for key, values in held.items()} == scored
@@ -103,7 +110,7 @@ def test_inverse_dynamics_samples_are_taken_as_they_are():
     result = reconstruct(
         logs, three_axis(), conditioning=Conditioning(cutoff_hz=0), options=Options(max_order=2)
     )
-    assert result.notes == []
+    assert result.notes == result.model.history["physics"]["faults"]
     assert result.reports[0].orders == [2, 0] and result.reports[0].terms == [0, 2, 1]
 
 

@@ -174,7 +174,9 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys, small_run, monkeypa
     out = tmp_path / "out"
     assert main(["reproduce", "fig6", "fig5", "--out", str(out), "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads((out / "reproduction.json").read_text())
+    written = json.loads((out / "reproduction.json").read_text())
+    assert written.pop("written_by") == "armloop reproduce"
+    assert printed == written
     assert list(printed) == ["fig5", "fig6"]
     for item in printed.values():
         assert set(item["paper"]) == set(item["ours"])
