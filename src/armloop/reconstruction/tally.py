@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.blocks import block_numbers
 from armloop.model import ReconstructedModel
 from armloop.reconstruction.data import Chunk
 from armloop.reconstruction.sorter import Sorter
@@ -52,12 +53,14 @@ class Tally:
         sorter: Sorter | None,
         part: Part = "all",
         margin: float = 0.0,
+        seconds: float | None = None,
     ) -> Tally:
         """Sums of one chunk, of all runs as they are: prediction and filter need every sample.
 
         Args:
             part: which of the held-out blocks judge.
             margin: seconds from a block that was fitted, or that chose, within which samples do not judge.
+            seconds: length of the pieces that ``blocks`` are told apart by; the held-out blocks' own by default.
         """
         samples, held = chunk.samples, chunk.judging(part, margin)
         squares = residual(model, samples)[held] ** 2
@@ -75,7 +78,9 @@ class Tally:
         n = squares.shape[1]
         blocks = np.zeros((0, 2, n))
         if samples.cutoff_hz > 0 and held.any():
-            index = np.unique(chunk.blocks[held], return_inverse=True)[1]
+            pieces = chunk.blocks if seconds is None else block_numbers(samples.motion, seconds)
+            keys = np.column_stack([chunk.blocks[held], pieces[held]])
+            index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
             blocks = np.zeros((int(index.max()) + 1, 2, n))
             np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
         return Tally(sums, blocks, int(held.sum()))
@@ -97,7 +102,7 @@ class Tally:
             max((x for x in joint if x is not None), default=None)
             for joint in zip(*per_condition, strict=True)
         ]
-        worst = self._worst()
+        worst = self.worst()
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
         return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "samples": self.samples}
@@ -114,7 +119,7 @@ class Tally:
         sums = np.where(known, relative, 0.0).sum(axis=1)
         return np.where(known.any(axis=1), sums / np.maximum(known.sum(axis=1), 1), np.nan)
 
-    def _worst(self) -> list[float | None]:
+    def worst(self) -> list[float | None]:
         """RMSE per joint that one block in ten exceeds: a run may consist of such motion."""
         found: list[float | None] = []
         for errors, counts in zip(self.blocks[:, 0].T, self.blocks[:, 1].T, strict=True):
