@@ -14,7 +14,7 @@ INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: setup loop test bench blind mutants clean
+.PHONY: setup loop test long bench blind mutants clean
 
 setup: $(INSTALLED)
 
@@ -49,7 +49,11 @@ test: setup $(TESTING)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest $(PYTEST_ARGS)
+	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
+
+# What takes minutes a test: ten random arms of another engine, workers killed in the middle.
+long: setup $(TESTING)
+	$(BIN)/pytest $(PYTEST_ARGS) -m long
 
 bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done

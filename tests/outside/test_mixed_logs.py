@@ -50,7 +50,7 @@ def test_friction_and_mass_matrix_of_one_arm(tmp_path: Path) -> None:
     check(1, 2, 30.0, tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "joints"), TEN)
 def test_friction_and_mass_matrix_of_ten_arms(seed: int, joints: int, tmp_path: Path) -> None:
     check(seed, joints, 60.0, tmp_path)
