@@ -1,4 +1,4 @@
-"""Measured arms, part of the data left out in turn, with default settings; the library is named where nine folds would each compare two."""
+"""Measured arms, part of the data left out in turn; the library is named where nine folds would each compare two."""
 
 import json
 from pathlib import Path
