@@ -30,7 +30,17 @@ def lacking(
         return json.loads(capsys.readouterr().out)
 
     model = str(out / "model.json")
-    answer("reconstruct", *map(str, logs), *arm, "--friction", "coulomb,viscous", "--out", model)
+    answer(
+        "reconstruct",
+        *map(str, logs),
+        *arm,
+        "--friction",
+        "coulomb,viscous",
+        "--library",
+        "rigid-body",
+        "--out",
+        model,
+    )
     found = answer("diagnose", model, str(run), "--out", str(out / "first"))
     again = answer("diagnose", str(out / "first" / "model.json"), str(run), "--out", str(out / "second"))
     assert (again["verdict"], again["effects"]) == ("no_effect", [])
@@ -49,7 +59,7 @@ def check(found: dict, joints: set[int]) -> np.ndarray:
     return (after / before)[[j - 1 for j in sorted(joints)]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_ur10e_model_lacks_memory_at_nearly_all_joints(
     ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -60,7 +70,7 @@ def test_a_ur10e_model_lacks_memory_at_nearly_all_joints(
     assert (left[2:] < 0.4).all()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_panda_model_lacks_memory_at_its_wrist(
     measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
