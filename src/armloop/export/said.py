@@ -126,7 +126,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
         elif not added.effect.rubs:
             why = "a fault of the record" if added.effect.sensor else "not in any description"
             missing.append(f"{added.effect.label()}: {why}")
-    for j in np.flatnonzero(constants):
+    for j in np.flatnonzero(constants).tolist():
         missing.append(f"joint {j + 1}: a constant torque, {constants[j]:.4g} {arm.joints[j].torque_unit}")
     damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
     for j in range(arm.n):
