@@ -141,7 +141,7 @@ def test_a_fault_is_answered_with_one_line_and_leaves_nothing_behind(
     answered(*FAULTS[fault], inputs, tmp_path, capsys)
 
 
-@pytest.mark.parametrize("fault", ["NaN in a cell", "a missing model"])
+@pytest.mark.parametrize("fault", ["NaN in a cell", "a missing file"])
 def test_a_process_of_its_own_answers_alike(inputs: Path, tmp_path: Path, fault: str) -> None:
     parts, expected = FAULTS[fault]
     arguments = arguments_of(parts, inputs, tmp_path)
