@@ -35,9 +35,9 @@ found
 
 # %%
 for effect in found.effects:
-    print(
-        effect.effect.label(), {name: (p.value, p.std_error, p.unit) for name, p in effect.parameters.items()}
-    )
+    print(effect.effect.label())
+    for name, value in effect.parameters.items():
+        print(f"  {name}: {value.value} ± {value.std_error} {value.unit}")
 
 # %% [markdown]
 # Errors *after* are of blocks of the run that were not fitted. A load's mass is told apart from its lever only as far as the
