@@ -72,6 +72,7 @@ def test_the_low_pass_is_chosen_without_them(monkeypatch: pytest.MonkeyPatch) ->
     assert chosen(other)[:, 1].min() > 2 * one[:, 1].max()
 
 
+@pytest.mark.slow
 def test_laws_friction_and_ripple_are_chosen_and_fitted_without_them() -> None:
     log, arm = run(), three_axis()
     samples = condition([log], USUAL)
