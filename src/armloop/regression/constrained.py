@@ -66,7 +66,7 @@ def constrained_least_squares(
         A = solve_triangular(L, (rows * scale).T, lower=True).T
         A /= np.linalg.norm(A, axis=1, keepdims=True)
         z = _nearest(target, A)
-        theta = scale * solve_triangular(L, z, lower=True, trans="T")
+        theta = _bounded(scale * solve_triangular(L, z, lower=True, trans="T"), rows)
         cost = float(np.sum((z - target) ** 2)) - free
         if cost > most:
             raise TooCostly(f"the constraints cost {cost:.3g}")
@@ -79,6 +79,14 @@ def constrained_least_squares(
                 f"after {_ROUNDS} rounds of new constraints {len(left)} are still violated, by {-worst:.1g} at worst"
             )
     return theta, len(rows)
+
+
+def _bounded(theta: Array, rows: Array) -> Array:
+    """θ with bounds of single coefficients met to the last digit: what is undetermined magnifies round-off."""
+    single = rows[np.count_nonzero(rows, axis=1) == 1]
+    above, below = (single > 0).any(axis=0), (single < 0).any(axis=0)
+    theta = np.where(above, np.maximum(theta, 0.0), theta)
+    return np.where(below, np.minimum(theta, 0.0), theta)
 
 
 def _nearest(target: Array, A: Array) -> Array:
