@@ -95,21 +95,30 @@ def test_every_command_and_the_python_run(tmp_path, unpacked):
     assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
 
 
+@pytest.mark.slow
 @pytest.mark.measured
 def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path, measured):
-    outputs = [
-        armloop(line.replace("$UR10E", str(measured / "ur10e")), tmp_path)
-        for line in commands("armloop")
-        if "$UR10E" in line
-    ]
-    assert len(outputs) == 4
+    lines = [line for line in commands("armloop") if "$UR10E" in line]
+    assert [line.split()[1] for line in lines] == ["reconstruct", "evaluate", "diagnose", "crossvalidate"]
+    *_, diagnosed, answered = (
+        armloop(
+            line.replace("$UR10E", str(measured / "ur10e")) + " --json" * ("crossvalidate" in line), tmp_path
+        )
+        for line in lines
+    )
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (mass,) = re.findall(r"`payload`, ([\d.]+) ± ", text)
-    assert mass in outputs[2]
+    assert mass in diagnosed
     answer = json.loads((tmp_path / "out" / "ur10e" / "diagnosis.json").read_text(encoding="utf-8"))
     nrmse = answer["error"]["nrmse"]
     for values in nrmse.values():
         assert f"| {sum(values) / 6:.3f} |" in text
+    found = json.loads(answered)
+    assert found["leave_out"] == "file" and len(found["files"]) == 9
+    assert f"| each of the nine no-load files left out in turn | {found['mean']['nrmse']:.3f} |" in text
+    assert found["mean"]["nrmse"] <= 0.045
+    ladder = {note.split(":")[0] for notes in found["notes"].values() for note in notes}
+    assert "friction, presliding" in ladder
 
 
 @pytest.mark.slow
