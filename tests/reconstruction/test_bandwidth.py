@@ -37,7 +37,7 @@ def test_clean_data_keep_the_bandwidth_and_noisy_ones_do_not(seed: int) -> None:
     errors = dict(noisy.trials)
     assert errors[noisy.cutoff_hz] < 0.8 * errors[10.0]
     (note,) = noisy.notes()
-    assert f"low-pass of {noisy.cutoff_hz:.3g} Hz, chosen on held-out blocks" in note
+    assert f"low-pass of {noisy.cutoff_hz:.3g} Hz, chosen by cross-validation" in note
 
 
 def test_smoothing_the_torque_alone_gains_nothing() -> None:
@@ -72,7 +72,7 @@ def test_the_model_keeps_the_corner_that_was_chosen(tmp_path: Path) -> None:
     model = load_model(tmp_path / "model.json")
     chosen = model.history["bandwidth"]
     assert model.conditioning.cutoff_hz == chosen["cutoff_hz"] <= 5.0
-    assert any("chosen on held-out blocks" in note for note in found.notes)
+    assert any("chosen by cross-validation" in note for note in found.notes)
 
 
 def test_an_explicit_corner_stands_and_must_lie_below_the_nyquist_rate(
