@@ -8,7 +8,7 @@ from armloop.arm import load_arm
 from armloop.components import RigidBody
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import fit
+from armloop.diagnosis.fit import Shape, fit
 from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Known
 from armloop.effects import effect, hypotheses
@@ -49,6 +49,22 @@ def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
     assert FOLDS == 2
     assert chosen((6, 11)) == (11.0, 6.0)
     assert chosen((9, 11)) == (11.0, 9.0)
+
+
+def test_a_fold_is_judged_with_what_the_other_folds_showed_alone():
+    model = exact("three_axis")
+    motion = fourier_motion(40.0, 100.0, 3)
+    samples = condition([measured(motion, np.zeros_like(motion.q), 3)], model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    residual = np.zeros_like(samples.tau)
+    residual[evidence.fold == 0, 1] = 0.2  # there in one fold, absent in the other
+    offset = effect("torque_offset", 2)
+    found = fit(evidence, residual, [offset], [Shape.fixed(offset.shapes(evidence.context)[0])])
+    stacked, size = found.stacked, 0.2 / evidence.scale[1]
+    for fold, left in ((0, size), (1, -size)):
+        rows = (stacked.fold == fold) & (stacked.joint == 1)
+        assert rows.sum() > 100
+        np.testing.assert_allclose(found.held_out[rows], left, rtol=1e-3)
 
 
 @pytest.mark.parametrize("mass", [0.1, 0.3])
