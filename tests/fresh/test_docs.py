@@ -61,7 +61,7 @@ def test_what_the_guide_names_is_there():
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = [
         *re.findall(r"`((?:src|tests|scenarios|docs)/[\w./]*)`", text),
-        *re.findall(r"\]\((\S+)\)", text),
+        *re.findall(r"\]\(([^)\s]+)\)", text),
     ]
     assert len(named) > 12
     for path in named:
