@@ -66,6 +66,7 @@ mutants: setup $(TESTING)
 blind: setup $(TESTING)
 	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5
 	$(BIN)/python tests/blind/run.py --arms 20 --cases 16
+	$(BIN)/python tests/blind/run.py --outside --arms 12 --cases 8
 
 clean:
 	rm -rf $(VENV) out dist

@@ -7,6 +7,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
 
     python tests/blind/run.py --arms 20 --cases 16
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models and answers
+    python tests/blind/run.py --outside --arms 6     arms, engine and controllers from outside (MuJoCo)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
 
@@ -33,10 +34,16 @@ from armloop.errors import InputError
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path) -> str:
+def make(seed: int, cases: int, place: Path, outside: bool = False) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
+        if outside:
+            sys.path.insert(0, str(Path(__file__).parents[1]))
+            from outside_generate import generate_outside
+
+            generate_outside(seed, cases, place / "logs", place / "answers")
+            return ""
         generate(seed, cases, load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
         return str(error)
@@ -66,6 +73,7 @@ def main() -> int:
     parser.add_argument("--arms", type=int, default=20)
     parser.add_argument("--cases", type=int, default=16, help="runs per arm")
     parser.add_argument("--first", type=int, default=1, help="seed of the first arm")
+    parser.add_argument("--outside", action="store_true", help="arms simulated by MuJoCo instead of our own")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", default=None, metavar="DIR", help="keep logs, models and answers here")
     parser.add_argument("--again", default=None, metavar="DIR", help="judge the kept logs of DIR once more")
@@ -77,7 +85,7 @@ def main() -> int:
         place = Path(options.again or options.keep or temporary)
         if not options.again:
             seeds = range(options.first, options.first + options.arms)
-            made = {seed: workers.submit(make, seed, options.cases, place) for seed in seeds}
+            made = {seed: workers.submit(make, seed, options.cases, place, options.outside) for seed in seeds}
             for seed, job in made.items():
                 if job.result():
                     _say(f"arm {seed} cannot be used: {job.result()}")

@@ -67,7 +67,9 @@ def test_what_judges_a_fold_was_not_fitted_to_it():
     evidence, column, residual = slow_friction_in_one_fold(1.0)
     found = fit(evidence, residual, [effect("viscous_friction", 2)], [Shape.fixed(0.0)])
     of_one = evidence.stack(column, []).y
-    np.testing.assert_allclose(found.held_out, np.where(found.stacked.fold == 0, -2.0, 2.0) * of_one, atol=1e-5)
+    np.testing.assert_allclose(
+        found.held_out, np.where(found.stacked.fold == 0, -2.0, 2.0) * of_one, atol=1e-5
+    )
 
 
 def test_a_shape_for_judging_a_fold_does_not_see_what_other_effects_are_in_it():
