@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
+from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.effects.events import during
 from armloop.model import AddedEffect
@@ -69,17 +70,20 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     """
     motion = evidence.samples.motion
     known = known_contacts(evidence)
-    rows, new = novelty(evidence, *innovations(evidence, residual))
-    level = np.where(known[rows][:, None], 0.0, np.abs(new))
-    bursts = _together([_bursts(motion, rows, of_joint) for of_joint in level.T])
+    if evidence.rows.any():
+        rows, new = novelty(evidence, *innovations(evidence, residual))
+        level = np.where(known[rows][:, None], 0.0, np.abs(new))
+        bursts = _together([_bursts(motion, rows, of_joint) for of_joint in level.T])
+        bursts = [burst for burst in bursts if not _comes_back(evidence, rows, level, burst)]
+    else:
+        every = frozenset(range(motion.joints))
+        bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
     total = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
     if length > _LONGEST * total:
         return []  # what is there that long is no event
     found = []
     for burst in bursts:
-        if _comes_back(evidence, rows, level, burst):
-            continue
         # What happens to another joint at the same time, but not together with this, is an event of its own.
         others = {
             j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints

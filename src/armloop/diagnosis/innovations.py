@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2
 #: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
-_CREEP = 0.01
+CREEP = 0.01
 #: Dry friction of a joint that creeps is known but for this part; it creeps below this part of its trained speed …
 _UNSURE, _SLOW = 0.8, 0.05
 #: … and at rest it can hold this many times its sliding level.
@@ -38,7 +38,7 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     """
     samples, model = evidence.samples, evidence.model
     motion = samples.motion
-    rest = ~samples.moving | (np.abs(motion.v) < _CREEP)
+    rest = ~samples.moving | (np.abs(motion.v) < CREEP)
     # Where sliding takes more than the model says, so does sticking.
     sliding_more = [
         float(np.median((np.sign(motion.v[:, j]) * residual[:, j])[evidence.rows[:, j]]))
@@ -51,7 +51,7 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
     held = np.minimum(np.abs(residual) - dry, np.abs(bare) - _STICTION * dry)
     ranges = model.history.get("range")
-    slow = _SLOW * np.asarray(ranges[1]) if ranges else np.full(motion.joints, _CREEP)
+    slow = _SLOW * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
     sliding = np.abs(residual) - _UNSURE * dry * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
     size = np.maximum(np.where(rest, held, sliding), 0.0)
     sign = np.sign(np.where(rest, bare, residual))
@@ -94,7 +94,7 @@ def dry_level(evidence: Evidence) -> Array:
     load = evidence.context.load
     sides = []
     for direction in (1.0, -1.0):
-        v = np.full_like(motion.v, direction * _CREEP)
+        v = np.full_like(motion.v, direction * CREEP)
         creeping = Motion(motion.time, motion.q, v, np.zeros_like(v), np.arange(motion.samples))
         sides.append(_slid(model.friction, creeping, direction, load))
     return np.abs(sides[0] - sides[1]) / 2

@@ -26,6 +26,8 @@ _SMEARED, _REFINEMENTS = 0.05, 3
 _EXPLAINED = 0.5
 #: … and a torque on one joint, or a force on the tool, is it if nothing with more freedom explains so much more.
 _MORE = 0.05
+#: So many joints or fewer feel a force as if it were a torque on any of them.
+_FEW = 3
 #: Directions in which the arm feels a force less than this part of what it feels of another tell nothing of it.
 _FELT = 0.03
 
@@ -91,7 +93,14 @@ def push(evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int
         return None
     most = max(trial.share for trial, _ in tried)
     equals = [(trial, kind) for trial, kind in tried if trial.share >= most - _MORE]
-    best, chosen = min(equals, key=lambda pair: (pair[1].effect.complexity, pair[1].link > 0, -pair[0].share))
+    # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
+    forceful = n > _FEW
+
+    def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
+        trial, kind = pair
+        return forceful and kind.effect.joint is not None, kind.effect.complexity, kind.link > 0, -trial.share
+
+    best, chosen = min(equals, key=order)
     if best.share < _EXPLAINED:
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
