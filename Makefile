@@ -1,6 +1,7 @@
 # make setup   create .venv with everything in it, from requirements.lock
 # make loop    the main job, start to end; results in out/loop
 # make test    style, types and tests
+# make docs    the documentation, tutorials executed, in out/site
 # make bench   the benchmarks' ratios
 # make blind   how often the verdict on an undeclared effect is right
 # make mutants how many changes of the numerics the quick tests see
@@ -12,9 +13,10 @@ BIN := $(VENV)/bin
 PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
+WRITING := $(VENV)/.writing
 PYTEST_ARGS ?= -n 2 --dist loadfile
 
-.PHONY: setup loop test long bench blind mutants clean
+.PHONY: setup loop test long docs bench blind mutants clean
 
 setup: $(INSTALLED)
 
@@ -54,6 +56,17 @@ test: setup $(TESTING)
 # What takes minutes a test: ten random arms of another engine, workers killed in the middle.
 long: setup $(TESTING)
 	$(BIN)/pytest $(PYTEST_ARGS) -m long
+
+$(WRITING): requirements-docs.lock $(TESTING)
+	@grep '^[^#]' requirements-docs.lock | xargs $(BIN)/pip install -qq --no-deps
+	@touch $@
+
+# Strict: a link that leads nowhere, an object without a docstring, or a tutorial's error ends it. Nothing is fetched.
+docs: setup $(WRITING)
+	@rm -rf .cache docs/tutorials/out # executed afresh: a cached tutorial would show another armloop's answers
+	$(BIN)/python docs/make_gallery.py
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/mkdocs build --strict --quiet
+	@echo "open out/site/index.html"
 
 bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done

@@ -1,17 +1,21 @@
-"""Reconstructed models with nothing to reconstruct: each kind of component fitted to an arm's exact torques."""
+"""Arms, and models with nothing to reconstruct: each kind of component fitted to an arm's exact torques."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm
+from armloop.arm import Arm, load_arm
 from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.effects import Estimate, effect
+from armloop.export.consistent import pseudo_inertias
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.library.lagrangian import candidates
+from armloop.library.rigid_body import BaseParameters
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.motion import Motion
 
@@ -83,3 +87,32 @@ def model_of(
             for name, joint, parameters in effects
         ),
     )
+
+
+def six_joints() -> Arm:
+    """A wrist of three axes behind the three-axis arm, with made-up links."""
+    arm = load_arm("three_axis")
+    rng = np.random.default_rng(3)
+    X = np.tile(np.eye(4), (6, 1, 1))
+    X[:3] = arm.X_PF
+    X[3:, :3, 3] = [[0.3, 0, 0], [0.1, 0, 0.02], [0.05, 0.01, 0]]
+    axis = np.vstack([arm.axis, [[1, 0, 0], [0, 1, 0], [1, 0, 0]]])
+    com = np.vstack([arm.com, rng.uniform(-0.05, 0.05, (3, 3))])
+    mass = np.append(arm.mass, [1.0, 0.7, 0.3])
+    own = np.array(
+        [m * (1e-3 * np.eye(3) + c @ c * np.eye(3) - np.outer(c, c)) for m, c in zip(mass, com, strict=True)]
+    )
+    joints = (*arm.joints, *(replace(arm.joints[0], name=f"wrist_{k}") for k in (1, 2, 3)))
+    inertia = np.concatenate([arm.inertia, own[3:]])
+    return replace(arm, name="six", joints=joints, X_PF=X, axis=axis, mass=mass, com=com, inertia=inertia)
+
+
+ARMS = {"three_axis": load_arm("three_axis"), "scara": load_arm("scara"), "six": six_joints()}
+
+
+def disguised(arm: Arm, rotors: bool) -> RigidBody:
+    """The arm's base parameters in links that no bodies have: the smallest numbers with the same torques."""
+    base = BaseParameters.of_arm(arm)
+    links = base.to_full(base.from_full(nominal_parameters(arm)))
+    assert np.linalg.eigvalsh(pseudo_inertias(links.reshape(-1, 10))).min() < 0
+    return RigidBody(np.append(links, np.linspace(0.1, 0.2, arm.n)) if rotors else links, ("m1",), np.ones(1))

@@ -347,3 +347,10 @@ def test_measured_logs_are_read_as_they_are(measured: Path) -> None:
             continue
         log = read_log(path, joints=joints.get(path.parent.name, 6), quiet=True)
         assert log.runs() == [slice(0, log.samples)], path
+
+
+def test_a_log_shows_itself_in_a_line():
+    time = np.concatenate([np.arange(50), 500 + np.arange(50)]) * 0.01
+    q = np.sin(time)[:, None] * [1.0, 2.0]
+    log = MotionLog(time, q, np.cos(time)[:, None] * [1.0, 2.0], np.ones_like(q))
+    assert repr(log) == "<armloop.MotionLog log: 2 joints, 100 samples in 2 runs, 5.49 s, tau in N*m>"

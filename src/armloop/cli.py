@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from typing import Any
 
 from armloop import __version__
 from armloop.errors import InputError
@@ -45,6 +46,21 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> None:  # type: ignore[override]
         command = self.prog.removeprefix("armloop").strip()
         raise InputError(f"{command + ': ' if command else ''}{message}; see {self.prog} --help")
+
+
+class _Command(_Parser):
+    """The parser of one command, which learns its options when it is called: the help of all names them not."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        command = import_module(f"armloop.commands.{self.prog.split()[-1]}")
+        command.arguments(self)
+        self.add_argument(
+            "--force",
+            action="store_true",
+            help="replace files that are read, or that this command has not written",
+        )
+        self.set_defaults(run=command.run)
+        return super().parse_known_args(args, namespace)
 
 
 class _Ended(BaseException):
@@ -137,23 +153,16 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Start with `armloop loop`. Each command has its own --help.",
     )
     parser.add_argument("--version", action="version", version=f"armloop {__version__}")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Command)
     for name in COMMANDS:
         command = import_module(f"armloop.commands.{name}")
-        p = commands.add_parser(
+        commands.add_parser(
             name,
             help=command.HELP,
             description=command.HELP[0].upper() + command.HELP[1:] + ".",
             epilog=f"Example:\n  {command.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        command.arguments(p)
-        p.add_argument(
-            "--force",
-            action="store_true",
-            help="replace files that are read, or that this command has not written",
-        )
-        p.set_defaults(run=command.run)
     return parser
 
 

@@ -32,7 +32,7 @@ _JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
 _SHARED_ROWS = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MotionLog:
     """What was measured on an arm of `n` joints at `N` instants.
 
@@ -138,6 +138,13 @@ class MotionLog:
             cells.get("vdot"),
             name=name,
             tau_unit=tau_unit,
+        )
+
+    def __repr__(self) -> str:
+        runs, seconds = len(self.runs()), float(self.time[-1] - self.time[0])
+        return (
+            f"<armloop.MotionLog {self.name}: {self.q.shape[1]} joints, {self.samples} samples in {runs} "
+            f"{'run' if runs == 1 else 'runs'}, {seconds:.4g} s, tau in {self.tau_unit}>"
         )
 
     @property

@@ -297,21 +297,29 @@ def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
         ModelError: unreadable, not JSON, another schema, or a field missing, misshapen or not finite.
         ArmError: the model belongs to another arm.
     """
-    data = read_json(path, ModelError, "a model written by `armloop reconstruct`")
+    model = model_of(read_json(path, ModelError, "a model written by `armloop reconstruct`"), str(path))
+    if arm is not None:
+        model.arm.require_same(arm, str(path))
+    return model
+
+
+def model_of(data: Any, where: str) -> ReconstructedModel:
+    """The model of a file's content, as of :meth:`ReconstructedModel.to_dict`; ``where`` is named in the errors.
+
+    Raises:
+        ModelError, ArmError: as of :func:`load_model`.
+    """
     # Here, for a command that only says what it can do should not wait for descriptions of files.
     from armloop.schemas.model import model_data
 
     try:
-        model = _from_dict(model_data(data))
+        return _from_dict(model_data(data))
     except KeyError as error:
-        raise ModelError(f"{path}: field {error} is missing") from error
+        raise ModelError(f"{where}: field {error} is missing") from error
     except (ModelError, ArmError) as error:
-        raise type(error)(f"{path}: {error}") from error
+        raise type(error)(f"{where}: {error}") from error
     except (TypeError, ValueError, AttributeError, OverflowError, IndexError) as error:
-        raise ModelError(f"{path}: a field is misshapen: {error}") from error
-    if arm is not None:
-        model.arm.require_same(arm, str(path))
-    return model
+        raise ModelError(f"{where}: a field is misshapen: {error}") from error
 
 
 def _from_dict(data: dict[str, Any]) -> ReconstructedModel:

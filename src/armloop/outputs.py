@@ -8,12 +8,10 @@ Python programs write where they say.
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import os
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from armloop.errors import InputError
@@ -25,15 +23,14 @@ _HEAD = 4096
 _LONGEST_RECORD = 1 << 22
 
 
-@dataclass
 class _Guard:
     """A command that runs: its name, what it reads by device and inode, and what it has taken for itself."""
 
-    command: str
-    force: bool
-    inputs: dict[tuple[int, int], str] = field(default_factory=dict)
-    locks: list[int] = field(default_factory=list)
-    made: list[Path] = field(default_factory=list)
+    def __init__(self, command: str, force: bool) -> None:
+        self.command, self.force = command, force
+        self.inputs: set[tuple[int, int]] = set()
+        self.locks: list[int] = []
+        self.made: list[Path] = []
 
 
 _guard: _Guard | None = None
@@ -65,7 +62,7 @@ def reading(path: str | Path) -> None:
     if _guard is not None:
         found = _status(Path(path))
         if found is not None:
-            _guard.inputs[found.st_dev, found.st_ino] = str(path)
+            _guard.inputs.add((found.st_dev, found.st_ino))
 
 
 def stamp() -> str | None:
@@ -223,6 +220,8 @@ def _marked(path: Path, command: str) -> bool:
 
 
 def _line(path: Path, command: str, name: str) -> str:
+    import hashlib
+
     with path.open("rb") as file:
         return f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {command}  {name}"
 

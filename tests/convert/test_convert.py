@@ -96,6 +96,24 @@ def test_the_unit_of_effort_is_asked_for_in_a_line(tmp_path, log, capsys):
     assert "--tau-unit A" in capsys.readouterr().out
 
 
+def test_the_effort_limits_tell_a_torque_from_a_current(tmp_path, log, capsys):
+    """By name: the bag's order is not the arm's."""
+    path = bag(tmp_path / "bag", log, [2, 0, 1], kind="db3")
+    limits = 1.01 * np.abs(log.tau).max(axis=0)
+    arm = three_axis()
+    arm = replace(arm, joints=tuple(replace(j, effort=x) for j, x in zip(arm.joints, limits, strict=True)))
+    with pytest.raises(InputError, match="what tau holds") as error:
+        convert([path], arm=arm)
+    assert ", ".join(f"{x:.3g}" for x in np.abs(log.tau).max(axis=0)) in str(error.value)
+    assert not any("effort limits" in note for note in convert([path], arm=arm, answers=TORQUE).notes)
+    (note,) = (
+        note
+        for note in convert([path], arm=arm, answers=Answers(drive_gains=[1, 2, 1])).notes
+        if "effort limits" in note
+    )
+    assert NAMES[1] in note and NAMES[0] not in note and NAMES[2] not in note
+
+
 def test_a_folder_or_file_that_is_no_bag(tmp_path, capsys):
     (tmp_path / "x.mcap").write_bytes(b"no bag at all")
     (tmp_path / "x.db3").write_bytes(b"no bag at all")

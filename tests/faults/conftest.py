@@ -1,6 +1,7 @@
 """A folder with one of everything right in it, from which each case takes what it needs and spoils it."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,9 @@ from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.log import write_log
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.resources import urdf_path
+
+#: A number of more digits than any reader takes.
+LONG = "9" * 400
 
 
 def build(folder: Path) -> None:
@@ -78,3 +82,10 @@ def changed(path: Path, change: object) -> None:
     data = json.loads(path.read_text())
     change(data)  # type: ignore[operator]
     path.write_text(json.dumps(data))
+
+
+def one_line(answer: str, said: str) -> None:
+    """Check that a command has refused in one line of bearable length, saying so."""
+    assert answer.startswith("armloop: ") and answer.endswith("\n") and answer.count("\n") == 1, answer
+    assert re.search(said, answer), answer
+    assert len(answer) < 1000

@@ -4,12 +4,7 @@ import fcntl
 import json
 import os
 import re
-import resource
-import signal
 import stat
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -327,94 +322,6 @@ def test_numbers_that_are_not_finite_are_null() -> None:
 def test_names_that_are_no_text_can_be_written(place: Path) -> None:
     write_text(place / "a.html", "log \udcff")
     assert (place / "a.html").read_bytes() == b"log \\udcff"
-
-
-# --- processes of their own
-
-
-def start(command: str, place: Path, **more: object) -> subprocess.Popen[str]:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-m", "armloop", *command.split()],
-        cwd=place,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        **more,  # type: ignore[call-overload]
-    )
-
-
-def children(pid: int) -> list[int]:
-    found = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        found += [int(child) for child in (task / "children").read_text().split()]
-    return found
-
-
-def wait_for(what: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < end, "it did not come"
-        time.sleep(0.05)
-
-
-def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-@pytest.mark.parametrize(
-    ("sent", "status", "said"),
-    [
-        (signal.SIGINT, 130, "armloop: interrupted\n"),
-        (signal.SIGTERM, 143, "armloop: ended on request (SIGTERM)\n"),
-        (signal.SIGKILL, -9, ""),
-    ],
-)
-def test_a_signal_ends_workers_too_with_one_line(sent: int, status: int, said: str, place: Path) -> None:
-    process = start("loop --out l", place)
-    wait_for(lambda: len(children(process.pid)) >= 2)
-    workers = children(process.pid)
-    if sent == signal.SIGINT:
-        os.killpg(process.pid, sent)  # as a terminal does
-    else:
-        process.send_signal(sent)
-    _, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (status, said)
-    wait_for(lambda: not any(map(alive, workers)), 10.0)
-    assert not [path for path in contents(place) if path.endswith(".part")]
-
-
-def limited(size: int) -> Callable[[], None]:
-    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-
-def test_a_full_disk_is_one_line_and_leaves_nothing(place: Path) -> None:
-    process = start("collect three_axis --plan simulation --out logs", place, preexec_fn=limited(20_000))
-    _, err = process.communicate(timeout=100)
-    assert process.returncode == 2
-    assert err.startswith("armloop: ") and err.count("\n") == 1 and "cannot be written" in err
-    assert not [name for name in contents(place) if name.endswith((".part", ".csv")) and "logs" in name]
-
-
-def test_too_little_memory_is_one_line(place: Path) -> None:
-    program = """
-import sys
-from armloop import cli
-import armloop.commands.evaluate as command
-def run(options): raise MemoryError
-command.run = run
-sys.exit(cli.main(["evaluate", "model.json", "run.csv"]))
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=place
-    )
-    assert done.returncode == 1
-    assert done.stderr.startswith("armloop: not enough memory") and done.stderr.count("\n") == 1
 
 
 def test_what_was_written_before_the_vanishing_of_the_folder_can_be_read(place: Path) -> None:

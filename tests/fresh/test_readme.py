@@ -1,4 +1,4 @@
-"""Every command and every line of Python in the README runs, in the order in which they stand there."""
+"""Every command and every line of Python in the README, and the way from a bag in docs/convert.md, run as they stand."""
 
 import glob
 import json
@@ -16,13 +16,13 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 
 
-def blocks(language: str) -> list[str]:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def blocks(language: str, page: str = "README.md") -> list[str]:
+    text = (ROOT / page).read_text(encoding="utf-8")
     return [body for kind, body in BLOCK.findall(text) if kind == language]
 
 
-def commands(program: str) -> list[str]:
-    lines = "\n".join(blocks("sh")).replace("\\\n", " ").splitlines()
+def commands(program: str, page: str = "README.md") -> list[str]:
+    lines = "\n".join(blocks("sh", page)).replace("\\\n", " ").splitlines()
     return [line for line in lines if line.startswith(program)]
 
 
@@ -98,3 +98,23 @@ def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path,
     nrmse = answer["error"]["nrmse"]
     for values in nrmse.values():
         assert f"| {sum(values) / 6:.3f} |" in text
+
+
+@pytest.mark.slow
+@pytest.mark.measured
+def test_the_way_from_a_bag_to_a_simulator_and_c(tmp_path, measured):
+    found = {
+        "$BAG": measured / "ros2bag" / "ur10_exciting_trajectory.db3",
+        "$URDF": measured / "ur10e" / "ur10e.urdf",
+    }
+    lines = commands("armloop", "docs/convert.md")
+    assert [line.split()[1] for line in lines] == ["convert", "reconstruct", "diagnose", "export", "export"]
+    for line in lines:
+        for name, path in found.items():
+            line = line.replace(name, str(path))
+        out = armloop(line, tmp_path)
+        if "diagnose" in line:
+            assert "no_effect" in out
+        if "export" in line:
+            assert "read back by" in out
+    assert (tmp_path / "out" / "ur10.xml").is_file() and (tmp_path / "out" / "ur10.c").is_file()

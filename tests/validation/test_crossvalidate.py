@@ -1,6 +1,8 @@
 """Cross-validation through the public reconstruction, its command, and what physical consistency changes."""
 
+import importlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,11 @@ import pytest
 from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.cli import main
+from armloop.keeping import FOLDER, Kept
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.log import MotionLog, write_log
+from armloop.reconstruction import Options
+from armloop.signals import Conditioning
 from armloop.validation import crossvalidate
 from armloop.validation.physics import check_mass_matrix, mass_matrix
 
@@ -57,6 +62,68 @@ def test_the_command_answers_for_blocks(
     assert main(call) == 0
     text = capsys.readouterr().out
     assert "nRMSE of the moving joints on data left out" in text and "Friction ladder" in text
+
+
+def test_it_goes_on_where_it_was_ended(
+    logs: list[MotionLog],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    module = importlib.import_module("armloop.validation.crossvalidate")
+    paths = [str(tmp_path / f"{log.name}.csv") for log in logs]
+    for path, log in zip(paths, logs, strict=True):
+        write_log(path, log)
+    real, made = module.reconstruct, []
+
+    def ended(training: list[MotionLog], *more: object, **named: object) -> object:
+        made.append([log.name for log in training])
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        return real(training, *more, **named)
+
+    monkeypatch.setattr(module, "reconstruct", ended)
+    out = tmp_path / "out"
+    call = [
+        "crossvalidate",
+        *paths,
+        "--arm",
+        "three_axis",
+        "--library",
+        "rigid-body",
+        "--cutoff",
+        "8",
+        "--json",
+    ]
+    assert main([*call, "--out", str(out)]) == 130
+    assert [path.name for path in out.iterdir()] == [FOLDER]
+    capsys.readouterr()
+    assert main([*call, "--out", str(out)]) == 0
+    assert made == [["run2", "run3"], ["run1", "run3"], ["run1", "run3"], ["run1", "run2"]]
+    resumed = json.loads(capsys.readouterr().out)
+    assert json.loads((out / "crossvalidation.json").read_text())["files"] == resumed["files"]
+    assert not (out / FOLDER).exists()
+    assert main(call) == 0  # from the beginning: the same to the bit
+    assert json.loads(capsys.readouterr().out) == resumed and len(made) == 7
+
+
+def test_a_fit_that_was_kept_serves_its_own_data_and_settings_alone(
+    logs: list[MotionLog], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    module = importlib.import_module("armloop.validation.crossvalidate")
+    fit = module.reconstruct(logs[:2], three_axis(), library="rigid-body")
+    made = []
+    monkeypatch.setattr(module, "reconstruct", lambda *all_, **named: made.append(1) or fit)
+
+    def fits(logs: list[MotionLog], **settings: object) -> int:
+        made.clear()
+        crossvalidate(logs, three_axis(), library="rigid-body", kept=Kept(tmp_path, "a"), **settings)
+        return len(made)
+
+    assert (fits(logs), fits(logs)) == (3, 0)
+    assert fits(logs, conditioning=Conditioning(cutoff_hz=5.0)) == 3
+    assert fits(logs, options=Options(physical=False)) == 3
+    assert fits([*logs[:2], replace(logs[2], tau=2.0 * logs[2].tau)]) == 3
 
 
 def test_faults_are_one_line(logs: list[MotionLog], tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -93,14 +93,20 @@ def excite(
     Args:
         library: what is to be regressed; by the number of joints if None.
         criterion: "variance" (of the coefficients), "logdet" (of the information) or "condition".
-        duration: s; by the library if None. base_frequency: Hz, and harmonics of it.
+        duration: s; by the library if None.
+        base_frequency: Hz.
+        harmonics: how many of it.
         order: N1 of the double feature set's candidates.
-        lower, upper, velocity, acceleration: (n,) rad, rad/s, rad/s² (m, ..); those of a built-in arm's plant, or nine
-            tenths of the URDF's travel and half its speed, if None.
+        lower: (n,) rad (m); that of a built-in arm's plant, or nine tenths of the URDF's travel, if None.
+        upper: likewise.
+        velocity: (n,) rad/s (m/s); that of a built-in arm's plant, or half the URDF's, if None.
+        acceleration: (n,) rad/s² (m/s²), likewise.
         reserve: part of the effort limits that is kept free.
         model: predicts the torque that must keep within the drives' limits; the URDF's inertias if None.
         noise: (n,) standard deviation of each joint's torque, N·m (N); the model's baseline error if None.
-        starts: of the optimiser. random: references to compare with. seed: of both.
+        starts: of the optimiser.
+        random: how many references to compare with.
+        seed: of both.
 
     Raises:
         InputError: settings out of range, or limits that exclude any motion.

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
 
 def page(text: str, figure: Figure | None = None) -> str:
     """HTML of a table that is text, with a figure below it."""
-    shown = f'<pre style="line-height:1.25">{escape(text)}</pre>'
+    # A table's lines must not wrap, whatever style the notebook has.
+    style = "line-height:1.25;font-size:0.8em;white-space:pre;overflow-x:auto"
+    shown = f'<pre style="{style}">{escape(text)}</pre>'
     if figure is None:
         return shown
     import base64

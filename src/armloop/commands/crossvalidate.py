@@ -47,14 +47,30 @@ def arguments(p: argparse.ArgumentParser) -> None:
         action="store_true",
         help="do both, and insist on it as well, and say what physical consistency costs and gains",
     )
+    p.add_argument(
+        "--out",
+        default=None,
+        help="folder for crossvalidation.json; each fit is kept there until the end, so that the same call goes on where "
+        "it was ended",
+    )
     add_recorded(p, "N*m")
     add_json(p)
 
 
 def run(options: argparse.Namespace) -> None:
     """Reconstruct with part of the logs left out, in turn, and score what was left out."""
-    from armloop.commands.shared import TORQUE, arm_of, print_json, progress, read_logs, recorded_as
+    from armloop.commands.shared import (
+        TORQUE,
+        arm_of,
+        out_folder,
+        print_json,
+        progress,
+        read_logs,
+        recorded_as,
+    )
     from armloop.errors import InputError
+    from armloop.files import write_json
+    from armloop.keeping import Kept
     from armloop.reconstruction import Options
     from armloop.reports.crossvalidation import (
         crossvalidation_tables,
@@ -72,6 +88,8 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
     arm = arm_of(options)
     logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
+    folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
+    kept = Kept(folder, "crossvalidate")
     how = {
         "leave_out": options.leave_out,
         "block_seconds": options.block,
@@ -80,15 +98,20 @@ def run(options: argparse.Namespace) -> None:
         "conditioning": None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
         "options": Options(max_order=options.max_order, physical=not options.no_physical),
         "progress": progress(options),
+        "kept": kept,
     }
     if options.compare_physical:
         comparison = compare_physical(logs, arm, **how)
         result = comparison.runs["physical"]
     else:
         comparison, result = None, crossvalidate(logs, arm, **how)
+    compared = {} if comparison is None else {"physical_consistency": comparison.to_dict()}
+    answer = {**result.to_dict(), **compared}
+    if folder is not None:
+        write_json(folder / "crossvalidation.json", {"schema": "armloop/crossvalidation/1", **answer})
+        kept.clear()
     if options.json:
-        compared = {} if comparison is None else {"physical_consistency": comparison.to_dict()}
-        print_json({**result.to_dict(), **compared})
+        print_json(answer)
         return
     for text in crossvalidation_tables(result):
         print(text, end="\n\n")

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armloop.commands.ranges import add_ranges, ranges_stated, read_ranges
 
@@ -62,8 +61,7 @@ def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
     return wanted
 
 
-@dataclass(frozen=True, eq=False)
-class Planned:
+class Planned(NamedTuple):
     """The answer of ``--next-run``: the motion, or why there is none."""
 
     path: str

@@ -74,6 +74,9 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         cells["v"] = _differences(time, cells["q"], starts)
         notes.append("v: central differences of q, for the source has no velocities")
     unit = "A" if mapping.tau.gains is None and canonical(_unit(mapping.tau, 0), "tau") in CURRENTS else "N*m"
+    beyond = None if arm is None or unit == "A" else _beyond_limits(cells["tau"], arm)
+    if beyond is not None:
+        notes.append(beyond)
     # Parts that follow one another without a gap may jump: they are checked once they are kept apart.
     log = unchecked_log(time=time, **cells, name=recording.path.stem, tau_unit=unit)
     used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {
@@ -153,7 +156,10 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         if v is not None:
             v = QuantityMap(v.columns, _said(v.unit, rates[answers.angle_unit]), v.sign, v.offset)
     if not _is_said(tau):
-        asked.append("what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A)")
+        asked.append(
+            "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
+            f"{_sizes(recording, mapping, arm)})"
+        )
     elif canonical(_unit(tau, 0), "tau") == "%" and tau.gains is None:
         raise LogError(f"{where}: tau is in percent of a rating: give gains (N·m per percent) in a --map")
     if not _is_said(q) or (v is not None and not _is_said(v)):
@@ -170,6 +176,32 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         unit = _time_unit(recording, mapping, q, v)
     time = type(mapping.time)(mapping.time.column, unit, mapping.time.rate)
     return Mapping(time, q, tau, v, mapping.vdot, mapping.joints, mapping.keep)
+
+
+def _sizes(recording: Recording, mapping: Mapping, arm: Arm | None) -> str:
+    """The largest values of tau beside the arm's effort limits, from which its user can tell which of them they are."""
+    if arm is None or not all(np.isfinite(joint.effort) for joint in arm.joints):
+        return ""
+    largest = [
+        np.abs(_column(recording, mapping.tau, "tau", j)).max() for j in _order(recording, mapping, arm, [])
+    ]
+    limits = ", ".join(f"{joint.effort:.3g}" for joint in arm.joints)
+    return f": the largest are {', '.join(f'{x:.3g}' for x in largest)}, the arm's effort limits {limits} in SI units"
+
+
+def _beyond_limits(tau: Array, arm: Arm) -> str | None:
+    """What to say of (N, n) torques that the arm's drives cannot give; None if they all can."""
+    largest = np.abs(tau).max(axis=0)
+    beyond = [
+        f"{joint.name} {size:.4g} of {joint.effort:.4g} {joint.torque_unit}"
+        for joint, size in zip(arm.joints, largest, strict=True)
+        if size > joint.effort
+    ]
+    if not beyond:
+        return None
+    return (
+        f"tau is beyond the arm's effort limits: {', '.join(beyond)}; are its unit and the drive gains right?"
+    )
 
 
 def _time_unit(recording: Recording, mapping: Mapping, q: QuantityMap, v: QuantityMap | None) -> str:

@@ -16,12 +16,17 @@ from armloop.drake_systems.scenario_data import PlanData, PlantData, TrackingDat
 from armloop.schemas.answers import DiagnosisData, LoopData
 from armloop.schemas.answers import TrackingData as TrackingAnswer
 from armloop.schemas.model import ModelData
+from armloop.schemas.scores import CrossValidationData, EvaluationData, MeasuredData, ReconstructionData
 
 FILES: dict[str, Any] = {
     "model": ModelData,
     "diagnosis": DiagnosisData,
     "tracking": TrackingAnswer,
     "loop": LoopData,
+    "measured": MeasuredData,
+    "evaluation": EvaluationData,
+    "reconstruction": ReconstructionData,
+    "crossvalidation": CrossValidationData,
     "scenario": TrackingData,
     "plant": PlantData,
     "collection_plan": PlanData,

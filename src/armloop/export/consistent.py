@@ -1,26 +1,31 @@
-"""Link inertias that are physically consistent and have given base parameters, by a semidefinite program.
+"""Link inertias that are physically consistent and have given base parameters, by log-determinant regularisation.
 
-A link's mass, first moment and inertia belong to some body of non-negative density exactly if its pseudo-inertia
+A link's mass, first moment and inertia belong to some body of positive density exactly if its pseudo-inertia
 
     J = [[ (tr(I)/2) 1 - I,  m c ],
          [ (m c)^T,          m   ]]
 
-is positive semidefinite (Wensing, Kim and Slotine, "Linear matrix inequalities for physically consistent inertial
-parameter identification", IEEE RA-L 3(1), 2018). Torques fix the base parameters only: the rest, the null space of
-the regressor, is free to make every J positive definite and to stay near the nominal links. So the base parameters
-are met to rounding, whatever the solver's tolerance.
+is positive definite (Wensing, Kim and Slotine, "Linear matrix inequalities for physically consistent inertial
+parameter identification", IEEE RA-L 3(1), 2018). Torques fix the base parameters only; of the links that have them,
+the ones wanted are those nearest to a prior by the Bregman divergence of -log det (Lee, Wensing and Park, "Geometric
+robot dynamic identification: a convex programming approach", IEEE T-RO 36(2), 2020):
+
+    minimize  |R (x - x0)|² / (2 μ)  +  Σ_i [ tr(J0_i^-1 J_i) - log det J_i ],    μ from 1 towards 0.
+
+Whatever the base parameters, this is strictly convex and its minimum lies inside the cone, so bodies are always found:
+with those base parameters if any have them, and else as near to them in torque as bodies come.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import brentq
 
 from armloop.arm import Arm
-from armloop.errors import ModelError
 from armloop.kinematics import LINK_PARAMETERS, nominal_parameters
 from armloop.library.rigid_body import full_columns
 from armloop.motion import Motion
@@ -29,10 +34,18 @@ Array = NDArray[np.float64]
 
 _STATES = 300
 _RANK = 1e-9
-#: Part of the largest possible smallest eigenvalue that is kept as a margin where the prior would touch zero.
-_MARGIN = 0.1
-#: The smallest margin, relative to a link's scale, at which a solution counts as one with positive masses.
-_FEASIBLE = 1e-7
+#: A rotor inertia, relative to a link's scale, that is rounding.
+_ROUNDING = 1e-12
+#: What the prior weighs beside the mean square of the torque's change, relative to the torque: it falls until what it
+#: costs, at most the last weight for each eigenvalue and rotor (the gap of a barrier method), is nothing.
+_WEIGHTS = np.logspace(0, -8, 9)
+_STEPS = 100
+#: The Newton decrement at which a minimum is found: half its square is the gap.
+_CONVERGED = 1e-3
+#: A prior may be a rod, a point or nothing: its eigenvalues are at least this part of a link's scale.
+_THICKNESS = 1e-3
+#: The smallest eigenvalue of a pseudo-inertia, relative to a link's scale, that passes for a body.
+_FEASIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,60 +69,108 @@ class ConsistentInertia:
 def consistent_inertia(
     arm: Arm, links: Array, rotors: Array, prior: Array | None = None
 ) -> ConsistentInertia:
-    """The links nearest to a prior that can exist and give the same torques as given parameters.
+    """The links nearest to a prior that can exist and give the same torques as given parameters, or the nearest.
 
     Args:
         links: (10 n,) parameters that have the base parameters wanted.
-        rotors: (n,) rotor inertias, likewise; a rotor that is zero stays zero.
+        rotors: (n,) rotor inertias, likewise; a rotor that is zero, but for rounding, becomes zero.
         prior: (10 n,) nominal parameters, by default the arm's; a link without mass has none.
-
-    Raises:
-        ModelError: the solver finds no solution at all.
     """
     n = arm.n
     prior = nominal_parameters(arm) if prior is None else prior
-    with_rotor = np.flatnonzero(rotors != 0.0)
     scale = _scales(arm, links, prior)
+    with_rotor = np.flatnonzero(np.abs(rotors) > _ROUNDING * scale[9::10])
     units = np.concatenate([scale, scale[9::10][with_rotor]])
-    start = np.concatenate([links, rotors[with_rotor]]) / units
-    goal = np.concatenate([prior, rotors[with_rotor]]) / units
-    rows = _torque_rows(arm, with_rotor) * units
-    singular, V = _spectrum(rows)
-    rank = int(np.count_nonzero(singular > _RANK * singular[0]))
-    free, fixed = V[:, rank:], V[:, :rank]
-    margin, z = _program(n, start, free, goal, None)
-    exact = margin > _FEASIBLE
-    if exact:
-        x = start + free @ z
-    else:
-        # No bodies have these base parameters: let them give way where it costs least torque.
-        cost = singular[:rank, None] * np.eye(rank) / np.sqrt(len(rows))
-        margin, y = _program(n, start, np.hstack([fixed, free]), goal, cost)
-        x = start + np.hstack([fixed, free]) @ y
-    full = x * units
+    wanted = np.concatenate([links, rotors[with_rotor]]) / units
+    R = _torque_factor(arm, with_rotor, links, rotors) * units
+    # Directions that change no torque are to change none by rounding either.
+    _, singular, Vt = np.linalg.svd(R)
+    fixed = Vt[singular > _RANK * singular[0]]
+    R = R @ fixed.T @ fixed
+    bodies = _bodies((prior / scale).reshape(n, 10))
+    drives = np.maximum(wanted[10 * n :], _THICKNESS)
+    x = np.concatenate([_parameters_of(bodies).ravel(), drives])
+    for weight in _WEIGHTS:
+        x = _nearest(R / np.sqrt(weight), wanted, bodies, drives, x)
+    # What it still lacks of the base parameters wanted, put right by the least change if it stays a body.
+    moved = x + fixed.T @ (fixed @ (wanted - x))
+    exact = bool(_smallest(moved, n) > _FEASIBLE and (moved[10 * n :] >= 0).all())
+    x = moved if exact else x
     found = np.zeros(n)
-    found[with_rotor] = np.maximum(full[10 * n :], 0.0)
-    smallest = min(float(np.linalg.eigvalsh(pseudo_inertia(x[10 * i : 10 * i + 10]))[0]) for i in range(n))
-    if not smallest > 0:
-        raise ModelError(
-            "no link inertias with positive masses were found for the model's base parameters; "
-            "reconstruct with --library rigid-body on more exciting data"
-        )
-    return ConsistentInertia(full[: 10 * n], found, exact, smallest)
+    found[with_rotor] = x[10 * n :] * units[10 * n :]
+    return ConsistentInertia(x[: 10 * n] * scale, found, exact, _smallest(x, n))
 
 
-def pseudo_inertia(parameters: Array) -> Array:
-    """(4, 4) pseudo-inertia of one link's ten parameters."""
-    m, mx, my, mz, xx, yy, zz, xy, xz, yz = parameters
+def pseudo_inertias(parameters: Array) -> Array:
+    """(n, 4, 4) pseudo-inertias of links' ten parameters, (n, 10)."""
+    m, mx, my, mz, xx, yy, zz, xy, xz, yz = np.asarray(parameters).T
     half = 0.5 * (xx + yy + zz)
-    return np.array(
-        [
-            [half - xx, -xy, -xz, mx],
-            [-xy, half - yy, -yz, my],
-            [-xz, -yz, half - zz, mz],
-            [mx, my, mz, m],
-        ]
-    )
+    rows = [[half - xx, -xy, -xz, mx], [-xy, half - yy, -yz, my], [-xz, -yz, half - zz, mz], [mx, my, mz, m]]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+#: (10, 4, 4) what a unit of each parameter adds to a pseudo-inertia.
+_UNITS = pseudo_inertias(np.eye(10))
+
+
+def _parameters_of(J: Array) -> Array:
+    """(n, 10) parameters of (n, 4, 4) pseudo-inertias."""
+    return np.asarray(np.linalg.lstsq(_UNITS.reshape(10, 16).T, J.reshape(-1, 16).T)[0].T)
+
+
+def _bodies(prior: Array) -> Array:
+    """Pseudo-inertias (n, 4, 4) of a prior's links, none thinner than a body that counts; unity where none has mass."""
+    if not (prior[:, 0] > 0).any():
+        return np.tile(np.eye(4), (len(prior), 1, 1))
+    values, vectors = np.linalg.eigh(pseudo_inertias(prior))
+    return np.asarray(vectors * np.maximum(values, _THICKNESS)[:, None, :] @ vectors.swapaxes(1, 2))
+
+
+def _smallest(x: Array, n: int) -> float:
+    return float(np.linalg.eigvalsh(pseudo_inertias(x[: 10 * n].reshape(n, 10))).min())
+
+
+def _nearest(R: Array, wanted: Array, bodies: Array, drives: Array, x: Array) -> Array:
+    """The x that minimises |R (x - wanted)|² / 2 and its divergence from (bodies, drives), from one inside the cone.
+
+    Newton's method with an exact line search. With J = L L^T both Hessian and slope are G^T times something, so that
+    each step is a least-squares problem with the root of the Hessian's condition.
+    """
+    n = len(bodies)
+    prior = np.linalg.inv(bodies)
+    for _ in range(_STEPS):
+        L = np.linalg.cholesky(pseudo_inertias(x[: 10 * n].reshape(n, 10)))
+        inverse = np.linalg.inv(L)[:, None]
+        turned = inverse @ _UNITS @ inverse.swapaxes(2, 3)  # (n, 10, 4, 4): L^-1 E L^-T
+        barrier = block_diag(*turned.reshape(n, 10, 16).swapaxes(1, 2), np.diag(1 / x[10 * n :]))
+        towards = np.concatenate([(L.swapaxes(1, 2) @ prior @ L).ravel(), x[10 * n :] / drives])
+        off = R @ (x - wanted)
+        least = np.linalg.lstsq(
+            np.vstack([R, barrier]), np.concatenate([off, towards - _ones(n, len(drives))])
+        )
+        step = -least[0]
+        far, near = R @ step, barrier @ step
+        growth = np.linalg.eigvalsh(near[: 16 * n].reshape(n, 4, 4)).ravel()
+        growth = np.append(growth, near[16 * n :])
+        x = x + _exact_length(off @ far + towards @ near, far @ far, growth) * step
+        if np.hypot(np.linalg.norm(far), np.linalg.norm(near)) < _CONVERGED:
+            break
+    return x
+
+
+def _ones(n: int, drives: int) -> Array:
+    """What ``towards`` is at the prior itself: n identities, and ones."""
+    return np.concatenate([np.tile(np.eye(4).ravel(), n), np.ones(drives)])
+
+
+def _exact_length(slope: float, curvature: float, growth: Array) -> float:
+    """The t > 0 that minimises slope t + curvature t² / 2 - Σ log(1 + growth t); a log's argument stays positive."""
+
+    def rate(t: float) -> float:
+        return float(slope + curvature * t - np.sum(growth / (1 + growth * t)))
+
+    end = (1 - 1e-9) / max(-float(growth.min()), 1e-2)
+    return end if rate(end) <= 0 else float(brentq(rate, 0.0, end)) if rate(0.0) < 0 else 1.0
 
 
 def _scales(arm: Arm, links: Array, prior: Array) -> Array:
@@ -117,9 +178,10 @@ def _scales(arm: Arm, links: Array, prior: Array) -> Array:
     lengths = np.linalg.norm(arm.X_PF[:, :3, 3], axis=1)
     reach = float(lengths.sum()) + float(np.abs(arm.com).max(initial=0.0))
     length = max(reach / arm.n, 0.05)
-    masses = np.maximum(prior[::10], 0.0)
-    moment = float(np.abs(links.reshape(-1, 10)[:, 1:4]).max(initial=0.0)) / length
-    mass = max(float(masses.mean()), moment / arm.n, 1e-3)
+    mass = float(np.maximum(prior[::10], 0.0).mean())
+    if not mass:
+        moments = np.abs(links.reshape(-1, 10)[:, 1:])
+        mass = max(moments[:, :3].max() / length, moments[:, 3:].max() / length**2, 1e-3)
     kinds = {"m": mass}
     sizes = [
         kinds.get(name, mass * length if name.startswith("m") else mass * length**2)
@@ -128,89 +190,19 @@ def _scales(arm: Arm, links: Array, prior: Array) -> Array:
     return np.tile(np.array(sizes), arm.n)
 
 
-def _torque_rows(arm: Arm, with_rotor: NDArray[np.intp]) -> Array:
-    """Torques per unit of each parameter on random motion, one row per torque."""
+def _torque_factor(arm: Arm, with_rotor: NDArray[np.intp], links: Array, rotors: Array) -> Array:
+    """R (P, P) with |R x|² the mean square of the torques of parameters x on random motion.
+
+    Each joint's torque is in units of the RMS that the given links and rotors need there, so that a wrist counts as
+    much as a shoulder.
+    """
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (_STATES, arm.n))
     v, vdot = rng.normal(size=(2, _STATES, arm.n))
     motion = Motion(np.arange(float(_STATES)), q, v, 3 * vdot, np.array([0]))
-    columns = full_columns(arm, motion, rotors=True).reshape(-1, 11 * arm.n)
-    return columns[:, [*range(10 * arm.n), *(10 * arm.n + with_rotor)]]
-
-
-def _spectrum(rows: Array) -> tuple[Array, Array]:
-    """Singular values and right singular vectors, by way of the triangular factor: there are far more rows."""
-    _, singular, Vt = np.linalg.svd(np.linalg.qr(rows, mode="r"))
-    return singular, Vt.T
-
-
-def _program(n: int, start: Array, basis: Array, goal: Array, cost: Array | None) -> tuple[float, Array]:
-    """Coordinates along a basis that keep every pseudo-inertia inside the cone, and the margin they keep.
-
-    First the largest margin t with J_i >= t 1 for all links (and rotors >= t); then, with a part of it, the
-    nearest to the goal. With ``cost`` the first columns of the basis, which change torques, are held back instead.
-    """
-    from pydrake.solvers import MathematicalProgram
-
-    def program() -> tuple[Any, Any]:
-        prog = MathematicalProgram()
-        return prog, prog.NewContinuousVariables(basis.shape[1], "z")
-
-    columns = [
-        [pseudo_inertia(basis[10 * i : 10 * i + 10, k]) for k in range(basis.shape[1])] for i in range(n)
-    ]
-    heads = [pseudo_inertia(start[10 * i : 10 * i + 10]) for i in range(n)]
-    r = len(start) - 10 * n
-
-    def solved(prog: Any, z: Any) -> Array | None:
-        result = _solve(prog)
-        return None if result is None else np.asarray(result.GetSolution(z), dtype=np.float64)
-
-    if cost is None:
-        prog, z = program()
-        t = prog.NewContinuousVariables(1, "t")
-        for i in range(n):
-            prog.AddLinearMatrixInequalityConstraint([heads[i], *columns[i], -np.eye(4)], [*z, *t])
-        for k in range(r):
-            row = basis[10 * n + k]
-            prog.AddLinearConstraint(np.append(row, -1.0)[None], [-start[10 * n + k]], [np.inf], [*z, *t])
-        # More than the scale itself is no better, and bounds the program.
-        prog.AddBoundingBoxConstraint(-1e3, 1.0, t)
-        prog.AddLinearCost(-1.0 * t[0])
-        result = _solve(prog)
-        if result is None:
-            return -np.inf, np.zeros(basis.shape[1])
-        margin = float(result.GetSolution(t)[0])
-        if margin <= _FEASIBLE:
-            return margin, np.asarray(result.GetSolution(z), dtype=np.float64)
-        centre = np.asarray(result.GetSolution(z), dtype=np.float64)
-    else:
-        margin, centre = 1e-4, np.zeros(basis.shape[1])
-    keep = margin * (_MARGIN if cost is None else 1.0)
-    prog, z = program()
-    for i in range(n):
-        prog.AddLinearMatrixInequalityConstraint([heads[i] - keep * np.eye(4), *columns[i]], list(z))
-    for k in range(r):
-        floor = keep if cost is None else 0.0
-        prog.AddLinearConstraint(basis[10 * n + k][None], [floor - start[10 * n + k]], [np.inf], z)
-    if cost is None:
-        prog.Add2NormSquaredCost(basis, goal - start, z)
-    else:
-        held = cost.shape[1]
-        prog.Add2NormSquaredCost(1e4 * cost, np.zeros(len(cost)), z[:held])
-        prog.Add2NormSquaredCost(basis, goal - start, z)
-    found = solved(prog, z)
-    return keep, centre if found is None else found
-
-
-def _solve(prog: Any) -> Any:
-    """The first solver's answer that is one; None where there is none."""
-    from pydrake.solvers import ClarabelSolver, CsdpSolver, ScsSolver
-
-    for solver in (ClarabelSolver(), ScsSolver(), CsdpSolver()):
-        if not (solver.available() and solver.enabled()):
-            continue
-        result = solver.Solve(prog)
-        if result.is_success():
-            return result
-    return None
+    columns = full_columns(arm, motion, rotors=True)
+    size = np.sqrt(np.mean((columns @ np.concatenate([links, rotors])) ** 2, axis=0))
+    size = np.maximum(size, 1e-6 * size.max(initial=0.0))
+    rows = (columns / np.where(size > 0, size, 1.0)[:, None]).reshape(-1, 11 * arm.n)
+    kept = [*range(10 * arm.n), *(10 * arm.n + with_rotor)]
+    return np.linalg.qr(rows[:, kept], mode="r") / np.sqrt(len(rows))

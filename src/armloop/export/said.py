@@ -102,7 +102,8 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     arm = model.arm
     missing: list[str] = []
     notes: list[str] = []
-    links, rotors, left = rigid_parameters(model)
+    constants = _constants(model) if nearest_friction else np.zeros(arm.n)
+    links, rotors, left, constants = rigid_parameters(model, constants)
     if left.max() > _NO_BODY:
         listed = ", ".join(f"{x:.2g}" for x in left)
         missing.append(f"terms that no rigid body has: {listed} of the joints' rigid torque (RMS)")
@@ -125,6 +126,8 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
         elif not added.effect.rubs:
             why = "a fault of the record" if added.effect.sensor else "not in any description"
             missing.append(f"{added.effect.label()}: {why}")
+    for j in np.flatnonzero(constants).tolist():
+        missing.append(f"joint {j + 1}: a constant torque, {constants[j]:.4g} {arm.joints[j].torque_unit}")
     damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
     for j in range(arm.n):
         if stiffness[j] < 0:
@@ -134,11 +137,12 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     return Said(arm, found.links, found.rotors, damping, dry, stiffness, rest, gravity, missing, notes)
 
 
-def rigid_parameters(model: ReconstructedModel) -> tuple[Array, Array, Array]:
+def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array, Array, Array, Array]:
     """Link parameters (10 n,) and rotor inertias (n,) with the model's rigid torques, and what they leave.
 
     What they leave, (n,) relative to each joint's RMS, is zero for components that are rigid bodies; sparse terms
-    and energies are fitted by least squares on random states within the training range.
+    and energies are fitted by least squares on random states within the training range. A constant torque that
+    stands with friction, (n,), may be the weight on a prismatic joint: what no body needs of it comes last.
     """
     arm, n = model.arm, model.arm.n
     bodies = [c for c in model.components if isinstance(c, RigidBody)]
@@ -146,21 +150,35 @@ def rigid_parameters(model: ReconstructedModel) -> tuple[Array, Array, Array]:
     for body in bodies:
         full[: len(body.parameters)] += body.parameters
     if len(bodies) == len(model.components):
-        return full[: 10 * n], full[10 * n :], np.zeros(n)
+        return full[: 10 * n], full[10 * n :], np.zeros(n), constants
     motion = random_motion(model, _STATES, seed=0)
     columns = full_columns(arm, motion, rotors=True)
     rest = replace(model, components=tuple(c for c in model.components if not isinstance(c, RigidBody)))
-    wanted = rest.rigid_body(motion)
+    wanted = rest.rigid_body(motion) + constants
+    if constants.any():
+        columns = np.concatenate([columns, np.broadcast_to(np.eye(n), (len(columns), n, n))], axis=2)
     scale = np.maximum(np.sqrt(np.mean(wanted**2, axis=0)), 1e-12)
-    rows = (columns / scale[:, None]).reshape(-1, 11 * n)
-    start = np.concatenate([nominal_parameters(arm), np.zeros(n)])
+    rows = (columns / scale[:, None]).reshape(-1, columns.shape[2])
+    start = np.zeros(rows.shape[1])
+    start[: 10 * n] = nominal_parameters(arm)
     size = np.linalg.norm(rows, axis=0)
-    size[size == 0] = 1.0
+    # A parameter that moves no joint has a column of rounding errors, which must not be scaled up to count.
+    size[size < 1e-9 * size.max()] = np.inf
     change = np.linalg.lstsq(rows / size, (wanted / scale).ravel() - rows @ start, rcond=1e-9)[0] / size
     fitted = start + change
     left = np.sqrt(np.mean((columns @ fitted - wanted) ** 2, axis=0)) / scale
-    full += fitted
-    return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0)
+    full += fitted[: 11 * n]
+    apart = np.zeros(n)
+    if constants.any():
+        apart = np.where(np.abs(fitted[11 * n :]) > _NO_BODY * scale, fitted[11 * n :], 0.0)
+    return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0), apart
+
+
+def _constants(model: ReconstructedModel) -> Array:
+    """(n,) what the laws of friction hold of torques that are the same in both directions and at any speed."""
+    return np.array(
+        [sum(t.coefficient for t in terms if t.kind == "offset") for terms in model.friction.terms], float
+    )
 
 
 def random_motion(model: ReconstructedModel, samples: int, seed: int) -> Motion:
@@ -223,9 +241,9 @@ def _viscous(model: ReconstructedModel) -> Array:
 
 
 def _other_laws(model: ReconstructedModel) -> list[list[str]]:
-    """What each joint's friction has beside Coulomb and viscous terms, in words."""
+    """What each joint's friction has beside Coulomb and viscous terms and a constant, in words."""
     found = [
-        [_WORDS.get(t.kind, t.kind) for t in terms if t.kind not in ("sign", "viscous")]
+        [_WORDS.get(t.kind, t.kind) for t in terms if t.kind not in ("sign", "viscous", "offset")]
         for terms in model.friction.terms
     ]
     for added in model.effects:
@@ -247,7 +265,6 @@ def friction_torques(model: ReconstructedModel) -> tuple[Array, Array]:
 
 _WARM = 1e300
 _WORDS = {
-    "offset": "a constant torque",
     "smooth_sign": "dry friction that sets in smoothly",
     "hysteresis": "memory (presliding)",
     "load_sign": "friction that grows with the load",

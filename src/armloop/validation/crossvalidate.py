@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.errors import InputError
+from armloop.keeping import Kept, digest
 from armloop.log import MotionLog, require_different
+from armloop.model import ReconstructedModel, model_of
 from armloop.motion import Samples
 from armloop.progress import Progress, silent
-from armloop.reconstruction import Options, Reconstruction, reconstruct
+from armloop.reconstruction import Options, reconstruct
 from armloop.scoring import Score, residual, score_errors
 from armloop.signals import Conditioning, condition
 from armloop.validation.splits import Split, by_blocks, by_file, judging_rows
@@ -36,19 +38,27 @@ class LeftOut:
 
 
 @dataclass(frozen=True, eq=False)
+class Fit:
+    """A model of the rest of the data, and what its reconstruction noted."""
+
+    model: ReconstructedModel
+    notes: list[str]
+
+
+@dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Scores of all logs on data left out, and the reconstructions behind them.
+    """Scores of all logs on data left out, and the models behind them.
 
     Attributes:
         leave_out: ``"file"`` or ``"blocks"``; ``block_seconds`` is None for files.
         files: one per log.
-        results: (what was left out, reconstruction) of every split.
+        results: (what was left out, the fit to the rest) of every split.
     """
 
     leave_out: str
     block_seconds: float | None
     files: list[LeftOut]
-    results: list[tuple[str, Reconstruction]] = field(repr=False)
+    results: list[tuple[str, Fit]] = field(repr=False)
 
     @property
     def per_joint(self) -> list[float | None]:
@@ -85,6 +95,7 @@ def crossvalidate(
     conditioning: Conditioning | None = None,
     options: Options | None = None,
     progress: Progress = silent,
+    kept: Kept | None = None,
 ) -> CrossValidation:
     """Reconstruct several times, each time without some of the data, and score those.
 
@@ -92,6 +103,8 @@ def crossvalidate(
         leave_out: one of :data:`LEAVE_OUT`; files by default where there are at least two.
         block_seconds: length of the alternating blocks.
         method, library, conditioning, options: as of :func:`armloop.reconstruction.reconstruct`.
+        kept: where finished fits are kept, and taken from: the same data and settings, and what was left out, give
+            the same fit.
 
     Raises:
         InputError: too little data to leave any out, or to reconstruct from the rest.
@@ -103,19 +116,30 @@ def crossvalidate(
     splits = by_file(logs) if leave_out == "file" else by_blocks(logs, block_seconds)
     options = replace(options or Options(), standard_errors=False, parts=False)
     errors: list[list[_Judged]] = [[] for _ in logs]
+    kept = kept or Kept(None, None)
+    settings = [leave_out, block_seconds, method, library, repr(conditioning), repr(options)]
+    signals = [(log.name, log.time, log.q, log.v, log.tau, log.vdot) for log in logs]
+    data = [arm.to_dict(), [[name, digest(*(x for x in xs if x is not None))] for name, *xs in signals]]
     results = []
     for number, split in enumerate(splits, 1):
         progress(f"{number} of {len(splits)}: {split.name} left out")
-        result = reconstruct(
-            split.training,
-            arm,
-            method=method,
-            library=library,
-            conditioning=conditioning,
-            options=options,
-        )
-        results.append((split.name, result))
-        for k, judged in _judge(split, logs, result):
+
+        def fitted(split: Split = split) -> dict[str, Any]:
+            found = reconstruct(
+                split.training,
+                arm,
+                method=method,
+                library=library,
+                conditioning=conditioning,
+                options=options,
+            )
+            return {"model": found.model.to_dict(), "notes": list(found.notes)}
+
+        # Judged is what was kept, just made or not, so that both give the same figures.
+        found = kept.once([number, split.name, settings, data], fitted)
+        fit = Fit(model_of(found["model"], f"the model without {split.name}"), found["notes"])
+        results.append((split.name, fit))
+        for k, judged in _judge(split, logs, fit.model):
             errors[k].append(judged)
     files = []
     for log, parts in zip(logs, errors, strict=True):
@@ -129,12 +153,12 @@ def crossvalidate(
 _Judged = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
 
 
-def _judge(split: Split, logs: Sequence[MotionLog], result: Reconstruction) -> list[tuple[int, _Judged]]:
+def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:
     found = []
     for k, blocks in split.left_out.items():
-        samples = condition([logs[k]], result.model.conditioning)
+        samples = condition([logs[k]], model.conditioning)
         rows = judging_rows(_time(logs[k], samples), samples, blocks)
-        found.append((k, (residual(result.model, samples)[rows], samples.tau[rows], samples.moving[rows])))
+        found.append((k, (residual(model, samples)[rows], samples.tau[rows], samples.moving[rows])))
     return found
 
 

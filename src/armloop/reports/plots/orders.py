@@ -47,19 +47,21 @@ def orders_figure(reports: Sequence[StepReport], baseline: Sequence[StepReport] 
             f"chosen: {percent(errors[chosen])}",
             (chosen, errors[chosen]),
             textcoords="offset points",
-            xytext=(0, -20),
-            ha="center",
+            # above the ring, where no tick's label stands, and towards the panel's middle
+            xytext=(0, 14),
+            ha="left" if 2 * chosen < len(errors) - 1 else "right",
             color=INK,
             fontsize=9.5,
         )
         axes.set_yscale("log")
-        axes.set_xticks(range(len(labels)), labels)
+        tilted = len(labels) > 5
+        axes.set_xticks(range(len(labels)), labels, rotation=90 if tilted else 0)
         polish(axes, "orders (N1, N2)", "held-out error / RMS torque" if axes is row[0] else "", name)
         axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.3g} %"))
         axes.yaxis.set_minor_formatter(_minor(errors))
         axes.tick_params(which="minor", colors=MUTED, labelsize=8, length=0)
         axes.margins(x=0.22)
-        axes.set_ylim(0.75 * min(errors), 1.25 * max(errors))
+        axes.set_ylim(0.75 * min(errors), max(1.25 * max(errors), 2.5 * errors[chosen]))
     return made
 
 

@@ -1,0 +1,179 @@
+"""Model files with one thing wrong: one line that names file and field, status 2; and what old files become."""
+
+import json
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from faults.conftest import one_line
+
+from armloop.cli import main
+from armloop.model import load_model
+
+
+def at(*keys: str | int) -> Callable[[Any], Callable[[Any], None]]:
+    """A field of the file; given a value, the change that puts it there; ``...`` takes the field away."""
+
+    def to(value: Any) -> Callable[[Any], None]:
+        def change(data: Any) -> None:
+            for key in keys[:-1]:
+                data = data[key]
+            if value is ...:
+                del data[keys[-1]]
+            else:
+                data[keys[-1]] = value
+
+        return change
+
+    return to
+
+
+PAYLOAD, OFFSET = ("effects", 0, "parameters"), ("effects", 1, "parameters", "offset")
+# field, values that cannot stand there, what the line says of each
+ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
+    (("schema",), ["armloop/model/3", "armloop/loop/1", 1, None, [], ...], "schema is"),
+    (("arm",), [None, [], 3, "three_axis"], r"arm is .*a mapping of fields"),
+    (("arm", "name"), [None, 3, "x" * 1000], r"arm\.name"),
+    (("arm", "joints"), [None, [], {}, "3", ...], r"joints"),
+    (("arm", "joints", 0, "kind"), ["ball", None, 1, ""], r"arm\.joints\[1\]\.kind is .*there are|text"),
+    (("arm", "joints", 0, "lower"), ["low", None, 1e300, 5.0, []], r"joints\[1\]\.lower|lower below upper"),
+    (("arm", "joints", 1, "upper"), ["high", None, -1e300, -9.0], r"joints\[2\]\.upper|lower below upper"),
+    (("arm", "joints", 2, "velocity"), [-1.0, "fast", None, 1e300], r"joints\[3\]\.velocity"),
+    (("arm", "joints", 2, "effort"), [-1.0, "strong", None], r"joints\[3\]\.effort"),
+    (("arm", "X_PF"), [None, [], [1.0, 2.0], [[[0.0]]]], r"X_PF"),
+    (("arm", "axis", 0), [[0.0, 0.0, 0.0], [0.0, 0.0], [0, 0, 2], "z", None], r"axis\[1\]"),
+    (("arm", "mass", 0), [-1.0, "1kg", None, 1e300], r"mass\[1\]"),
+    (("arm", "mass"), [[1.0], [], None, [1.0] * 40], "mass"),
+    (("arm", "com", 0, 0), ["x", None, 1e300, []], r"com\[1\]\[1\]"),
+    (("arm", "inertia", 0, 0), [[1.0], "x", None], r"inertia\[1\]\[1\]"),
+    (("arm", "gravity"), [[0.0], 9.81, None, [0, 0, "down"]], "gravity"),
+    (("arm", "X_tool"), [[[1.0]], None, "I"], "X_tool"),
+    (("components",), [None, {}, "x"], r"components is"),
+    (("components", 0, "kind"), ["magic", None, ..., 3], "kind|unknown"),
+    (("components", 0, "parameters"), [None, [], [1.0] * 7, ["a"] * 30, [1e300] * 30, ...], "parameters"),
+    (("components", 0, "base_parameters"), [None, [], {"m1": "x"}, {"m1": None}, ...], "base_parameters"),
+    (("friction",), [None, {}, [[], []], [[]] * 40, "none", ...], "friction"),
+    (("friction", 0, 0, "kind"), ["magic", None, 3, ...], "magic|kind"),
+    (("friction", 0, 0, "coefficient"), ["big", None, 1e300, [], ...], "coefficient"),
+    (("friction", 0, 1, "parameter"), [-1.0, "x", None, 1e300], "parameter"),
+    (("effects",), [None, {}, "x", ...], "effects"),
+    (("effects", 0, "effect"), ["magic", None, 3, ...], "magic|effect"),
+    (("effects", 0, "joint"), [2, 99, "1", 1.5], r"joint"),
+    (("effects", 1, "joint"), [None, 0, -1, 4, 10**30, "2", ...], "joint"),
+    ((*PAYLOAD, "mass"), [None, 0.4, [], ...], "mass"),
+    ((*PAYLOAD, "mass", "value"), [-0.4, 0.0, "x", None, 1e300, [], ...], "mass|payload"),
+    ((*PAYLOAD, "mass", "std_error"), [-0.1, "x", {}, 1e300, ...], "std_error"),
+    ((*PAYLOAD, "mass", "unit"), [None, 3, ...], "unit"),
+    ((*PAYLOAD, "com", "value"), [[0.0, "x", 0.0], [99.0, 0.0, 0.0], None, "x"], "com|payload"),
+    ((*PAYLOAD, "com", "std_error"), [[0.1, 0.1], "x", [-1.0] * 3], "std_error|com"),
+    ((*OFFSET, "value"), ["x", None, 1e300, ...], "offset|value"),
+    (("conditioning",), [None, [], "x", ...], "conditioning"),
+    (("conditioning", "cutoff_hz"), [-1.0, 1e-9, 1e300, "ten", None, ...], "cutoff_hz"),
+    (("conditioning", "oversampling"), [0, -1, 1e300, "x"], "oversampling"),
+    (("conditioning", "dead_zone"), [-1, "x", 1e300], "dead_zone"),
+    (("conditioning", "magic"), [1.0], "field 'magic' is unknown; there are: cutoff_hz"),
+    (("recorded",), [None, [], ...], "recorded"),
+    (("recorded", "unit"), ["lbf", None, 3, ...], "unit"),
+    (("recorded", "drive_gains"), [[1.0, 2.0], [0.0] * 3, [-1.0] * 3, ["a"] * 3, 3], "drive_gains"),
+    (("baseline",), [None, [], "x", ...], "baseline"),
+    (("baseline", "rmse"), [[1.0], [-1.0] * 3, ["a"] * 3, 3, [1e300] * 3], "rmse"),
+    (("history",), [None, [], "x", ...], "history"),
+    (("history", "logs"), [3, "run", [3], {}], "logs"),
+    (
+        ("history", "range"),
+        [[[1.0]], [1.0] * 4, "wide", [["a"] * 3] * 4, [[-1.0] * 3] * 4, [[1.0] * 2] * 4],
+        "range",
+    ),
+    (("history", "inertial"), [[1.0], "x", [1e300] * 30, 3], "inertial"),
+    (("history", "notes"), [3, [3]], "notes"),
+    (("uncertainty",), [None, [], "x"], "uncertainty"),
+    (
+        ("uncertainty", "friction"),
+        [[{}], [{"v1": {"std_error": -1.0, "degrees_of_freedom": 3}}] * 3, 3],
+        "friction",
+    ),
+    (
+        ("uncertainty", "joints"),
+        [[{}] * 2, [{"m1": {"std_error": "x", "degrees_of_freedom": 3}}] * 3],
+        "joints",
+    ),
+]
+STEP = {"kind": "terms", "step": 1, "joints": [{"sin(q2)": 1.0}, {}, {}]}
+TERMS: dict[str, tuple[dict[str, Any], str]] = {
+    "step 99": ({"step": 99}, r"components\[2\]\.step is 99; it must be .*at most 3"),
+    "step 0": ({"step": 0}, r"step is 0"),
+    "step a word": ({"step": "one"}, r"step is 'one'"),
+    "two joints": ({"joints": [{}, {}]}, "terms of step 1: 2 joints, the arm has 3"),
+    "another arm's term": ({"joints": [{"sin(q7)": 1.0}, {}, {}]}, r"unknown term 'sin\(q7\)'"),
+    "code": ({"joints": [{"__import__('os').system('true')": 1.0}, {}, {}]}, "unknown term"),
+    "a word": ({"joints": [{"sin(q2)": "x"}, {}, {}]}, r"sin\(q2\) is 'x'"),
+    "null": ({"joints": [{"sin(q2)": None}, {}, {}]}, r"sin\(q2\) is None"),
+    "too large": ({"joints": [{"sin(q2)": 1e300}, {}, {}]}, r"sin\(q2\) is 1e\+300"),
+    "a long name": ({"joints": [{"s" * 1000: 1.0}, {}, {}]}, "joints"),
+}
+SENSORS: dict[str, tuple[str, int | None, dict[str, float]]] = {
+    "a gain of zero": ("torque_gain", 1, {"gain": 0.0}),
+    "a delay of 1e9 s": ("time_delay", None, {"seconds": 1e9}),
+    "a rotor of negative inertia": ("rotor_inertia", 1, {"inertia": -1.0}),
+}
+
+
+def cases() -> Iterator[tuple[str, Callable[[Any], None], str]]:
+    for keys, values, said in ROWS:
+        for value in values:
+            name = "gone" if value is ... else repr(value)[:30]
+            yield f"{'.'.join(map(str, keys))} {name}", at(*keys)(value), said
+    for name, (change, said) in TERMS.items():
+        yield f"terms: {name}", lambda data, c=change: data["components"].append({**STEP, **c}), said
+    for name, (effect, joint, values) in SENSORS.items():
+        parameters = {key: {"value": x, "std_error": 0.1, "unit": "1"} for key, x in values.items()}
+        added = {"effect": effect, "joint": joint, "parameters": parameters}
+        yield name, lambda data, a=added: data["effects"].append(a), f"{effect}.*cannot be"
+
+
+CASES = {name: (change, said) for name, change, said in cases()}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_model_with_one_thing_wrong(
+    name: str, right: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, said = CASES[name]
+    data = json.loads((right / "model.json").read_text())
+    change(data)
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(data))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert main(["evaluate", str(path), str(right / "run.csv")]) == 2
+    answer = capsys.readouterr()
+    assert answer.out == ""
+    one_line(answer.err, said)
+    assert "bad.json" in answer.err
+
+
+def test_models_of_the_first_schema_are_read(right: Path, tmp_path: Path) -> None:
+    data = json.loads((right / "model.json").read_text())
+    del data["uncertainty"]
+    data["schema"] = "armloop/model/1"
+    (tmp_path / "old.json").write_text(json.dumps(data))
+    assert load_model(tmp_path / "old.json").to_dict() == load_model(right / "model.json").to_dict()
+
+
+def test_what_others_add_is_let_stand(right: Path, tmp_path: Path) -> None:
+    data = json.loads((right / "model.json").read_text())
+    data["history"]["by_others"] = {"any": ["thing"]}
+    data["by_others"] = 1
+    (tmp_path / "more.json").write_text(json.dumps(data))
+    assert load_model(tmp_path / "more.json").history["by_others"] == {"any": ["thing"]}
+
+
+def test_an_unknown_standard_error_survives(right: Path, tmp_path: Path) -> None:
+    data = json.loads((right / "model.json").read_text())
+    data["effects"][1]["parameters"]["offset"]["std_error"] = None
+    (tmp_path / "a.json").write_text(json.dumps(data))
+    load_model(tmp_path / "a.json").save(tmp_path / "b.json")
+    again = json.loads((tmp_path / "b.json").read_text())
+    assert again["effects"][1]["parameters"]["offset"]["std_error"] is None
