@@ -40,7 +40,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
         )
     elif diagnosis.contacts:
         sentences.append(
-            f"Found: {len(diagnosis.contacts)} events, listed below; their samples are kept out of "
+            f"Found: {len(diagnosis.contacts)} {_events(diagnosis)}, listed below; their samples are kept out of "
             "everything else."
         )
     if diagnosis.contacts and not diagnosis.judged:
@@ -60,6 +60,13 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             f"{unit(where.words())}."
         )
     return sentences or [_nothing(diagnosis)]
+
+
+def _events(diagnosis: Diagnosis) -> str:
+    """What all events of a run were, in words."""
+    forces = all(contact.added.effect.joint is None for contact in diagnosis.contacts)
+    links = any("link" in contact.added.parameters for contact in diagnosis.contacts)
+    return "events" if not forces else "pushes on the arm" if links else "pushes at the tool"
 
 
 def _nothing(diagnosis: Diagnosis) -> str:
