@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, three_axis
 
 from armloop.arm import Arm, load_arm
 from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
@@ -16,8 +17,11 @@ from armloop.library.double_feature_set import DoubleFeatureSet
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.library.lagrangian import candidates
 from armloop.library.rigid_body import BaseParameters
+from armloop.log import MotionLog
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.motion import Motion
+from armloop.scoring import score
+from armloop.signals import condition
 
 Array = NDArray[np.float64]
 STRIBECK = (
@@ -25,6 +29,32 @@ STRIBECK = (
     FrictionTerm("stribeck", -0.17, 0.1),
     FrictionTerm("viscous", 2.65),
 )
+
+
+#: Every listed effect with parameters that matter.
+EFFECT_PARAMETERS = {
+    "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03]},
+    "viscous_friction": {"coefficient": 0.3},
+    "coulomb_friction": {"level": 0.2},
+    "stribeck_friction": {"static_excess": 0.2, "velocity": 0.7},
+    "friction_asymmetry": {"level": -0.1},
+    "load_dependent_friction": {"coefficient": 0.1},
+    "quadratic_drag": {"coefficient": 0.2},
+    "friction_drift": {"level": 0.3, "time_constant": 5.0},
+    "viscous_asymmetry": {"coefficient": -0.25},
+    "joint_spring": {"stiffness": 1.5, "rest": 0.3},
+    "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
+    "presliding_hysteresis": {"level": 0.2, "width": 0.01},
+    "rotor_inertia": {"inertia": 0.05},
+    "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
+    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.0},
+    "external_contact": {"start": 0.0, "end": 40.0, "force": [3.0, -2.0, 5.0]},
+    "external_torque": {"start": 0.0, "end": 40.0, "torque": 2.0},
+    "torque_gain": {"gain": 1.1},
+    "torque_offset": {"offset": -0.3},
+    "encoder_offset": {"offset": 0.05},
+    "time_delay": {"seconds": 0.7},
+}
 
 
 def random_motion(n: int, samples: int, seed: int = 0) -> Motion:
@@ -87,6 +117,23 @@ def model_of(
             for name, joint, parameters in effects
         ),
     )
+
+
+def as_it_was(log: MotionLog | None = None) -> ReconstructedModel:
+    """The arm of :mod:`synthetic` exactly, with what it leaves on a log of its own, if one is given, as its baseline."""
+    joints = tuple(
+        (
+            FrictionTerm("sign", float(fs)),
+            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
+            FrictionTerm("viscous", float(fv)),
+        )
+        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
+    )
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
+    if log is None:
+        return bare
+    return replace(bare, baseline=score(bare, condition([log], bare.conditioning)).moving)
 
 
 def six_joints() -> Arm:

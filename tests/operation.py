@@ -4,30 +4,23 @@ Torques come from `synthetic`, whose laws are written out there. Added are a fri
 log, an error of the model that depends on the posture, and a coloured one.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from exact_parts import as_it_was
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from synthetic import (
-    COULOMB,
-    STATIC,
-    STRIBECK_VELOCITY,
-    VISCOUS,
     fourier_motion,
     friction,
     measured,
     three_axis,
 )
 
-from armloop.components import RigidBody
 from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
-from armloop.scoring import score
-from armloop.signals import condition
 
 Array = NDArray[np.float64]
 
@@ -58,17 +51,7 @@ def operate(seed: int, k: int, change: Change | None = None, seconds: float = 20
 
 def healthy_model() -> ReconstructedModel:
     """The arm as it was, with what it leaves on a log of its own as its baseline."""
-    joints = tuple(
-        (
-            FrictionTerm("sign", float(fs)),
-            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
-            FrictionTerm("viscous", float(fv)),
-        )
-        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
-    )
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
-    return replace(bare, baseline=score(bare, condition([operate(99, 0)], bare.conditioning)).moving)
+    return as_it_was(operate(99, 0))
 
 
 def contents(store: Path) -> dict[str, bytes]:

@@ -16,8 +16,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
 # A room may import itself and every room of an earlier layer.
 LAYERS = (
     {"__init__"},
-    {"errors"},
-    {"functions", "motion", "outputs", "progress", "resources", "voices", "workers"},
+    {"errors", "quiet"},
+    {"functions", "motion", "outputs", "progress", "registry", "resources", "voices", "workers"},
     {"files", "reading"},
     {"keeping", "schemas"},
     {"blocks", "plausibility", "regression", "tables", "urdf"},

@@ -3,7 +3,7 @@
 import numpy as np
 
 from armloop.blocks import block_numbers, block_sums, folds
-from armloop.motion import Motion
+from armloop.motion import Motion, Samples
 
 
 def two_runs(period: float = 0.1) -> Motion:
@@ -35,10 +35,21 @@ def test_a_run_of_one_sample_is_a_block():
     np.testing.assert_array_equal(block_numbers(motion, 1.0), [0, 1, 2])
 
 
+def test_samples_of_a_trimmed_run_lie_in_the_blocks_of_the_whole():
+    whole = two_runs(0.01)
+    spans = np.array([whole.time[[run.start, run.stop - 1]] for run in whole.runs()])
+    expected = block_numbers(whole, 1.0)
+    for trim in (0, 5, 20):
+        rows = np.concatenate([np.arange(run.start + trim, run.stop - trim, 3) for run in whole.runs()])
+        starts = np.searchsorted(rows, whole.starts)
+        part = Motion(whole.time[rows], whole.q[rows], whole.v[rows], whole.vdot[rows], starts)
+        np.testing.assert_array_equal(block_numbers(part, 1.0, spans), expected[rows])
+
+
 def test_folds_take_turns_and_every_fold_gets_data():
     q = np.zeros((1000, 1))
     motion = Motion(np.arange(1000) * 0.01, q, q, q, np.array([0]))
-    fold = folds(motion, 5, 1.0)
+    fold = folds(Samples(motion, q, np.ones_like(q, dtype=bool), 0.01), 5, 1.0)
     assert np.bincount(fold).tolist() == [200] * 5 or np.ptp(np.bincount(fold)) <= 4
     np.testing.assert_array_equal(fold, block_numbers(motion, 1.0) % 5)
 

@@ -80,6 +80,8 @@ class Samples:
     moving : (N, n) true where joint j slides, that is |v_j| is above the dead zone of its velocity noise
     period : the sample period in seconds
     cutoff_hz : corner of the low-pass that tau and the motion have passed; 0 where there was none
+    spans : (R, 2) first and last instant of the recorded run that each run of the motion was cut from; None where
+        the runs are as they were recorded
 
     Raises `ValueError` when the shapes do not agree.
     """
@@ -89,6 +91,7 @@ class Samples:
     moving: NDArray[np.bool_]
     period: float
     cutoff_hz: float = 0.0
+    spans: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -125,12 +125,13 @@ def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None 
         return _as_they_are(logs)
     if noise is None:
         noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
-    parts = []
+    parts, spans = [], []
     for log in logs:
         for run in log.runs():
             part = _condition_run(log.select(run), how, how.dead_zone * noise)
             if part is not None:
                 parts.append(part)
+                spans.append(log.time[[run.start, run.stop - 1]])
     if not parts:
         longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
         raise ShortRunError(
@@ -140,7 +141,20 @@ def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None 
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
-    return Samples(Motion(time, q, v, vdot, starts), tau, moving.astype(bool), period, how.cutoff_hz)
+    motion = Motion(time, q, v, vdot, starts)
+    return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
+
+
+def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:
+    """Instants, s, that :func:`condition` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
+    kept, spans = [], []
+    for run in log.runs():
+        time = log.time[run]
+        grid, keep = _grid(time, how)
+        if grid is not None:
+            kept.append(time[0] + grid[keep])
+            spans.append(time[[0, -1]])
+    return kept, np.array(spans).reshape(-1, 2)
 
 
 def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
@@ -185,15 +199,12 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import binary_dilation
 
-    if log.samples < FEWEST_SAMPLES:
+    grid, keep = _grid(log.time, how)
+    if grid is None:
         return None
     period = uniform_period(log.time)
-    trim = at_least(0.5 / (how.cutoff_hz * period))
-    if log.samples < 6 * trim:
-        return None
     # From the run's start: what stamps far from zero lose to rounding must not grow along the run.
     elapsed = log.time - log.time[0]
-    grid = period * np.arange(log.samples)
     resolution = 2 * float(np.spacing(np.abs(log.time[[0, -1]]).max()))
     even = bool(np.abs(grid - elapsed).max() < 1e-3 * period + resolution)
 
@@ -206,10 +217,20 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     still = np.abs(v) <= dead_zone
     reach = at_least(how.smear / (how.cutoff_hz * period))
     smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
+    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+
+
+def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:
+    """A run's uniform grid (N,), s from its start, and which of it is kept; None for a run too short for the filter."""
+    if len(time) < FEWEST_SAMPLES:
+        return None, slice(0)
+    period = uniform_period(time)
+    trim = at_least(0.5 / (how.cutoff_hz * period))
+    if len(time) < 6 * trim:
+        return None, slice(0)
     # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.
     stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period) + 1e-6))
-    keep = slice(trim, len(grid) - trim, stride)
-    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+    return period * np.arange(len(time)), slice(trim, len(time) - trim, stride)
 
 
 def _as_they_are(logs: Sequence[MotionLog]) -> Samples:

@@ -22,6 +22,7 @@ from threading import Thread
 from typing import Any, Protocol, TypeVar
 
 from armloop.errors import InputError
+from armloop.quiet import quiet
 
 Chunk = TypeVar("Chunk")
 Answer = TypeVar("Answer")
@@ -205,22 +206,10 @@ def _somebody_listens(address: str) -> None:
 
 def _connect(client: Any, address: str, answer: Future[Any]) -> None:
     try:
-        with _quiet("distributed"):
+        with quiet("distributed", logging.CRITICAL):
             answer.set_result(client(address, timeout=PATIENCE, set_as_default=False))
     except BaseException as error:
         answer.set_exception(error)
-
-
-@contextmanager
-def _quiet(name: str) -> Iterator[None]:
-    """Keep a library from logging below errors: what goes wrong is told by our own line."""
-    logger = logging.getLogger(name)
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
 
 
 def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:

@@ -5,11 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exact_parts import as_it_was
 from synthetic import (
-    COULOMB,
-    STATIC,
-    STRIBECK_VELOCITY,
-    VISCOUS,
     fourier_motion,
     friction,
     measured,
@@ -17,12 +14,10 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.components import RigidBody
 from armloop.diagnosis import close, diagnose
 from armloop.effects import Estimate, effect
 from armloop.errors import InputError
-from armloop.kinematics import nominal_parameters, regressor, tool_jacobian
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.kinematics import regressor, tool_jacobian
 from armloop.log import MotionLog
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.motion import Motion
@@ -79,17 +74,7 @@ def run(*laws: Law, seed: int, seconds: float = 40.0) -> MotionLog:
 @pytest.fixture(scope="module")
 def model() -> ReconstructedModel:
     """The arm as it was, with what it leaves on a clean run as its baseline."""
-    joints = tuple(
-        (
-            FrictionTerm("sign", float(fs)),
-            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
-            FrictionTerm("viscous", float(fv)),
-        )
-        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
-    )
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
-    return replace(bare, baseline=score(bare, condition([run(seed=90)], bare.conditioning)).moving)
+    return as_it_was(run(seed=90))
 
 
 PAIRS: dict[str, tuple[tuple[Law, ...], set[str]]] = {

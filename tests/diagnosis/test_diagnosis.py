@@ -6,11 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from exact_parts import as_it_was
 from synthetic import (
-    COULOMB,
-    STATIC,
-    STRIBECK_VELOCITY,
-    VISCOUS,
     fourier_motion,
     friction,
     measured,
@@ -18,16 +15,12 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.components import RigidBody
 from armloop.diagnosis import diagnose
 from armloop.kinematics import nominal_parameters, regressor, tool_jacobian
-from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion
 from armloop.reconstruction import reconstruct
-from armloop.scoring import score
-from armloop.signals import condition
 
 Law = Callable[[Motion], np.ndarray]
 
@@ -153,18 +146,7 @@ def run(law: Law | None, seed: int, seconds: float = 60.0, rate: float = 125.0) 
 @pytest.fixture(scope="module")
 def model() -> ReconstructedModel:
     """The arm as it is, with what it leaves on a clean run as its baseline."""
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    joints = tuple(
-        (
-            FrictionTerm("sign", float(fs)),
-            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
-            FrictionTerm("viscous", float(fv)),
-        )
-        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
-    )
-    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
-    baseline = score(bare, condition([run(None, seed=90)], bare.conditioning)).moving
-    return ReconstructedModel(three_axis(), (body,), FrictionLaw(joints), baseline=baseline)
+    return as_it_was(run(None, seed=90))
 
 
 def check_parameters(found: dict, expected: dict[str, object]) -> None:

@@ -85,6 +85,22 @@ def test_a_shape_for_judging_a_fold_does_not_see_what_other_effects_are_in_it():
     assert chosen == [11.0, 11.0]
 
 
+def test_a_fold_is_judged_with_what_the_other_folds_showed_alone():
+    model = exact("three_axis")
+    motion = fourier_motion(40.0, 100.0, 3)
+    samples = condition([measured(motion, np.zeros_like(motion.q), 3)], model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    residual = np.zeros_like(samples.tau)
+    residual[evidence.fold == 0, 1] = 0.2  # there in one fold, absent in the other
+    offset = effect("torque_offset", 2)
+    found = fit(evidence, residual, [offset], [Shape.fixed(offset.shapes(evidence.context)[0])])
+    stacked, size = found.stacked, 0.2 / evidence.scale[1]
+    for fold, left in ((0, size), (1, -size)):
+        rows = (stacked.fold == fold) & (stacked.joint == 1)
+        assert rows.sum() > 100
+        np.testing.assert_allclose(found.held_out[rows], left, rtol=1e-3)
+
+
 @pytest.mark.parametrize("mass", [0.1, 0.3])
 def test_a_load_on_an_upright_slide_is_no_torque_offset(mass):
     # On the SCARA arm a load is almost only a constant force on the slide; its inertia tells it apart.

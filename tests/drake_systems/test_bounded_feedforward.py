@@ -151,7 +151,7 @@ def test_what_is_wrong_with_limits_is_told(tmp_path):
             load_tracking(path)
 
 
-@pytest.mark.parametrize("kind", ["cubic", "quadratic", "viscous_forward"])
+@pytest.mark.parametrize("kind", ["cubic", "quadratic", "viscous_forward", "root"])
 def test_friction_that_is_not_linear_in_the_speed_is_in_the_torques(kind):
     arm = load_arm("three_axis")
     friction = (FrictionTerm("sign", 0.3), FrictionTerm("viscous", 0.5), FrictionTerm(kind, 1.5))

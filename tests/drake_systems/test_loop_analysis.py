@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from exact_parts import model_of
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from armloop.arm import load_arm
 from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.loop_analysis import loop_margins, posture_model
+from armloop.drake_systems.loop_analysis import loop_margins, model_posture, posture_model
 from armloop.drake_systems.pid import PidGains
+from armloop.library.friction import FrictionTerm
 
 
 @pytest.fixture
@@ -58,6 +60,24 @@ def test_posture_model_of_the_three_axis_arm():
     assert_allclose(M, M.T)
     _, _, G = posture_model(arm, friction, [0, -np.pi / 2, 0])
     assert_allclose(G[1, 1], 7.377120, rtol=1e-5)
+
+
+def test_friction_of_an_identified_model_is_linearised_by_its_derivative():
+    arm = load_arm("three_axis")
+    law = [
+        ("sign", 0.6, 0.0),
+        ("viscous", 0.5, 0.0),
+        ("quadratic", 0.3, 0.0),
+        ("root", 0.2, 0.0),
+        ("viscous_forward", 0.4, 0.0),
+    ]
+    model = model_of(arm, friction=tuple(FrictionTerm(kind, c, p) for kind, c, p in law))
+    M, F, G = model_posture(model, [0.1, 0.3, -0.5])
+    # At 1 rad/s: c, 2 c v, c / (2 sqrt(v)), and c one way alone.
+    assert_allclose(F, (0.5 + 0.6 + 0.1 + 0.2) * np.eye(3), atol=1e-6)
+    truth = posture_model(arm, [JointFriction()] * 3, [0.1, 0.3, -0.5])
+    assert_allclose(M, truth[0], atol=1e-9)
+    assert_allclose(G, truth[2], atol=1e-4)
 
 
 def test_the_papers_gains_are_comfortable():

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exact_parts import energies, model_of, random_motion, rigid_body, scara_terms
+from exact_parts import EFFECT_PARAMETERS, energies, model_of, random_motion, rigid_body, scara_terms
 from numpy.testing import assert_allclose
 from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 from pydrake.multibody.plant import MultibodyPlant
@@ -38,24 +38,13 @@ from armloop.functions import MATH
 from armloop.library.friction import Sliding, torque_along
 
 ARM, SCARA = load_arm("three_axis"), load_arm("scara")
+#: A torque from outside on one joint is found in logs; no plant has it.
 PARAMETERS = {
-    "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03], "own_inertia": 0.001},
-    "viscous_friction": {"coefficient": 0.3},
-    "coulomb_friction": {"level": 0.2},
-    "stribeck_friction": {"static_excess": 0.2, "velocity": 0.1},
-    "friction_asymmetry": {"level": 0.1},
-    "load_dependent_friction": {"coefficient": 0.1},
-    "quadratic_drag": {"coefficient": 0.2},
-    "friction_drift": {"level": 0.3, "time_constant": 50.0},
-    "viscous_asymmetry": {"coefficient": -0.25},
-    "joint_spring": {"stiffness": 1.5, "rest": 0.3},
-    "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
-    "presliding_hysteresis": {"level": 0.2, "width": 0.01},
-    "rotor_inertia": {"inertia": 0.05},
-    "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
-    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.0, "ratio": -1.0},
-    "external_contact": {"start": 0.0, "end": 2.0, "force": [3.0, -2.0, 5.0]},
+    name: values
+    for name, values in EFFECT_PARAMETERS.items()
+    if not EFFECTS[name].sensor and name != "external_torque"
 }
+PARAMETERS["transmission_coupling"] = PARAMETERS["transmission_coupling"] | {"coulomb": 0.0}
 WHOLE = ("payload", "gravity_tilt", "external_contact")
 LOADED = tuple(
     (name, None if name in ("payload", "gravity_tilt") else 2, PARAMETERS[name])
@@ -232,7 +221,7 @@ def test_a_contact_pushes_like_the_plants_own_while_it_lasts():
 
 
 def test_a_shared_motor_says_what_its_columns_say():
-    p = PARAMETERS["transmission_coupling"] | {"coulomb": 0.3}
+    p = EFFECT_PARAMETERS["transmission_coupling"] | {"coulomb": 0.3}
     system = EffectTorque(ARM, "transmission_coupling", 2, p, other_joint=3)
     motion = random_motion(3, 4, seed=9)
     # fast enough for the smoothed sign of the motor's speed to be one

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from armloop.drake_systems.scenario_data import CONTROLLERS
+from armloop.drake_systems.controllers import LISTED
 from armloop.drake_systems.scenarios import load_plan, load_plant, load_tracking, plant_names
 from armloop.errors import ScenarioError
 from armloop.excitation import fourier_reference, write_reference
@@ -92,9 +92,7 @@ def test_a_file_may_hold_several_scenarios(tmp_path):
         load_tracking(f"{_written(path, TWO.replace('  score: []', '  Kp: []'))}:slow")
     with pytest.raises(ScenarioError, match=r"holds one scenario without a name; leave out :slow"):
         load_tracking(f"{_written(path, 'plant: three_axis')}:slow")
-    assert set(load_tracking("three_axis_tracking:all_controllers").controllers) == {*CONTROLLERS} - {
-        "bounded"
-    }
+    assert set(load_tracking("three_axis_tracking:all_controllers").controllers) == {*LISTED} - {"bounded"}
 
 
 def _written(path, text):

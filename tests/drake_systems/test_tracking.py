@@ -10,9 +10,9 @@ from numpy.testing import assert_allclose
 from pydrake.systems.framework import DiagramBuilder
 
 from armloop.components import SparseTerms
+from armloop.drake_systems.controllers import LISTED
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.exact import exact_model
-from armloop.drake_systems.scenario_data import CONTROLLERS
 from armloop.drake_systems.scenarios import load_tracking
 from armloop.drake_systems.tracking import add_controlled_arm, controllers_for, run_tracking, track
 from armloop.excitation import FourierReference
@@ -99,14 +99,14 @@ def test_all_controllers_of_a_scenario(short):
     """Exact inverse dynamics come first, computed torque with the same model is close, each with its metrics."""
     brief = dataclasses.replace(
         short,
-        controllers=CONTROLLERS,
+        controllers=LISTED,
         reference=dataclasses.replace(short.reference, duration=0.6),
         score=(0.1, 0.6),
     )
     assert controllers_for(brief, {}) == ["pid", "exact"]
     model = exact_model(brief.plant.arm, brief.plant.config.friction)
     results = run_tracking(brief, {"model": model})
-    assert list(results) == list(CONTROLLERS)
+    assert list(results) == list(LISTED)
     assert np.all(results["exact"].eta < 0.01) and np.all(results["computed_torque"].eta < 0.1)
     assert_allclose(results["exact"].eta, results["pid_step3"].eta)
     # without the inertia a little worse than with it, far better than without friction's shape

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exact_parts import model_of, random_motion
+from exact_parts import EFFECT_PARAMETERS, model_of, random_motion
 from numpy.testing import assert_allclose
 from pydrake.systems.framework import Context as DrakeContext
 from synthetic import three_axis
@@ -31,29 +31,6 @@ from armloop.model import AddedEffect, ReconstructedModel
 from armloop.motion import Motion
 
 ARM = three_axis()
-PARAMETERS = {
-    "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03]},
-    "viscous_friction": {"coefficient": 0.3},
-    "coulomb_friction": {"level": 0.2},
-    "stribeck_friction": {"static_excess": 0.2, "velocity": 0.7},
-    "friction_asymmetry": {"level": -0.1},
-    "load_dependent_friction": {"coefficient": 0.1},
-    "quadratic_drag": {"coefficient": 0.2},
-    "friction_drift": {"level": 0.3, "time_constant": 5.0},
-    "viscous_asymmetry": {"coefficient": -0.25},
-    "joint_spring": {"stiffness": 1.5, "rest": 0.3},
-    "torque_ripple": {"amplitude": 0.2, "order": 7.0, "phase": 0.4},
-    "presliding_hysteresis": {"level": 0.2, "width": 0.01},
-    "rotor_inertia": {"inertia": 0.05},
-    "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
-    "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.0},
-    "external_contact": {"start": 0.0, "end": 40.0, "force": [3.0, -2.0, 5.0]},
-    "external_torque": {"start": 0.0, "end": 40.0, "torque": 2.0},
-    "torque_gain": {"gain": 1.1},
-    "torque_offset": {"offset": -0.3},
-    "encoder_offset": {"offset": 0.05},
-    "time_delay": {"seconds": 0.7},
-}
 SENSORS = [name for name, kind in EFFECTS.items() if kind.sensor]
 EVENTS = [name for name, kind in EFFECTS.items() if not kind.sensor and not kind.searched]
 ACTING = [name for name in EFFECTS if name not in SENSORS]
@@ -75,7 +52,7 @@ def joints(name: str) -> tuple[int | None, int | None]:
 
 def with_effect(name: str) -> ReconstructedModel:
     """The bare model with the effect."""
-    parameters = {key: Estimate(value, 0.0, "") for key, value in PARAMETERS[name].items()}
+    parameters = {key: Estimate(value, 0.0, "") for key, value in EFFECT_PARAMETERS[name].items()}
     return BARE.with_effects([AddedEffect(effect(name, *joints(name)), parameters)])
 
 
@@ -124,7 +101,7 @@ def check(found: np.ndarray, name: str, atol: float = 1e-9) -> None:
 
 
 def test_every_effect_is_here():
-    assert set(PARAMETERS) == set(EFFECTS)
+    assert set(EFFECT_PARAMETERS) == set(EFFECTS)
     assert sorted(EVENTS) == ["external_contact", "external_torque"]
     memory = {name for name in ACTING if EFFECTS[name].memory}
     assert memory == {*EVENTS, *WARMING, *REMEMBERING}
@@ -135,9 +112,9 @@ def test_columns(name):
     """A torque that is linear in its coefficients lies in the space of its columns, at the right shape."""
     kind, motion = effect(name, *joints(name)), slid(MOTION) if name in REMEMBERING else MOTION
     context = with_effect(name).context(motion)
-    tau = kind.torque(context, PARAMETERS[name])
+    tau = kind.torque(context, EFFECT_PARAMETERS[name])
     shape = float(
-        PARAMETERS[name].get(
+        EFFECT_PARAMETERS[name].get(
             {
                 "stribeck_friction": "velocity",
                 "torque_ripple": "order",
@@ -194,7 +171,7 @@ def test_effect_torque(name):
     inertial = BARE.inertial_parameters() if name == "gravity_tilt" else None
     joint, other = joints(name)
     system = EffectTorque(
-        ARM, name, joint, PARAMETERS[name], other_joint=other, inertial=inertial, smoothing=1e-4
+        ARM, name, joint, EFFECT_PARAMETERS[name], other_joint=other, inertial=inertial, smoothing=1e-4
     )
     context, load, found = system.CreateDefaultContext(), BARE.rigid_body(MOTION), []
     for k, (q, v, vdot) in enumerate(rows(MOTION)):
@@ -252,7 +229,7 @@ FRICTION = (JointFriction(0.72, 0.55, 0.1, 2.65),) * 3
 def test_the_simulated_plant(name):
     """One short step of the plant, driven by the torque of its own exact model, accelerates as that says."""
     joint, other = joints(name)
-    undeclared = UndeclaredEffect(name, joint, PARAMETERS[name], other)
+    undeclared = UndeclaredEffect(name, joint, EFFECT_PARAMETERS[name], other)
     h = 1e-6
     arm = replace(ARM, joints=tuple(replace(j, lower=-9.0, upper=9.0, effort=1e6) for j in ARM.joints))
     plant = ArmPlant(arm, FRICTION, effects=(undeclared,), time_step=h)
@@ -274,10 +251,18 @@ def test_the_simulated_plant(name):
 @pytest.mark.parametrize("name", LASTING)
 def test_the_exact_model_has_it(name):
     joint, other = joints(name)
-    undeclared = UndeclaredEffect(name, joint, PARAMETERS[name], other)
+    undeclared = UndeclaredEffect(name, joint, EFFECT_PARAMETERS[name], other)
     exact = exact_model(ARM, FRICTION, (undeclared,))
     bare = exact_model(ARM, FRICTION)
     check(np.array([exact.feedforward(*x) - bare.feedforward(*x) for x in rows(MOTION)]), name)
+
+
+def assert_supplies_nothing(model: ReconstructedModel) -> None:
+    """A controller supplies what it does without the effect."""
+    for x in rows(MOTION):
+        assert_allclose(model.feedforward(*x), BARE.feedforward(*x), atol=1e-12)
+    torques = [Dynamics(m).torque(MOTION.q, MOTION.v, MOTION.vdot) for m in (model, BARE)]
+    assert_allclose(*torques, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", SENSORS)
@@ -285,30 +270,20 @@ def test_a_sensors_fault_is_in_the_record_alone(name):
     model = with_effect(name)
     assert np.abs(reference(name)).max() > 0.01 or name == "time_delay"
     assert_allclose(model.predict(MOTION, sensors=False), BARE.predict(MOTION), atol=1e-12)
-    for x in rows(MOTION):
-        assert_allclose(model.feedforward(*x), BARE.feedforward(*x), atol=1e-12)
-    torques = [Dynamics(m).torque(MOTION.q, MOTION.v, MOTION.vdot) for m in (model, BARE)]
-    assert_allclose(*torques, atol=1e-12)
+    assert_supplies_nothing(model)
     with pytest.raises(ModelError):
-        EffectTorque(ARM, name, joints(name)[0], PARAMETERS[name])
+        EffectTorque(ARM, name, joints(name)[0], EFFECT_PARAMETERS[name])
 
 
 @pytest.mark.parametrize("name", EVENTS)
 def test_an_event_is_not_foreseen(name):
-    model = with_effect(name)
-    for x in rows(MOTION):
-        assert_allclose(model.feedforward(*x), BARE.feedforward(*x), atol=1e-12)
-    torques = [Dynamics(m).torque(MOTION.q, MOTION.v, MOTION.vdot) for m in (model, BARE)]
-    assert_allclose(*torques, atol=1e-12)
+    assert_supplies_nothing(with_effect(name))
 
 
 @pytest.mark.parametrize("name", WARMING)
 def test_a_controller_takes_the_joint_as_warm(name):
     model = with_effect(name)
-    for x in rows(MOTION):
-        assert_allclose(model.feedforward(*x), BARE.feedforward(*x), atol=1e-12)
-    torques = [Dynamics(m).torque(MOTION.q, MOTION.v, MOTION.vdot) for m in (model, BARE)]
-    assert_allclose(*torques, atol=1e-12)
+    assert_supplies_nothing(model)
     # what the run shows fades towards it
     late = replace(MOTION, time=np.concatenate([[0.0], 1000.0 + MOTION.time[1:]]))
     assert_allclose(model.predict(late)[1:], BARE.predict(late)[1:], atol=1e-9)

@@ -14,6 +14,7 @@ from armloop.drake_systems.speed_mode import Instruments, SpeedModeArm
 from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import (
     INERTIA,
+    REGISTRY,
     Effect,
     Element,
     Law,
@@ -21,9 +22,6 @@ from armloop.effects import (
     Parameter,
     effect,
     hypotheses,
-    own,
-    own_effects,
-    own_names,
     register,
 )
 from armloop.errors import InputError, ModelError, ScenarioError
@@ -58,17 +56,11 @@ class Unknown(LinearJointEffect):
 
 
 @pytest.fixture(autouse=True)
-def nothing_left_behind(monkeypatch):
+def nothing_left_behind():
     """Every test begins and ends without a registered effect."""
-    monkeypatch.setattr(own, "_registered", {})
-    forget()
+    REGISTRY.forget()
     yield
-    forget()
-
-
-def forget() -> None:
-    own._installed.cache_clear()
-    own._loaded.cache_clear()
+    REGISTRY.forget()
 
 
 def install(folder: Path, monkeypatch, module: str, entries: dict[str, str], code: str) -> None:
@@ -82,7 +74,7 @@ def install(folder: Path, monkeypatch, module: str, entries: dict[str, str], cod
     (info / "entry_points.txt").write_text(f"[armloop.effects]\n{lines}")
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, module, raising=False)
-    forget()
+    REGISTRY.forget()
 
 
 CODE = """
@@ -97,7 +89,7 @@ class Own(LinearJointEffect):
 
 def test_a_registered_effect_is_a_hypothesis_at_every_joint_and_built_by_name():
     before = len(hypotheses(three_axis()))
-    assert register(Cubic) is Cubic and own_names() == ["cubic_drag"]
+    assert register(Cubic) is Cubic and REGISTRY.own_names() == ["cubic_drag"]
     labels = [h.label() for h in hypotheses(three_axis())]
     assert labels[before:] == [f"cubic_drag at joint {j}" for j in (1, 2, 3)]
     assert isinstance(effect("cubic_drag", 2), Cubic)
@@ -109,9 +101,9 @@ def test_a_registered_effect_is_a_hypothesis_at_every_joint_and_built_by_name():
 def test_an_installed_effect_is_loaded_when_it_is_asked_for(tmp_path, monkeypatch):
     install(tmp_path / "a", monkeypatch, "own_package_a", {"own_drag": "own_package_a:Own"}, CODE)
     effect("viscous_friction", 1)
-    assert own_names() == ["own_drag"] and "own_package_a" not in sys.modules
+    assert REGISTRY.own_names() == ["own_drag"] and "own_package_a" not in sys.modules
     assert effect("own_drag", 3).label() == "own_drag at joint 3"
-    assert set(own_effects()) == {"own_drag"}
+    assert set(REGISTRY.own()) == {"own_drag"}
     with pytest.raises(InputError, match="'own_drag' is taken by effect 'own_drag' of package own_package_a"):
         register(type("Drag", (Cubic,), {"name": "own_drag"}))
 
@@ -164,7 +156,7 @@ def re_escape(text: str) -> str:
 def test_what_is_no_effect_is_not_registered(kind, says):
     with pytest.raises(InputError, match=says):
         register(kind)
-    assert not own_names()
+    assert not REGISTRY.own_names()
 
 
 def test_an_unknown_effect_says_what_to_do():

@@ -131,7 +131,7 @@ def test_friction_terms_dissipate_one_by_one(result: Reconstruction):
 
 def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.MonkeyPatch):
     def fail(*_):
-        raise ArithmeticError("osqp: maximum iterations reached")
+        raise ArithmeticError("nnls: maximum iterations reached")
 
     monkeypatch.setattr("armloop.reconstruction.physical.constrained_least_squares", fail)
     with pytest.raises(ExcitationError, match="the motion tells too little"):

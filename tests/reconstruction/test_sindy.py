@@ -32,7 +32,7 @@ def test_the_baseline_goes_through_pysindy(samples, monkeypatch):
         return fit(self, x, t, **options)
 
     monkeypatch.setattr(pysindy.SINDy, "fit", counted)
-    held = folds(samples.motion, 5, 1.0) == 0
+    held = folds(samples, 5, 1.0) == 0
     found = sindy(three_axis(), samples, held, OPTIONS, silent)
     assert shapes and all(columns == 196 + 3 for _, columns in shapes)
     (report,) = found.reports
@@ -40,7 +40,7 @@ def test_the_baseline_goes_through_pysindy(samples, monkeypatch):
 
 
 def test_the_baseline_has_more_terms_and_larger_errors(samples):
-    held = folds(samples.motion, 5, 1.0) == 0
+    held = folds(samples, 5, 1.0) == 0
     results = []
     for method, max_order in ((sindy, 1), (stepwise, 2)):
         options = Options(sparse=Sparse(correlation=1.0), max_order=max_order)
@@ -55,7 +55,7 @@ def test_the_baseline_has_more_terms_and_larger_errors(samples):
 
 
 def test_held_out_samples_are_not_fitted_by_the_baseline(samples):
-    held = folds(samples.motion, 5, 1.0) == 0
+    held = folds(samples, 5, 1.0) == 0
     spoilt = replace(samples, tau=np.where(held[:, None], 1e3, samples.tau))
     one, other = (sindy(three_axis(), s, held, OPTIONS, silent) for s in (samples, spoilt))
     np.testing.assert_array_equal(one.components[0].coefficients, other.components[0].coefficients)

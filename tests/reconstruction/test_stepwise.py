@@ -21,7 +21,7 @@ COUNTS = (600, 1500, 1500)
 
 
 def held_out(samples: Samples) -> np.ndarray:
-    return folds(samples.motion, 5, 1.0) == 0
+    return folds(samples, 5, 1.0) == 0
 
 
 def found_on(samples: Samples, max_order: int, held: np.ndarray | None = None) -> Found:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armloop.regression.constrained import constrained_least_squares
+from armloop.regression.constrained import TooCostly, constrained_least_squares
 
 
 def test_nothing_violated_leaves_the_solution_alone():
@@ -24,6 +24,10 @@ def test_a_violated_bound_is_met_and_the_rest_follows():
     theta, active = constrained_least_squares(G, b, np.linalg.solve(G, b), cuts)
     np.testing.assert_allclose(theta, [0.0, 1.0], atol=1e-6)
     assert active == 1
+    # it costs (0+1)² + (0+1-1)² = 1
+    assert np.array_equal(constrained_least_squares(G, b, np.linalg.solve(G, b), cuts, 1.01)[0], theta)
+    with pytest.raises(TooCostly):
+        constrained_least_squares(G, b, np.linalg.solve(G, b), cuts, 0.99)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -60,6 +64,6 @@ def test_a_matrix_is_kept_positive_definite_by_cuts_though_columns_differ_by_ord
 def test_a_solution_that_violates_a_constraint_in_the_end_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     # a projection that gives up: what comes back is where it started
     monkeypatch.setattr("armloop.regression.constrained._nearest", lambda target, A: target)
-    start = np.array([-1.0, 2.0])
+    start = np.array([-3.0, 2.0])
     with pytest.raises(ArithmeticError, match="1 are still violated"):
-        constrained_least_squares(np.eye(2), start, start, lambda theta: np.eye(2)[theta < 0])
+        constrained_least_squares(np.eye(2), start, start, lambda theta: np.ones((int(theta.sum() < 0), 2)))

@@ -5,11 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from exact_parts import as_it_was
 from synthetic import (
-    COULOMB,
-    STATIC,
-    STRIBECK_VELOCITY,
-    VISCOUS,
     fourier_motion,
     friction,
     measured,
@@ -17,14 +14,10 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.components import RigidBody
 from armloop.conditions import sort_samples
 from armloop.diagnosis import diagnose
 from armloop.drake_systems.tracking import TrackingResult
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.log import MotionLog
-from armloop.model import ReconstructedModel
 from armloop.reconstruction import Reconstruction, StepReport
 from armloop.scoring import score
 from armloop.signals import condition
@@ -65,16 +58,7 @@ def tracked(controller: str, size: float) -> TrackingResult:
 
 def reconstructed(log: MotionLog) -> Reconstruction:
     """The arm's own parameters as if a reconstruction had found them, scored on a log."""
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    joints = tuple(
-        (
-            FrictionTerm("sign", float(fs)),
-            FrictionTerm("stribeck", float(fc - fs), STRIBECK_VELOCITY),
-            FrictionTerm("viscous", float(fv)),
-        )
-        for fs, fc, fv in zip(STATIC, COULOMB, VISCOUS, strict=True)
-    )
-    model = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
+    model = as_it_was()
     held_out = score(model, condition([log], model.conditioning))
     model = replace(model, baseline=held_out.moving)
     reports = [

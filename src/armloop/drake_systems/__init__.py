@@ -6,8 +6,14 @@ the systems it is made of. Names that end in an underscore are templates, `Feedf
 
 from armloop.drake_systems.adaptive_feedforward import AdaptiveFeedforward
 from armloop.drake_systems.beyond_bodies import BeyondBodies, BeyondBodies_, friction_systems
-from armloop.drake_systems.closed_loop import CONTROLLERS, ControlledArm, add_arm_with_controller
+from armloop.drake_systems.closed_loop import (
+    CONTROLLERS,
+    ControlledArm,
+    add_arm_under,
+    add_arm_with_controller,
+)
 from armloop.drake_systems.computed_torque import AccelerationGains, ComputedTorque, ComputedTorque_
+from armloop.drake_systems.controllers import Controller, register_controller
 from armloop.drake_systems.effect_system import EffectTorque, EffectTorque_, add_joint_forces
 from armloop.drake_systems.feedforward import Feedforward, Feedforward_, FeedforwardModel
 from armloop.drake_systems.forward_dynamics import ForwardDynamics, ForwardDynamics_
@@ -38,6 +44,7 @@ __all__ = [
     "ComputedTorque",
     "ComputedTorque_",
     "ControlledArm",
+    "Controller",
     "EffectTorque",
     "EffectTorque_",
     "Feedforward",
@@ -59,9 +66,11 @@ __all__ = [
     "StickingForwardDynamics",
     "StickingForwardDynamics_",
     "Stop",
+    "add_arm_under",
     "add_arm_with_controller",
     "add_joint_forces",
     "friction_systems",
     "model_equations",
     "presliding_of",
+    "register_controller",
 ]

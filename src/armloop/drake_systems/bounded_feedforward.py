@@ -16,10 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 
 from armloop.drake_systems.bounded_program import Program
-from armloop.drake_systems.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.errors import InputError
 from armloop.excitation import Reference, TableReference
@@ -28,13 +26,15 @@ from armloop.model import ReconstructedModel
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 6
+_ROUNDS = 8
+_NEAR = 0.3  # w of the program once a round moves the velocities farther than the one before
 _FAR = 0.3  # rad (m); beyond it, as where an arm would have to fall, nothing is near
 _NONE, _REMEDY = (
     "no motion near the reference keeps the torque limits",
     "raise them or slow the reference down",
 )
 _SLOW = 0.05  # rad/s (m/s), slower than which a deviation may turn a joint round
+_APART = 1e-5  # rad/s (m/s), rad (m), between the ends of a difference
 _CREEP = 1e-9  # rad/s (m/s), where friction is that of breaking loose
 
 
@@ -89,10 +89,9 @@ def bounded_reference(
     h = float(time[1])
     base = reference.evaluate(time)
     equations = ModelEquations(model, NUMPY, sharp=True)
-    slopes = ModelEquations(model, functions_of(AutoDiffXd), sharp=True)
     dry, _, slow = _dry_friction(equations, *base)
     level = _dry_friction(equations, base[0], _CREEP + 0 * base[1], base[2])[1]
-    d, torques = np.zeros((3, steps + 1, n)), base[0]
+    d, torques, near, moved = np.zeros((3, steps + 1, n)), base[0], 0.0, np.full(2, np.inf)
     for _ in range(_ROUNDS):
         slow |= np.sign(base[1] + d[1]) != np.sign(base[1])
         reserve = effort - np.where(slow, level, 0.0)
@@ -100,17 +99,22 @@ def bounded_reference(
             raise InputError(f"{_NONE} {limits}: dry friction alone takes them; {_REMEDY}")
         # the torque about the present answer, told as a function of the whole deviation
         rigid, J = _derivatives(equations, *(x + y for x, y in zip(base, d, strict=True)))
-        smooth, slope = _smooth_friction(equations, slopes, base[0] + d[0], base[1] + d[1])
+        smooth, slope = _smooth_friction(equations, base[0] + d[0], base[1] + d[1])
         J[1] = J[1] + slope
         tau = rigid + smooth
         offset = tau - sum(np.einsum("kij,kj->ki", J[a], d[a]) for a in range(3))
-        program = Program(h, offset, J, effort, rate, dry, np.where(slow, level, 0.0), reserve)
+        program = Program(h, offset, J, effort, rate, dry, np.where(slow, level, 0.0), reserve, d[1], near)
         found = program.solve()
         if found is None or not np.abs(found.d[0]).max() < _FAR:
             raise InputError(f"{_NONE} {limits}; {_REMEDY}")
-        moved = float(np.abs(found.d[0] - d[0]).max())
+        moved, before = np.abs(found.d[:2] - d[:2]).max(axis=(1, 2)), moved
+        if moved[1] > before[1]:
+            if near:
+                break
+            near, moved = _NEAR, before
+            continue
         d, torques = found.d, found.torque
-        if moved < 1e-4:
+        if moved[0] < 1e-4:
             break
     return BoundedReference(reference, TableReference(time, *d), torques)
 
@@ -122,16 +126,17 @@ def _torque(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> Array
 
 def _derivatives(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> tuple[Array, list[Array]]:
     """Return torques (K, n) without friction, and their derivatives (K, n, n) by q, v and vdot."""
-    n, step = q.shape[1], 1e-5
-    state, J = (q, v, vdot), []
+    n, state, J = q.shape[1], (q, v, vdot), []
     for which in range(3):
         columns = []
         for e in np.eye(n):
             ends = [
-                _torque(equations, *(x + (s * step * e if a == which else 0.0) for a, x in enumerate(state)))
+                _torque(
+                    equations, *(x + (s * _APART * e if a == which else 0.0) for a, x in enumerate(state))
+                )
                 for s in (1.0, -1.0)
             ]
-            columns.append((ends[0] - ends[1]) / (2 * step))
+            columns.append((ends[0] - ends[1]) / (2 * _APART))
         J.append(np.stack(columns, axis=2))
     return _torque(equations, q, v, vdot), J
 
@@ -153,24 +158,25 @@ def _dry_friction(
     return dry, level, slow
 
 
-def _smooth_friction(
-    equations: ModelEquations, slopes: ModelEquations, q: Array, v: Array
-) -> tuple[Array, Array]:
-    """Return the smooth part of friction (K, n), such as drag, and its derivative by v (K, n, n), by AutoDiffXd.
+def _smooth_friction(equations: ModelEquations, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return the smooth part of friction (K, n), such as drag, and its derivative by v (K, n, n).
 
-    Slower than `_SLOW` the derivative is that at this speed: some laws are infinitely steep at rest.
+    Slower than `_SLOW`, where some laws are infinitely steep, it is the straight line from one way to the other.
     """
     K, n = v.shape
-    tau, slope = np.zeros((K, n)), np.zeros((K, n, n))
-    for along, _, smooth in equations.dry_and_smooth(list(q.T), list(v.T)):
+    tau, slope, columns = np.zeros((K, n)), np.zeros((K, n, n)), list(q.T)
+    for index, (along, *_) in enumerate(equations.dry_and_smooth(columns, list(v.T))):
+        slow = np.abs(v[:, along.joint]) < _SLOW
+        speeds, smooth = [], []
+        for way in (-1.0, 1.0):
+            ahead = list(v.T)
+            ahead[along.joint] = np.where(slow, way * _SLOW, ahead[along.joint] + way * _APART)
+            speeds.append(along.of(ahead))
+            smooth.append(equations.dry_and_smooth(columns, ahead)[index][2])
+        rate = (smooth[1] - smooth[0]) / (speeds[1] - speeds[0])
         for joint, part in ((along.joint, 1.0), (along.other, along.ratio)):
-            tau[:, joint] += part * smooth if part else 0.0
-    faster = np.where(v < 0, -1.0, 1.0) * np.maximum(np.abs(v), _SLOW)
-    for k in range(K):
-        speeds = InitializeAutoDiff(faster[k]).ravel().tolist()
-        for along, _, smooth in slopes.dry_and_smooth(q[k].tolist(), speeds):
-            if isinstance(smooth, AutoDiffXd):
-                for joint, part in ((along.joint, 1.0), (along.other, along.ratio)):
-                    if part:
-                        slope[k, joint] += part * smooth.derivatives()
+            if part:
+                tau[:, joint] += part * (smooth[0] + rate * (along.of(list(v.T)) - speeds[0]))
+                slope[:, joint, along.joint] += part * rate
+                slope[:, joint, along.other] += part * along.ratio * rate
     return tau, slope

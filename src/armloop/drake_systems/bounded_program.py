@@ -3,12 +3,14 @@
 Unknown at K knots, h apart: the deviation d and its derivatives d', d'', and s, the part of the torque that dry friction
 takes where its sign is open.
 
-    min  sum |d_k|^2 / L^2 + |(s_k - s0_k) / level_k|^2
+    min  sum |d_k|^2 / L^2 + w |d'_k - d'_k,last|^2 / (L/s)^2 + |(s_k - s0_k) / level_k|^2
     subject to   u_k = offset_k + J_q d_k + J_v d'_k + J_a d''_k + s_k,
                  |u_k| <= limit,  |u_k - s_k| <= reserve_k,  |u_k - u_k-1| <= h rate,
                  |s_k| <= level_k where the sign is open, s_k = s0_k elsewhere,
 
-d'' linear between knots, so that d is a cubic, and d = d' = 0 at the start. Solver: Stellato et al., OSQP, 2020.
+The second term, of the proximal point algorithm (Rockafellar 1976), lets rounds end whose torques are far from linear in
+d', and costs nothing where they do. d'' is linear between knots, so that d is a cubic, and d = d' = 0 at the start.
+Solver: Stellato et al., OSQP, 2020.
 """
 
 from __future__ import annotations
@@ -45,6 +47,7 @@ class Program:
     limit : (n,) N*m (N); rate : (n,) N*m/s (N/s), inf for none
     dry : (K, n), s0; level : (K, n) of friction whose sign is open, 0 elsewhere
     reserve : (K, n), what dry friction leaves of the limit, looked at where its sign is open
+    last : (K, n), d' of the round before; near : w, 0 for any d'
     """
 
     h: float
@@ -55,6 +58,8 @@ class Program:
     dry: Array
     level: Array
     reserve: Array
+    last: Array
+    near: float = 0.0
 
     def solve(self) -> Answer | None:
         """Return the answer, None when no deviation keeps the limits."""
@@ -93,13 +98,15 @@ class Program:
         gaps, middle = np.zeros(2 * (size - n) + 2 * n), known[open_]
         low = [gaps, -1 - known, -reserve - middle, -slew - step @ known, -level]
         high = [gaps, 1 - known, reserve - middle, slew - step @ known, level]
-        price = 1 / level**2
+        price, near = 1 / level**2, np.full(size, max(self.near, 1e-9))
         solver = osqp.OSQP()
         solver.setup(
             sparse.csc_matrix(
-                sparse.diags_array(np.concatenate([np.ones(size), np.full(2 * size, 1e-9), price]))
+                sparse.diags_array(np.concatenate([np.ones(size), near, np.full(size, 1e-9), price]))
             ),
-            np.concatenate([np.zeros(3 * size), -price * dry[open_]]),
+            np.concatenate(
+                [np.zeros(size), -near * self.last.ravel() / units[1], np.zeros(size), -price * dry[open_]]
+            ),
             sparse.csc_matrix(sparse.vstack(rows)),
             np.concatenate(low),
             np.concatenate(high),

@@ -26,7 +26,8 @@ from armloop.model import ReconstructedModel
 Array = NDArray[np.float64]
 
 CONTROLLERS = ("pid", "computed_torque")
-"""The controllers that `add_arm_with_controller` knows."""
+"""The controllers that `add_arm_with_controller` knows; `add_arm_under` takes a law of your own."""
+_REFERENCE = ("q_ref", "v_ref", "vdot_ref", "tau_ff")
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +39,14 @@ class ControlledArm:
         controller holds the model itself
     controller : `tau` (n,)
     drives : where torques can change at a limited rate only, between the controller and the plant: `tau` (n,)
+    followed : the motion behind `reference`
     """
 
     plant: ArmPlant
     reference: ReferenceSource
     controller: PidController | LeafSystem
     drives: RateLimiter | None = None
+    followed: Reference | None = None
 
     def start_on_reference(self, root_context: Context) -> None:
         """Put the arm where the reference begins, at its velocity, inside the diagram's context."""
@@ -105,31 +108,70 @@ def add_arm_with_controller(
     spec = arm if isinstance(arm, Plant) else _plant(arm, model)
     n, config, period = spec.arm.n, spec.config, spec.config.time_step
     _check_controller(controller, gains, model, step)
-    source = ReferenceSource(reference, period, model if controller == "pid" else None, step)
-    followed = source.tables[0].shape[1]
+    followed = reference.evaluate([0.0])[0].shape[1]
     if not len(gains.kp) == followed == n:
         raise ValueError(
             f"{spec.arm.name} has {n} joints; the gains are for {len(gains.kp)}, the reference for {followed}"
         )
-    plant = builder.AddSystem(ArmPlant(spec.arm, config.friction, effects=effects, time_step=period))
-    builder.AddNamedSystem("reference", source)
+    law: LeafSystem
     if isinstance(gains, PidGains):
-        resolution = config.instruments.resolution(spec.arm)
-        law = builder.AddNamedSystem("pid", PidController(gains, period, resolution))
-        needed = ("q_ref", "v_ref", "tau_ff")
+        law = PidController(gains, period, config.instruments.resolution(spec.arm))
     else:
-        law = builder.AddNamedSystem("computed_torque", ComputedTorque(model, gains, period=period))
-        needed = ("q_ref", "v_ref", "vdot_ref")
-    for port in needed:
+        law = ComputedTorque(model, gains, period=period)
+    return add_arm_under(
+        builder,
+        spec,
+        law,
+        reference,
+        model,
+        step,
+        name=controller,
+        effects=effects,
+        torque_rate=torque_rate,
+    )
+
+
+def add_arm_under(
+    builder: DiagramBuilder,
+    plant: Plant,
+    law: LeafSystem,
+    reference: Reference,
+    model: FeedforwardModel | None = None,
+    step: int = 3,
+    *,
+    name: str = "controller",
+    effects: Sequence[UndeclaredEffect] = (),
+    torque_rate: ArrayLike | None = None,
+) -> ControlledArm:
+    """Add a plant that follows a reference under a control law of the caller's own; else as `add_arm_with_controller`.
+
+    law : input ports `state` and those that it wants of `q_ref`, `v_ref`, `vdot_ref` and, with a `model`, `tau_ff`;
+        output port `tau` (n,)
+
+    Raises `ValueError` when the law lacks a port, or has another one.
+    """
+    config, period = plant.config, plant.config.time_step
+    ports = [law.get_input_port(k).get_name() for k in range(law.num_input_ports())]
+    wanted = [port for port in ports if port in _REFERENCE]
+    if not law.HasOutputPort("tau") or "state" not in ports or len(wanted) + 1 < len(ports):
+        raise ValueError(
+            f"{name}: has the input ports {', '.join(ports) or 'none'}; a control law has state, those that it wants of "
+            f"{', '.join(_REFERENCE)}, and the output port tau"
+        )
+    source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
+    body = builder.AddSystem(ArmPlant(plant.arm, config.friction, effects=effects, time_step=period))
+    builder.AddNamedSystem("reference", source)
+    builder.AddNamedSystem(name, law)
+    for port in wanted:
         builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
-    builder.Connect(plant.GetOutputPort("state"), law.GetInputPort("state"))
+    builder.Connect(body.GetOutputPort("state"), law.GetInputPort("state"))
     drives = law
     if torque_rate is not None:
-        effort = [joint.effort for joint in spec.arm.joints]
+        effort = [joint.effort for joint in plant.arm.joints]
         drives = builder.AddNamedSystem("drives", RateLimiter(effort, torque_rate, period))
         builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
-    builder.Connect(drives.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    return ControlledArm(plant, source, law, drives if drives is not law else None)
+    builder.Connect(drives.GetOutputPort("tau"), body.GetInputPort("tau"))
+    return ControlledArm(body, source, law, drives if drives is not law else None, reference)
 
 
 def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:

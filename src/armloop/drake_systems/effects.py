@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from armloop.arm import Arm
 from armloop.drake_systems.own_effects import Law, own_law
 from armloop.effects import EFFECTS as LISTED
-from armloop.effects import Effect, effect, effect_kind, own_names
+from armloop.effects import REGISTRY, Effect, effect, effect_kind
 from armloop.effects.base import Placed, number
 from armloop.effects.external_contact import ExternalContact
 from armloop.effects.gravity_tilt import GravityTilt, base_rotation
@@ -56,7 +56,7 @@ class UndeclaredEffect:
         try:
             kind = effect_kind(self.name)
         except ModelError as error:
-            names = ", ".join([*EFFECTS, *own_names()])
+            names = ", ".join([*EFFECTS, *REGISTRY.own_names()])
             raise ScenarioError(f"effect {self.name!r} is unknown; the plant can have: {names}") from error
         if self.name in LISTED and self.name not in EFFECTS:
             raise ScenarioError(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.primitives import Linearize
 
@@ -22,6 +23,7 @@ from armloop.arm import Arm
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.plant import add_links
+from armloop.drake_systems.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.functions import MATH
 from armloop.model import ReconstructedModel
@@ -68,13 +70,17 @@ def posture_model(arm: Arm, friction: Sequence[JointFriction], q0: ArrayLike) ->
 def model_posture(model: ReconstructedModel, q0: ArrayLike) -> tuple[Array, Array, Array]:
     """Return M, F, G (n, n) of an identified model at rest at q0 (n,), as `posture_model` does of the arm itself.
 
-    F is the slope of the model's friction between 0.5 and 1 rad/s (0.05 and 0.1 m/s), where dry friction is level.
+    F is the derivative of the model's friction at 1 rad/s (0.1 m/s), where dry friction is level, the mean of both ways.
     """
     equations = ModelEquations(model, MATH, symmetric=True)
     q, n = np.asarray(q0, dtype=float).tolist(), model.arm.n
     speed = np.where(model.arm.revolute, 1.0, 0.1)
-    fast, slow = (equations.friction((part * speed).tolist(), q=q) for part in (1.0, 0.5))
-    F = np.diag((np.array(fast, dtype=float) - np.array(slow, dtype=float)) / (0.5 * speed))
+    slopes = ModelEquations(model, functions_of(AutoDiffXd))
+    ways = [slopes.friction(InitializeAutoDiff(way * speed).ravel().tolist(), q=q) for way in (1.0, -1.0)]
+    rates = [
+        [x.derivatives() if isinstance(x, AutoDiffXd) else np.zeros(n) for x in friction] for friction in ways
+    ]
+    F = np.mean(rates, axis=0)
     h, columns = 1e-5, []
     for e in np.eye(n):
         ahead, behind = (equations.gravity((np.array(q) + s * h * e).tolist()) for s in (1.0, -1.0))

@@ -13,10 +13,6 @@ Numbers = Annotated[list[Finite], Meta(max_length=MOST_JOINTS)]  # one per joint
 Above = Annotated[list[Positive], Meta(max_length=MOST_JOINTS)]
 Seed = Annotated[int, Meta(ge=0, lt=1 << 62)]
 
-CONTROLLERS = ("pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "bounded", "exact")
-"""PID without a model and with 1, 2 or 3 steps of one, Eqs. (35) and (36); computed torque with a model; PID with Step III
-on the motion nearest to the reference that keeps the limits; PID with the simulated arm's own inverse dynamics,
-which no reconstruction can reach."""
 PAPER = ("pid", "pid_step1", "pid_step3")
 """The controllers of Fig. 15."""
 

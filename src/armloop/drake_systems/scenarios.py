@@ -7,7 +7,6 @@ frozen types of the simulation. Whatever is wrong raises `ScenarioError`, one li
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +14,11 @@ from msgspec.structs import asdict, replace
 
 from armloop.arm import Arm, load_arm
 from armloop.drake_systems.collection import CollectionPlan, PlantConfig
+from armloop.drake_systems.controllers import LISTED, REGISTRY
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.scenario_data import (
-    CONTROLLERS,
-    PAPER,
     LimitsData,
     PickupData,
     PlanData,
@@ -30,62 +28,25 @@ from armloop.drake_systems.scenario_data import (
 )
 from armloop.drake_systems.scenario_files import beside, entry, per_joint, read, scenario_entry
 from armloop.drake_systems.scenario_references import reference_of
+from armloop.drake_systems.scenario_types import Pickup, Plant, TrackingScenario, Wear
 from armloop.drake_systems.speed_mode import Instruments
 from armloop.errors import ArmError, ScenarioError
 from armloop.excitation import MotionRanges, Reference
 from armloop.resources import scenario_path, urdf_names
 
+__all__ = [
+    "Pickup",
+    "Plant",
+    "TrackingScenario",
+    "Wear",
+    "load_plan",
+    "load_plant",
+    "load_tracking",
+    "plant_for",
+    "plant_names",
+]
+
 _LEAST_LOG = 14.0  # s, what a diagnosis needs and a little more
-
-
-@dataclass(frozen=True, eq=False)
-class Plant:
-    """A named simulated arm, ready to be built."""
-
-    name: str
-    arm: Arm
-    config: PlantConfig
-
-
-@dataclass(frozen=True, eq=False)
-class Pickup:
-    """A payload from `at` s on; the log is diagnosed and the model swapped at `diagnose_at` s."""
-
-    at: float
-    diagnose_at: float
-    payload: UndeclaredEffect
-
-
-@dataclass(frozen=True)
-class Wear:
-    """How often friction is drawn, and the standard deviation of its parameters' logarithms."""
-
-    samples: int
-    spread: float
-
-
-@dataclass(frozen=True, eq=False)
-class TrackingScenario:
-    """A tracking experiment, validated.
-
-    score : (start, end) s, the interval that is scored; controllers : names among `CONTROLLERS`
-    bandwidth : rad/s, of computed torque; None for what makes it as stiff as kp
-    rate : (n,) N*m/s (N/s), how fast the drives can change their torques; None for any
-    used : share of the drives' limits that `bounded` plans with
-    """
-
-    name: str
-    plant: Plant
-    gains: PidGains
-    reference: Reference
-    score: tuple[float, float]
-    controllers: tuple[str, ...] = PAPER
-    seed: int = 0
-    bandwidth: float | None = None
-    pickup: Pickup | None = None
-    wear: Wear | None = None
-    rate: np.ndarray | None = None
-    used: float = 1.0
 
 
 def plant_names() -> list[str]:
@@ -139,10 +100,12 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
     gains = [per_joint(getattr(data, key), n, f"{where}: {key}") for key in ("kp", "ki", "kd")]
     if any(np.any(gain < 0) for gain in gains):
         raise ScenarioError(f"{where}: kp, ki and kd must not be negative")
-    unknown = [name for name in data.controllers if name not in CONTROLLERS]
+    unknown = [name for name in data.controllers if REGISTRY.find(name) is None]
     if unknown or not data.controllers:
         given = ", ".join(unknown) or "empty"
-        raise ScenarioError(f"{where}: controllers: {given}; there are: {', '.join(CONTROLLERS)}")
+        raise ScenarioError(
+            f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}"
+        )
     score = data.score or [0.0, reference.duration]
     if len(score) != 2 or not 0 <= score[0] < score[1] <= reference.duration + 1e-9:
         raise ScenarioError(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from armloop.arm import Arm
 from armloop.drake_systems.plant import add_links
+from armloop.quiet import quiet
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Actors(NamedTuple):
 
 def local_meshcat() -> Meshcat:
     """Return a Meshcat server on the loopback interface, on a free port: no other computer can reach it."""
-    with _drake_says_less():  # it would write the address where messages of faults belong
+    with quiet("drake", logging.WARNING):  # it would write the address where messages of faults belong
         return Meshcat(MeshcatParams(host=LOOPBACK, show_stats_plot=False))
 
 
@@ -108,15 +108,3 @@ def _add_sticks(
             along = RigidTransform(RotationMatrix.MakeFromOneVector(tip, 2), 0.5 * tip)
             plant.RegisterVisualGeometry(body, along, Cylinder(_STICK, length), f"stick_{i + 1}", colour)
     return instance
-
-
-@contextmanager
-def _drake_says_less() -> Iterator[None]:
-    """Let Drake's logger pass warnings only, for the time of the block."""
-    logger = logging.getLogger("drake")
-    level = logger.level
-    logger.setLevel(logging.WARNING)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)

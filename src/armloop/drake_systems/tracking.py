@@ -12,29 +12,17 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
-from armloop.drake_systems.bounded_feedforward import bounded_reference
-from armloop.drake_systems.closed_loop import ControlledArm, add_arm_with_controller
-from armloop.drake_systems.computed_torque import AccelerationGains
+from armloop.drake_systems.bounded_feedforward import BoundedReference
+from armloop.drake_systems.closed_loop import ControlledArm, add_arm_under
+from armloop.drake_systems.controllers import MAIN_MODEL, Exact, controller_named, controller_of
 from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.exact import exact_model
 from armloop.drake_systems.feedforward import FeedforwardModel
 from armloop.drake_systems.live import LiveView
 from armloop.drake_systems.metrics import Metrics, measure
 from armloop.drake_systems.scenarios import TrackingScenario
-from armloop.dynamics import Dynamics, with_mass_matrix
-from armloop.model import ReconstructedModel
 from armloop.workers import Pool
 
 Array = NDArray[np.float64]
-
-MAIN_MODEL = "model"
-"""The name in `models` of the one behind `pid_step1`, `pid_step2`, `pid_step3` and `computed_torque`."""
-STEPS = {"step1": 1, "step2": 2, "step3": 3}
-"""The names in `models` of the ones behind `pid_step1`, `pid_step2` and `pid_step3` alone, and their steps."""
-COMPUTED_TORQUE = "computed_torque"
-_BANDWIDTH = 20.0  # rad/s, of computed torque with a model that has no mass matrix to show
-BOUNDED = "bounded"
-EXACT = "exact"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +50,14 @@ class TrackingResult:
 
 def needs_model(controller: str) -> bool:
     """Tell whether a controller of a scenario runs only with a model that somebody gives."""
-    return controller not in ("pid", EXACT)
+    return bool(controller_named(controller).models)
 
 
 def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
     """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
-    own = [
-        name if name in (COMPUTED_TORQUE, BOUNDED) else f"pid_{name}"
-        for name in models
-        if name not in (MAIN_MODEL, EXACT)
-    ]
-    served = {"pid", EXACT, *own}
-    if MAIN_MODEL in models:
-        served |= {COMPUTED_TORQUE, BOUNDED, *(f"pid_{name}" for name in STEPS)}
-    names = [name for name in scenario.controllers if name in served]
-    return names + [name for name in own if name not in names]
+    names = [name for name in scenario.controllers if controller_named(name).served_by(models)]
+    own = [controller_of(name) for name in models if name not in (MAIN_MODEL, Exact.name)]
+    return list(dict.fromkeys([*names, *own]))
 
 
 def run_tracking(
@@ -196,9 +177,10 @@ class RecordedArm:
     def result(self, root_context: Context) -> TrackingResult:
         """Return what the run came to so far."""
         time, state, tau, asked = self.recorded(root_context)
-        # what is bounded follows another motion, and is judged by what was asked for
-        reference = self._scenario.reference
-        tables = reference.evaluate(time) if self._controller == BOUNDED else self.systems.reference.tables
+        # whatever motion it follows, it is judged by the one that was asked for
+        tables, asked_for = self.systems.reference.tables, self._scenario.reference
+        if self.systems.followed is not asked_for:
+            tables = asked_for.evaluate(time)
         return score(self._scenario, self._controller, time, tables, state, tau, asked)
 
 
@@ -213,68 +195,24 @@ def add_controlled_arm(
 
     Raises `ValueError` when `models` has none for the controller.
     """
-    plant = scenario.plant
-    if controller == EXACT:
-        model: FeedforwardModel | None = exact_model(plant.arm, plant.config.friction, effects)
-        step = 3
-    else:
-        model, step = _feedforward(controller, models)
-    if controller == COMPUTED_TORQUE:
-        if isinstance(model, ReconstructedModel):
-            model = with_mass_matrix(model)
-        gains = _as_stiff(scenario, model)
-        return add_arm_with_controller(
-            builder,
-            plant,
-            gains,
-            scenario.reference,
-            model,
-            controller=controller,
-            effects=effects,
-            torque_rate=scenario.rate,
-        )
-    reference, bounded = scenario.reference, None
-    if controller == BOUNDED:
-        if not isinstance(model, ReconstructedModel):
-            raise ValueError("bounded needs a reconstructed model")
-        reference = bounded = bounded_reference(reference, model, *_planned(scenario))
-    arm = add_arm_with_controller(
-        builder, plant, scenario.gains, reference, model, step, effects=effects, torque_rate=scenario.rate
+    kind = controller_named(controller)
+    model = kind.model(scenario, models, effects)
+    reference = kind.reference(scenario, model)
+    arm = add_arm_under(
+        builder,
+        scenario.plant,
+        kind.law(scenario, model),
+        reference,
+        model,
+        kind.step,
+        name=controller,
+        effects=effects,
+        torque_rate=scenario.rate,
     )
-    if bounded is not None:
-        period = plant.config.time_step
-        arm.reference.set_torques(bounded.torque(period * np.arange(len(arm.reference.tables[0]))))
+    if isinstance(reference, BoundedReference):
+        period = scenario.plant.config.time_step
+        arm.reference.set_torques(reference.torque(period * np.arange(len(arm.reference.tables[0]))))
     return arm
-
-
-def _as_stiff(scenario: TrackingScenario, model: FeedforwardModel | None) -> AccelerationGains:
-    """Return critically damped gains of the scenario's bandwidth, by default such that M_ii w^2 = kp at the start."""
-    n, bandwidth = scenario.plant.arm.n, scenario.bandwidth
-    if bandwidth is not None or not isinstance(model, ReconstructedModel):
-        return AccelerationGains.critical(n, bandwidth or _BANDWIDTH)
-    inertia = np.diag(Dynamics(model, symmetric=True).mass_matrix(scenario.reference.evaluate([0.0])[0][0]))
-    w = np.minimum(np.sqrt(scenario.gains.kp / inertia), 0.1 / scenario.plant.config.time_step)
-    return AccelerationGains(w**2, 2 * w)
-
-
-def _planned(scenario: TrackingScenario) -> tuple[Array, Array | None]:
-    """Return what of the drives' limits may be planned with: torques and their rates."""
-    effort = np.array([joint.effort for joint in scenario.plant.arm.joints])
-    return scenario.used * effort, None if scenario.rate is None else scenario.used * scenario.rate
-
-
-def _feedforward(
-    controller: str, models: Mapping[str, FeedforwardModel]
-) -> tuple[FeedforwardModel | None, int]:
-    """Return a controller's model and the last step of it that is used."""
-    if controller == "pid":
-        return None, 3
-    name = controller.removeprefix("pid_")
-    model = models.get(name, models.get(MAIN_MODEL) if name in (*STEPS, COMPUTED_TORQUE, BOUNDED) else None)
-    if model is None:
-        given = ", ".join(models) or "none"
-        raise ValueError(f"there is no model for the controller {controller}; the models given are: {given}")
-    return model, STEPS.get(name, 3)
 
 
 def score(

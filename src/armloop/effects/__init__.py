@@ -11,13 +11,14 @@ from armloop.arm import Arm
 from armloop.effects.base import Context, Effect, Estimate, Parameter, Value
 from armloop.effects.law import INERTIA, Law, LinearJointEffect, ProfiledJointEffect
 from armloop.effects.listed import EFFECTS
-from armloop.effects.own import find, own_effects, own_names, register
+from armloop.effects.own import REGISTRY, register
 from armloop.errors import ModelError
 from armloop.library.friction import Element
 
 __all__ = [
     "EFFECTS",
     "INERTIA",
+    "REGISTRY",
     "Context",
     "Effect",
     "Element",
@@ -30,8 +31,6 @@ __all__ = [
     "effect",
     "effect_kind",
     "hypotheses",
-    "own_effects",
-    "own_names",
     "register",
 ]
 
@@ -42,11 +41,9 @@ def effect_kind(name: Any) -> type[Effect]:
     Raises:
         ModelError: there is none of that name.
     """
-    kind = EFFECTS.get(name) if isinstance(name, str) else None
-    if kind is None and isinstance(name, str):
-        kind = find(name)
+    kind = REGISTRY.find(name) if isinstance(name, str) else None
     if kind is None:
-        own = f"; of your own: {', '.join(own_names())}" if own_names() else ""
+        own = f"; of your own: {', '.join(REGISTRY.own_names())}" if REGISTRY.own_names() else ""
         raise ModelError(
             f"unknown effect {name!r}; install the package that brings it (entry points armloop.effects), or register its "
             f"class with armloop.effects.register. Listed are: {', '.join(EFFECTS)}{own}"
@@ -81,7 +78,7 @@ def hypotheses(arm: Arm) -> list[Effect]:
         InputError: an effect of the user's own cannot be loaded.
     """
     listed: list[Effect] = []
-    for kind in [*EFFECTS.values(), *own_effects().values()]:
+    for kind in [*EFFECTS.values(), *REGISTRY.own().values()]:
         if not kind.searched:
             continue
         if kind.pair_wise:

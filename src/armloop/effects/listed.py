@@ -30,9 +30,13 @@ _FILES = sorted(
     {module.name for module in iter_modules([_FOLDER])} - {"base", "events", "law", "listed", "own"}
 )
 
-#: Every listed effect by its name in ``diagnosis.json``. What looks like another comes after it: of equals a search
-#: names the first.
+#: Every listed effect by its name in ``diagnosis.json``. Of two that do equally well with as many numbers a search names
+#: the first: what looks like another comes after it, what leans on the known model after what the motion tells alone, and
+#: a fault of the record after what acts on the arm.
 EFFECTS: dict[str, type[Effect]] = {
     kind.name: kind
-    for kind in sorted((k for file in _FILES for k in _defined(file)), key=lambda k: bool(k.looks_like))
+    for kind in sorted(
+        (k for file in _FILES for k in _defined(file)),
+        key=lambda k: (bool(k.looks_like), k.needs_model, k.sensor, k.name),
+    )
 }

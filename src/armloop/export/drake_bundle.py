@@ -16,7 +16,7 @@ from armloop.drake_systems.beyond_bodies import presliding_elements
 from armloop.dynamics import ModelEquations
 from armloop.errors import InputError
 from armloop.export.exported import Exported, rms_of, whole_torque
-from armloop.export.rereading import drake_torque, without_warnings
+from armloop.export.rereading import drake_torque
 from armloop.export.robot_xml import urdf_text
 from armloop.export.said import Said, friction_torques, random_motion, said
 from armloop.files import write_text
@@ -24,6 +24,7 @@ from armloop.functions import MATH
 from armloop.model import ReconstructedModel
 from armloop.motion import Motion
 from armloop.newton_euler import mass_matrix
+from armloop.quiet import quiet
 
 Array = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     model.save(files[1])
     write_text(files[2], _PROGRAM.format(step=_STEP, smoothing=smoothing))
     try:
-        with contextlib.redirect_stdout(io.StringIO()), without_warnings():
+        with contextlib.redirect_stdout(io.StringIO()), quiet("drake"):
             program = runpy.run_path(str(files[2]))
     except RuntimeError as error:
         raise InputError(f"{files[2]}: does not run in Drake: {' '.join(str(error).split())}") from error

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.quiet import quiet
+
 Array = NDArray[np.float64]
 
 
 class NotInstalled(Exception):
     """The consumer of a format is not at hand."""
-
-
-@contextmanager
-def without_warnings() -> Iterator[None]:
-    """Keep Drake's parser quiet about friction: that it drops it is in the export's own table."""
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(level)
 
 
 def drake_torque(path: Path, joints: Sequence[str], q: Array, v: Array, vdot: Array) -> Array:
@@ -37,7 +25,7 @@ def drake_torque(path: Path, joints: Sequence[str], q: Array, v: Array, vdot: Ar
     from pydrake.multibody.tree import MultibodyForces
 
     plant = MultibodyPlant(0.0)
-    with without_warnings():
+    with quiet("drake"):  # that its parser drops friction is in the export's own table
         Parser(plant).AddModels(str(path))
     plant.Finalize()
     order = [plant.GetJointByName(name).velocity_start() for name in joints]

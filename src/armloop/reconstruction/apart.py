@@ -8,7 +8,7 @@ plain regression, base parameters with Coulomb and viscous friction, on a part o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #: Samples of the plain regression, from so many logs at most, and the speed from which on a joint counts as moving.
 _SAMPLES, _LOGS, _SLOW = 8000, 16, 0.01
 #: A block's length in distances at which samples do not judge, and the fewest blocks held out.
-_LENGTH, _FEWEST = 4.0, 4
+_LENGTH, FEWEST_BLOCKS = 4.0, 4
 #: Shortest block, periods of the filter.
 _SHORTEST = 5.0
 
@@ -45,6 +45,10 @@ class Apart:
     seconds: float
     margin: float
     correlation: float
+
+    def within(self, seconds: float) -> Apart:
+        """The same distances in blocks of another length, as far as they go in."""
+        return replace(self, seconds=seconds, margin=min(self.margin, seconds / _LENGTH))
 
     @property
     def too_short(self) -> bool:
@@ -77,7 +81,7 @@ def independent_blocks(
     covered *= len(logs) / len(some)
     correlation = _correlation(arm, parts)
     margin = max(0.5 / how.cutoff_hz, correlation)
-    longest = max(covered / (folds * _FEWEST), _SHORTEST / how.cutoff_hz)
+    longest = max(covered / (folds * FEWEST_BLOCKS), _SHORTEST / how.cutoff_hz)
     length = min(max(seconds, _LENGTH * margin), longest)
     return Apart(length, min(margin, length / _LENGTH), correlation)
 

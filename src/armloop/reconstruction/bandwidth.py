@@ -3,13 +3,14 @@
 Lowering the corner takes noise out of the velocities and accelerations that are regressed, and motion as well. The
 corners are compared by what rigid bodies with Coulomb and viscous friction, regressed on half of the blocks, leave on
 the other half of *one* torque, filtered at the highest corner for all of them: smoothing the torque itself gains
-nothing. Which corner is best is a property of the data, of the motion's speed and of the sensors' noise.
+nothing. Which corner is best is a property of the data, of the motion's speed and of the sensors' noise. The blocks that
+judge the model in the end (:mod:`armloop.reconstruction.held_out`) take no part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from armloop.log import MotionLog
 from armloop.motion import Motion
 from armloop.pieces import LogSource
 from armloop.plausibility import is_time_series
+from armloop.reconstruction.held_out import held_out_intervals, within
+from armloop.reconstruction.options import Options
 from armloop.signals import Conditioning, LowPass, ShortRunError, condition, uniform_period
 
 Array = NDArray[np.float64]
@@ -59,27 +62,46 @@ class Bandwidth:
             return []
         tried = ", ".join(f"{corner:.3g} Hz {error:.3f}" for corner, error in self.trials)
         return [
-            f"low-pass of {self.cutoff_hz:.3g} Hz, chosen on held-out blocks of one torque (nRMSE: {tried})"
+            f"low-pass of {self.cutoff_hz:.3g} Hz, chosen by cross-validation over blocks of one torque (nRMSE: {tried})"
         ]
 
 
-def choose_bandwidth(logs: Sequence[LogSource], arm: Arm, how: Conditioning) -> Bandwidth:
-    """The corner for these logs, at most ``how.cutoff_hz`` and at most 0.4 of the lowest sample rate.
+def highest_corner(logs: Sequence[LogSource], how: Conditioning) -> float:
+    """The highest corner that is tried, Hz: at most ``how.cutoff_hz`` and at most 0.4 of the lowest sample rate."""
+    return min(how.cutoff_hz, *(round(_OF_RATE / log.period, 3) for log in even_selection(logs)))
+
+
+def choose_bandwidth(
+    logs: Sequence[LogSource],
+    arm: Arm,
+    how: Conditioning,
+    options: Options | None = None,
+    libraries: Sequence[Conditioning] = (),
+) -> Bandwidth:
+    """The corner for these logs, at most :func:`highest_corner`.
 
     The highest corner stands where the data are too few, or do not move enough, to compare.
+
+    Args:
+        options: how the logs are dealt into blocks, of which those held out are left aside here.
+        libraries: usual filters of the libraries that are going to be regressed; ``how`` by default.
     """
     chosen = even_selection(logs)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
-    highest = min(how.cutoff_hz, *(round(_OF_RATE / log.period, 3) for log in chosen))
+    highest = highest_corner(logs, how)
     corners = [round(part * highest, 3) for part in _PARTS]
     corners[0] = highest
     # every corner must see the same logs: those that are long enough for the lowest
-    chosen = [log for log in chosen if log.time[-1] - log.time[0] > 4 / min(corners)]
-    if not chosen:
+    long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
+    if not any(long):
         return Bandwidth(highest)
+    filters = {Bandwidth(corner).suited(one) for corner in corners for one in (libraries or (how,))}
+    held_out = held_out_intervals(logs, sorted(filters, key=astuple), options or Options())
+    aside = [held_out[k] for k, enough in zip(_selected(logs), long, strict=True) if enough]
+    chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
-    tables = [table_at(chosen, arm, base, how, corner, corners) for corner in corners]
+    tables = [table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners]
     if any(table is None for table in tables):
         return Bandwidth(highest)
     made = [table for table in tables if table is not None]
@@ -107,16 +129,20 @@ def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
             )
 
 
-def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
-    """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
+def _selected(logs: Sequence[LogSource]) -> list[int]:
+    """Some of the logs, evenly, that hold about so many samples as are looked at."""
     total = sum(log.samples for log in logs)
     count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
-    picked = [logs[int(k)] for k in np.linspace(0, len(logs) - 1, count)]
-    found = []
-    for source in picked:
-        log = source.read()
+    return [int(k) for k in np.linspace(0, len(logs) - 1, count)]
+
+
+def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
+    """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
+    picked, found = _selected(logs), []
+    for k in picked:
+        log = logs[k].read()
         longest = max(log.runs(), key=lambda run: run.stop - run.start)
-        most = _SAMPLES // count
+        most = _SAMPLES // len(picked)
         found.append(log.select(slice(longest.start, min(longest.stop, longest.start + most))))
     return found
 
@@ -138,12 +164,17 @@ def table_at(
     how: Conditioning,
     corner: float,
     corners: list[float],
+    aside: Sequence[Array] | None = None,
 ) -> Table | None:
-    """Columns at one corner, at the instants that all corners share; None where no run is long enough."""
+    """Columns at one corner, at the instants that all corners share; None where no run is long enough.
+
+    Args:
+        aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
+    """
     parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
     lowest, following = min(corners), 0
     total = sum(log.samples for log in logs)
-    for log in logs:
+    for k, log in enumerate(logs):
         try:
             samples = condition([log], replace(how, cutoff_hz=corner, oversampling=1e9))
         except ShortRunError:
@@ -151,7 +182,10 @@ def table_at(
         motion, period = samples.motion, uniform_period(log.time)
         elapsed = motion.time - log.time[0]
         margin, length = 0.5 / lowest + period, float(log.time[-1] - log.time[0])
-        inside = np.flatnonzero((elapsed > margin) & (elapsed < length - margin))
+        used = (elapsed > margin) & (elapsed < length - margin)
+        if aside is not None:
+            used &= ~within(motion.time, aside[k], margin)
+        inside = np.flatnonzero(used)
         stride = max(1, total * arm.n // _ROWS)
         # the same instants at every corner: whole numbers of periods from the log's start
         numbers = np.rint(elapsed[inside] / period).astype(int)

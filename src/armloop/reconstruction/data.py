@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.blocks import block_numbers
+from armloop.log import MotionLog
 from armloop.motion import Motion, Samples
 from armloop.pieces import LogSource
 from armloop.reconstruction.options import Options
@@ -28,6 +29,8 @@ Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.
 REFERENCE = 50_000
+#: Fold that chooses the library where the held-out blocks are too few to be halved; 0 judges, 1 chooses orders.
+_CHOOSING = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,7 @@ class Chunk:
         validation: (N,) those that choose orders; they are used for the final fit, too.
         independent: (N,) so many of them that four are left per period of the filter's corner.
         folds: number of folds that the blocks are dealt into.
+        choosing: (N,) held-out samples that choose the library; those of every other held-out block by default.
     """
 
     samples: Samples
@@ -49,27 +53,33 @@ class Chunk:
     validation: Mask
     independent: Mask
     folds: int = 5
+    choosing: Mask | None = None
 
     def judging(self, part: str, margin: float = 0.0) -> Mask:
         """(N,) held-out samples that judge: ``"all"``, ``"selection"`` (they choose the library) or ``"test"``.
 
-        Every other held-out block chooses the library, so that the rest of them chooses nothing.
+        Those that do not choose the library choose nothing.
 
         Args:
             margin: seconds from a sample in a block of another part within which none judges.
         """
-        turn = self.blocks // self.folds % 2
         own = self.held_out.copy()
         if part != "all":
-            own &= turn == (0 if part == "selection" else 1)
+            choosing = self.blocks // self.folds % 2 == 0 if self.choosing is None else self.choosing
+            own &= choosing if part == "selection" else ~choosing
         if margin > 0:
             own &= ~_near(~own, self.samples.motion, margin)
         return own
 
+    def nested(self) -> Chunk:
+        """The same with one more fold held out, which alone chooses the library."""
+        choosing = self.blocks % self.folds == _CHOOSING
+        return replace(self, held_out=self.held_out | choosing, choosing=choosing)
+
     @staticmethod
     def of(samples: Samples, options: Options, first: int = 0, held_out: Mask | None = None) -> Chunk:
         """Deal samples into folds by blocks, the first of them numbered ``first``."""
-        blocks = first + block_numbers(samples.motion, options.block_seconds)
+        blocks = first + block_numbers(samples.motion, options.block_seconds, samples.spans)
         fold = blocks % options.folds
         held_out = fold == 0 if held_out is None else held_out
         return Chunk(samples, blocks, held_out, fold == 1, independent_rows(samples), options.folds)
@@ -79,7 +89,7 @@ class Chunk:
         old, motion = self.samples, self.samples.motion
         starts = np.searchsorted(rows, motion.starts).astype(np.intp)
         taken = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
-        samples = Samples(taken, old.tau[rows], old.moving[rows], old.period, old.cutoff_hz)
+        samples = Samples(taken, old.tau[rows], old.moving[rows], old.period, old.cutoff_hz, old.spans)
         return Chunk(
             samples,
             self.blocks[rows],
@@ -87,6 +97,7 @@ class Chunk:
             self.validation[rows],
             self.independent[rows],
             self.folds,
+            None if self.choosing is None else self.choosing[rows],
         )
 
 
@@ -140,6 +151,34 @@ class Data:
         return Data([_Kept(chunk)], chunk, Serial())
 
     @staticmethod
+    def kept(logs: Sequence[MotionLog], how: Conditioning, options: Options) -> Data:
+        """Samples in memory, a chunk for each log: so sums are added up in the order in which streamed ones are.
+
+        Raises:
+            ShortRunError: no log has a run long enough for the filter.
+        """
+        noise = np.max([_noise(how.cutoff_hz, log) for log in logs], axis=0) if how.cutoff_hz > 0 else None
+        chunks, first = [], 0
+        for log in logs:
+            chunk = _Conditioned(log, how, noise, options, first).chunk()
+            if chunk is not None:
+                chunks.append(chunk)
+                first = int(chunk.blocks[-1]) + 1
+        if not chunks:
+            condition(logs, how, noise)  # says how long a run must be
+        return Data([_Kept(chunk) for chunk in chunks], _joined(chunks), Serial())
+
+    def nested(self) -> Data:
+        """The same, in memory, with one more fold held out, which alone chooses the library."""
+        chunks = [part.chunk().nested() for part in self.parts if isinstance(part, _Kept)]
+        return Data([_Kept(chunk) for chunk in chunks], self.reference.nested(), self.workers)
+
+    @property
+    def in_memory(self) -> bool:
+        """Whether the reference is all there is."""
+        return all(isinstance(part, _Kept) for part in self.parts)
+
+    @staticmethod
     def streamed(
         logs: Sequence[LogSource], how: Conditioning, options: Options, workers: Workers | None = None
     ) -> Data:
@@ -174,6 +213,12 @@ class Data:
         if not parts:
             condition([logs[0].read()], how, noise)  # says which run is too short
         return Data(parts, _joined(reference), workers)
+
+    def sampled(self, count: int) -> Data:
+        """At most so many chunks, evenly; all samples in one where they are in memory."""
+        if self.in_memory:
+            return replace(self, parts=[_Kept(self.reference)])
+        return replace(self, parts=self.parts[:: max(1, -(-len(self.parts) // count))])
 
     def map(self, function: Callable[[Chunk], Answer]) -> Iterator[Answer]:
         """The function's answers for all chunks, in order."""
@@ -229,7 +274,15 @@ def _joined(chunks: Sequence[Chunk]) -> Chunk:
     )
     tau, moving = (np.concatenate([getattr(s, key) for s in samples]) for key in ("tau", "moving"))
     first = samples[0]
-    whole = Samples(Motion(time, q, v, vdot, starts), tau, moving, first.period, first.cutoff_hz)
+    spans = [s.spans for s in samples if s.spans is not None]
+    whole = Samples(
+        Motion(time, q, v, vdot, starts),
+        tau,
+        moving,
+        first.period,
+        first.cutoff_hz,
+        np.concatenate(spans) if len(spans) == len(samples) else None,
+    )
     return Chunk(
         whole,
         np.concatenate([c.blocks for c in chunks]),

@@ -25,7 +25,7 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         shared: whether its coefficients serve all joints.
     """
     samples = data.reference.samples
-    if not in_memory(data):
+    if not data.in_memory:
         # a selection cannot be filtered; its columns are taken as they are
         samples = replace(samples, cutoff_hz=0.0)
     if model.effects:
@@ -33,11 +33,6 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
         samples = replace(samples, tau=samples.tau - smooth(samples, bare))
     return standard_errors(model, samples, fitted_rows(data, found, shared))
-
-
-def in_memory(data: Data) -> bool:
-    """Whether the reference is all there is."""
-    return len(data.parts) == 1 and getattr(data.parts[0], "kept", None) is data.reference
 
 
 def fitted_rows(data: Data, found: Found, shared: bool) -> list[Fitted]:

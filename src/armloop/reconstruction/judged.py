@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -26,12 +25,10 @@ def held_out_parts(model: ReconstructedModel, data: Data, part: Part = "all") ->
         model: one that has not been fitted on them.
         part: which of the held-out blocks.
     """
-    parts = data.parts[:: max(1, -(-len(data.parts) // _CHUNKS))]
+    data = data.sampled(_CHUNKS)
     scales = Scales.of(data.reference.samples.motion)
-    most = max(1, MOST // len(parts))
-    return parts_of(
-        replace(data, parts=parts).sum(partial(_witness, model=model, part=part, scales=scales, most=most))
-    )
+    most = max(1, MOST // len(data.parts))
+    return parts_of(data.sum(partial(_witness, model=model, part=part, scales=scales, most=most)))
 
 
 def _witness(chunk: Chunk, model: ReconstructedModel, part: Part, scales: Scales, most: int) -> Witness:

@@ -190,7 +190,7 @@ class _Problem:
 
 def _choose(library: EnergyTerms, samples: Samples, rows: Rows, options: Options) -> Index:
     """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual."""
-    judged = folds(samples.motion, options.folds, options.block_seconds) == 1
+    judged = folds(samples, options.folds, options.block_seconds) == 1
     sparse = rows & independent_rows(samples)[:, None]
     fit = _problem(library, samples, sparse & ~judged[:, None])
     judge = _problem(library, samples, sparse & judged[:, None])

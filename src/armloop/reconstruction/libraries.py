@@ -17,10 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.arm import Arm
 from armloop.components import Lagrangian, RigidBody, SparseTerms
 from armloop.dynamics.physics import PhysicsChecks, check_physics
 from armloop.errors import InputError
+from armloop.library.lagrangian import candidates as energies
+from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
+from armloop.pieces import LogSource
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.shared import motion_range
@@ -139,6 +143,25 @@ class Contender:
         }
 
 
+def undetermined(library: str, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
+    """Why a library's candidates cannot be told apart by the logs; empty where they may be.
+
+    Torque below a corner takes four values per period of it, each joint apart (:func:`armloop.signals.independent_rows`).
+    Fewer values than candidates determine none of them, and the search among them takes longest.
+    """
+    if library != "lagrangian":
+        return ""
+    seconds = sum(float(np.ptp(log.time[run])) for log in map(_read, logs) for run in log.runs())
+    values, count = int(4 * cutoff_hz * seconds * arm.n), energies(arm).count
+    if count <= values:
+        return ""
+    return f"{count} candidates, but {values} independent values of torque"
+
+
+def _read(source: LogSource) -> MotionLog:
+    return source.read()
+
+
 def contender(library: str, attempt: Callable[[str], Attempt]) -> Contender:
     """Try a library; one that the logs do not carry is refused with the reason.
 
@@ -196,10 +219,11 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
         f"{one.library} {one.error:.2%}" if one.attempt else f"{one.library} not tried ({one.refused})"
         for one in others
     ]
-    notes = [
-        f"library {taken.library}: it leaves {taken.error:.2%} (nRMSE) on the blocks that choose the library; "
-        + ", ".join(parts)
-    ]
+    if np.isfinite(taken.error):
+        reason = f"it leaves {taken.error:.2%} (nRMSE) on the blocks that choose the library"
+    else:
+        reason = "the only one that the logs can determine"
+    notes = [f"library {taken.library}: {reason}; {', '.join(parts)}"]
     for one in others:
         if one.checks is not None and not one.passed and one.error < taken.error:
             notes.append(f"{one.library} leaves less but is no arm: {'; '.join(one.checks.faults())}")

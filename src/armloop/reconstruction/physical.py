@@ -21,7 +21,7 @@ from armloop.errors import ExcitationError
 from armloop.library.friction import FrictionTerm
 from armloop.motion import Motion
 from armloop.reconstruction.pooled import Solution
-from armloop.regression.constrained import Cuts, constrained_least_squares
+from armloop.regression.constrained import Cuts, TooCostly, constrained_least_squares
 
 Array = NDArray[np.float64]
 
@@ -98,9 +98,14 @@ def physical_solution(
     beyond = rng.uniform(body.low, body.high, (_BEYOND, len(body.low)))
     tried = ((LIMITS, np.concatenate([body.seen, beyond])), (TRAINED, body.seen))
     failed: ArithmeticError | None = None
+    # no more conditions can bind than there are shared coefficients, and bounds of them
+    conditions = len(body.positive) + int(body.positive.sum())
+    most = np.inf if insist else float(chi2.ppf(_CHANCE, conditions)) * solution.repeats
     for where, q in tried:
         try:
-            theta, binding = _kept_positive(solution, body, laws, q, rng if where == LIMITS else None)
+            theta, binding = _kept_positive(solution, body, laws, q, rng if where == LIMITS else None, most)
+        except TooCostly:
+            continue
         except ArithmeticError as error:
             failed = error
             continue
@@ -112,13 +117,23 @@ def physical_solution(
             "the motion tells too little: no physically possible inertial parameters can be found for it; log "
             "exciting motion of all joints, each moving apart from the others"
         ) from failed
-    return PhysicalSolution(solution.theta, binding, FREE)
+    return PhysicalSolution(solution.theta, 0, FREE)
 
 
 def _kept_positive(
-    solution: Solution, body: Body, laws: list[list[FrictionTerm]], q: Array, rng: np.random.Generator | None
+    solution: Solution,
+    body: Body,
+    laws: list[list[FrictionTerm]],
+    q: Array,
+    rng: np.random.Generator | None,
+    most: float,
 ) -> tuple[Array, int]:
-    """Coefficients with M positive definite at postures q and, with ``rng``, at all that a search finds, too."""
+    """Coefficients with M positive definite at postures q and, with ``rng``, at all that a search finds, too.
+
+    Raises:
+        TooCostly: that adds more than ``most`` to the squared error.
+        ArithmeticError: there are none.
+    """
     rows: list[Array] = []
     mass, start, r = body.mass(q), solution.theta, len(body.positive)
     for _ in range(_SEARCHES):
@@ -129,7 +144,7 @@ def _kept_positive(
             rows.extend(row for row in found if np.count_nonzero(row) > 1)
             return found
 
-        theta, _ = constrained_least_squares(solution.G, solution.b, start, recorded)
+        theta, _ = constrained_least_squares(solution.G, solution.b, start, recorded, most)
         if rng is None:
             break
         q = rng.uniform(body.low, body.high, (_TRIED, len(body.low)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,14 @@ from armloop.model import ReconstructedModel
 from armloop.motion import Samples
 from armloop.pieces import IN_MEMORY, LogSource
 from armloop.progress import Progress, silent
-from armloop.reconstruction.apart import Apart, independent_blocks
-from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth
+from armloop.reconstruction.apart import FEWEST_BLOCKS, Apart, independent_blocks
+from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_bandwidth, highest_corner
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
-from armloop.reconstruction.fitted import in_memory as kept_in_memory
 from armloop.reconstruction.fitted import uncertainty
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
+from armloop.reconstruction.held_out import held_out_intervals
 from armloop.reconstruction.judged import held_out_parts
 from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.libraries import (
@@ -37,6 +38,7 @@ from armloop.reconstruction.libraries import (
     choose,
     comparison_notes,
     contender,
+    undetermined,
 )
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.rigid_body import rigid_body
@@ -48,7 +50,7 @@ from armloop.reconstruction.stepwise import stepwise_on
 from armloop.reconstruction.tally import Part
 from armloop.reconstruction.torque_checks import check_torques
 from armloop.scoring import Score
-from armloop.signals import Conditioning, condition
+from armloop.signals import Conditioning
 from armloop.workers import Workers
 
 METHODS = ("stepwise", "sindy")
@@ -169,27 +171,27 @@ def reconstruct(
     time_series = conditioning is None or conditioning.cutoff_hz > 0
     if library is None and (not time_series or (large and arm.n <= MOST_JOINTS)):
         library = candidates(arm, settings)[0]
-    apart: Apart | None = None
-
-    if conditioning is None:
-        progress("choosing the low-pass on held-out blocks")
-        bandwidth = choose_bandwidth(kept or logs, arm, Conditioning())
-    else:
-        bandwidth = Bandwidth(conditioning.cutoff_hz)
+    if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
+    wanted = candidates(arm, settings) if library is None else [library]
+    usual = [conditioning or default_conditioning(one) for one in wanted]
+    bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
+    settings = replace(settings, block_seconds=apart.seconds)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
-    def attempt(library: str) -> Attempt:
-        nonlocal apart, settings
+    refused = {one: undetermined(one, arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
+    refused = {} if library is not None else {one: why for one, why in refused.items() if why}
+    left = [one for one in wanted if one not in refused]
+    few = len(left) > 1 and _are_few(kept, bandwidth.suited(usual[0]), settings)
+
+    def attempt(library: str, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(default_conditioning(library))
         progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
-        if apart is None:
-            apart = independent_blocks(arm, kept or logs, how, settings.block_seconds, settings.folds)
-            settings = replace(settings, block_seconds=apart.seconds)
         if large and method == "stepwise" and library == "double-feature-set":
             data = Data.streamed(logs, how, settings, workers)
         else:
-            data = Data.of(condition(kept or [log.read() for log in logs], how), settings)
+            data = Data.kept(kept or [log.read() for log in logs], how, settings)
+            data = data.nested() if nested else data
         check_recorded(arm, data.reference.samples)
         found = _found(arm, data, method, library, settings, progress)
         if bandwidth.trials:
@@ -197,11 +199,64 @@ def reconstruct(
         found.notes += bandwidth.notes()
         return Attempt(library, how, data, found, apart.margin)
 
-    if library is not None:
-        tried = [Contender(library, attempt(library), chosen=True)]
-    else:
-        tried = choose([contender(one, attempt) for one in candidates(arm, settings)])
-    return _finished(tried, arm, method, logs, settings, progress, recorded, apart)
+    if len(left) == 1:
+        tried = [Contender(one, refused=refused.get(one, "")) for one in wanted]
+        tried = [
+            one if one.refused else replace(one, attempt=attempt(one.library), chosen=True) for one in tried
+        ]
+        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, apart)
+    tried = [
+        Contender(one, refused=refused[one])
+        if one in refused
+        else contender(one, partial(attempt, nested=few))
+        for one in wanted
+    ]
+    tried = choose(tried)
+    if few:
+        tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
+    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, apart)
+
+
+def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> bool:
+    """Whether half of the held-out blocks are too few to judge by; a fold of the others then chooses the library."""
+    count = sum(map(len, held_out_intervals(logs, [how], options)))
+    return bool(logs) and options.folds > 2 and count < 2 * FEWEST_BLOCKS
+
+
+def held_apart(
+    logs: Sequence[LogSource],
+    arm: Arm,
+    usual: Sequence[Conditioning],
+    options: Options,
+    choosing: bool,
+    progress: Progress,
+) -> tuple[Bandwidth, Apart]:
+    """The low-pass, and the blocks that are held out: from it, too.
+
+    How long blocks must be depends on the low-pass, and they are held out from its choice: where a lower corner asks for
+    longer ones, it is chosen anew.
+
+    Args:
+        usual: filters of the libraries that are going to be regressed.
+        choosing: whether the corner is chosen; else it is the usual one.
+    """
+
+    def blocks(bandwidth: Bandwidth) -> Apart:
+        return independent_blocks(arm, logs, bandwidth.suited(usual[0]), options.block_seconds, options.folds)
+
+    if not choosing:
+        bandwidth = Bandwidth(usual[0].cutoff_hz)
+        return bandwidth, blocks(bandwidth)
+    progress("choosing the low-pass on blocks that judge nothing else")
+    bandwidth = Bandwidth(highest_corner(logs, Conditioning()))
+    seconds, apart = 0.0, blocks(bandwidth)
+    while apart.seconds > seconds:
+        seconds, before = apart.seconds, bandwidth.cutoff_hz
+        dealt = replace(options, block_seconds=seconds)
+        bandwidth = choose_bandwidth(logs, arm, Conditioning(), dealt, usual)
+        if bandwidth.cutoff_hz != before:
+            apart = blocks(bandwidth)
+    return bandwidth, apart.within(seconds)
 
 
 def _found(arm: Arm, data: Data, method: str, library: str, options: Options, progress: Progress) -> Found:
@@ -217,19 +272,20 @@ def _found(arm: Arm, data: Data, method: str, library: str, options: Options, pr
 
 def _finished(
     libraries: list[Contender],
+    part: Part,
     arm: Arm,
     method: str,
     logs: Sequence[LogSource],
     options: Options,
     progress: Progress,
     recorded: dict[str, Any] | None,
-    apart: Apart | None,
+    apart: Apart,
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if method == "stepwise" and kept_in_memory(data):
+    if method == "stepwise" and data.in_memory:
         bare = ReconstructedModel(
             arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
         )
@@ -239,7 +295,7 @@ def _finished(
         for one in (found, *([] if found.final is None else [found.final])):
             one.effects = (*one.effects, *ripple)
     notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
-    if apart is not None and apart.too_short:
+    if apart.too_short:
         notes.append(
             f"the residual remembers for {apart.correlation:.2g} s, and the logs are too short for held-out blocks of more "
             f"than {apart.seconds:.2g} s: the held-out error may be too good"
@@ -260,7 +316,6 @@ def _finished(
             **found.history,
         },
     )
-    part: Part = "test" if compared else "all"
     tally = tried.tally(found.sorter, part)
     parts = []
     if options.parts:
@@ -290,4 +345,4 @@ def _finished(
 
 def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:
     """(N,) every ``folds``-th block, which no step may fit."""
-    return folds(samples.motion, options.folds, options.block_seconds) == 0
+    return folds(samples, options.folds, options.block_seconds) == 0

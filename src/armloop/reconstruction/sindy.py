@@ -52,7 +52,7 @@ def sindy(
             "regression; log runs in which every joint moves"
         )
     rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
-    validation = folds(samples.motion, options.folds, options.block_seconds)[rows] == 1
+    validation = folds(samples, options.folds, options.block_seconds)[rows] == 1
     fit, check = rows[~validation], rows[validation]
     scale = np.sqrt(np.mean(samples.tau[rows] ** 2, axis=0))
     trials: list[tuple[list[int], float]] = []

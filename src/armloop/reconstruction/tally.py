@@ -78,7 +78,9 @@ class Tally:
         n = squares.shape[1]
         blocks = np.zeros((0, 2, n))
         if samples.cutoff_hz > 0 and held.any():
-            pieces = chunk.blocks if seconds is None else block_numbers(samples.motion, seconds)
+            pieces = (
+                chunk.blocks if seconds is None else block_numbers(samples.motion, seconds, samples.spans)
+            )
             keys = np.column_stack([chunk.blocks[held], pieces[held]])
             index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
             blocks = np.zeros((int(index.max()) + 1, 2, n))

@@ -1,8 +1,9 @@
-"""Least squares under linear inequalities, by osqp; constraints that nobody violates cost nothing.
+"""Least squares under linear inequalities, by an active-set method; constraints that nobody violates cost nothing.
 
-osqp takes first-order steps, which crawl where many constraints are nearly parallel, as those of a matrix that is
-all but singular. Then an active-set method ends the work: the projection z of z₀ onto {A z ≥ 0} is z₀ + Aᵀλ with
-the λ ≥ 0 that minimises ‖z₀ + Aᵀλ‖ (Moreau 1962; Lawson and Hanson, Solving Least Squares Problems, 1974).
+Whitened, the problem is the projection of z₀ onto the cone {A z ≥ 0}, which is z₀ + Aᵀλ with the λ ≥ 0 that minimise
+‖z₀ + Aᵀλ‖ (Moreau 1962): non-negative least squares (Lawson and Hanson, Solving Least Squares Problems, 1974). That is
+exact after finitely many steps, where first-order steps crawl along constraints that are nearly parallel, as those of a
+matrix that is all but singular are.
 """
 
 from __future__ import annotations
@@ -10,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import osqp
 from numpy.typing import NDArray
-from scipy import sparse
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
@@ -23,13 +22,17 @@ Cuts = Callable[[Array], Array]
 
 _ROUNDS = 20
 _TOLERANCE = 1e-9
-#: What a constraint may be violated by in the end, relative to the size of its addends: what osqp leaves.
+#: What a constraint may be violated by in the end, relative to the size of its addends.
 _FEASIBLE = 1e-6
-#: Steps of osqp before the active-set method takes over.
-_STEPS = 2000
 
 
-def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> tuple[Array, int]:
+class TooCostly(ArithmeticError):
+    """The constraints cost more squared error than was allowed."""
+
+
+def constrained_least_squares(
+    G: Array, b: Array, start: Array, cuts: Cuts, most: float = np.inf
+) -> tuple[Array, int]:
     """Minimise θᵀGθ − 2bᵀθ subject to c·θ ≥ 0 for every row that ``cuts`` ever returns.
 
     Constraints are added only where the current solution violates them (cutting planes), which also
@@ -39,11 +42,13 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
         G, b: (p, p), (p,) normal equations.
         start: (p,) the unconstrained solution.
         cuts: violated rows for a given θ.
+        most: squared error above that of ``start`` at which the search ends; further constraints only add to it.
 
     Returns:
         θ, and the number of constraints that were needed (0: ``start`` itself).
 
     Raises:
+        TooCostly: what the constraints cost exceeds ``most``.
         ArithmeticError: no solution is found, or the last one still violates a constraint.
     """
     # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
@@ -51,16 +56,20 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
     scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
     L = np.linalg.cholesky(G * np.outer(scale, scale) + 1e-12 * np.eye(len(b)))
     target = solve_triangular(L, scale * b, lower=True)
+    free = float(np.sum((L.T @ (start / scale) - target) ** 2))
     theta, rows = start, np.zeros((0, len(b)))
     for _ in range(_ROUNDS):
         violated = cuts(theta)
         if len(violated) == 0:
             return theta, len(rows)
-        rows = np.vstack([rows, violated])
+        rows = np.unique(np.vstack([rows, violated]), axis=0)
         A = solve_triangular(L, (rows * scale).T, lower=True).T
         A /= np.linalg.norm(A, axis=1, keepdims=True)
         z = _nearest(target, A)
-        theta = scale * solve_triangular(L, z, lower=True, trans="T")
+        theta = _bounded(scale * solve_triangular(L, z, lower=True, trans="T"), rows)
+        cost = float(np.sum((z - target) ** 2)) - free
+        if cost > most:
+            raise TooCostly(f"the constraints cost {cost:.3g}")
     left = cuts(theta)
     if len(left):
         sizes = np.maximum(np.abs(left * theta).sum(axis=1), 1e-300)
@@ -72,27 +81,19 @@ def constrained_least_squares(G: Array, b: Array, start: Array, cuts: Cuts) -> t
     return theta, len(rows)
 
 
+def _bounded(theta: Array, rows: Array) -> Array:
+    """θ with bounds of single coefficients met to the last digit: what is undetermined magnifies round-off."""
+    single = rows[np.count_nonzero(rows, axis=1) == 1]
+    above, below = (single > 0).any(axis=0), (single < 0).any(axis=0)
+    theta = np.where(above, np.maximum(theta, 0.0), theta)
+    return np.where(below, np.minimum(theta, 0.0), theta)
+
+
 def _nearest(target: Array, A: Array) -> Array:
     """The point nearest to ``target`` with A z ≥ 0."""
     size = max(float(np.abs(target).max()), 1e-300)
-    problem = osqp.OSQP()
-    problem.setup(
-        sparse.identity(len(target), format="csc"),
-        -target / size,
-        sparse.csc_matrix(A),
-        np.zeros(len(A)),
-        np.full(len(A), np.inf),
-        verbose=False,
-        eps_abs=_TOLERANCE,
-        eps_rel=_TOLERANCE,
-        max_iter=_STEPS,
-        polishing=True,
-    )
-    result = problem.solve(raise_error=False)
-    if result.info.status == "solved":
-        return size * np.asarray(result.x)
     try:
         pushes, _ = nnls(A.T, -target / size, maxiter=30 * len(A))
     except RuntimeError as error:
-        raise ArithmeticError(f"osqp: {result.info.status}; nnls: {error}") from error
+        raise ArithmeticError(f"nnls: {error}") from error
     return np.asarray(target + size * (A.T @ pushes))

@@ -86,7 +86,7 @@ def controller(name: str) -> str:
     if name in _OTHER_CONTROLLERS:
         return _OTHER_CONTROLLERS[name]
     rest = name.removeprefix("pid_")
-    return f"PID + {_STEPS.get(rest, rest)}"
+    return name.replace("_", " ") if rest == name else f"PID + {_STEPS.get(rest, rest)}"
 
 
 def effect_name(name: str, joint: int | None, other_joint: int | None = None) -> str:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from armloop.drake_systems.collection import collect, measure_run
+from armloop.drake_systems.controllers import Exact
 from armloop.drake_systems.scenarios import load_plan, load_tracking
-from armloop.drake_systems.tracking import EXACT, TrackingResult, track
+from armloop.drake_systems.tracking import TrackingResult, track
 from armloop.excitation import paper_reference
 from armloop.model import ReconstructedModel
 from armloop.motion import Samples
@@ -20,6 +21,7 @@ from armloop.signals import condition, smooth
 
 SCENARIO = "three_axis_tracking"
 #: The paper's, and PID with the plant's own inverse dynamics, which no reconstruction should be asked to beat.
+EXACT = Exact.name
 CONTROLLERS = (*paper.ETA_DEG, EXACT)
 
 
