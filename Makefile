@@ -1,5 +1,5 @@
 # make setup   create .venv with everything in it, from requirements.lock
-# make loop    the main job, start to end; results in out/loop
+# make loop    the main job, start to end, in out/loop; and on measured data, in out/measured
 # make test    style, types and tests
 # make docs    the documentation, tutorials executed, in out/site
 # make bench   the benchmarks' ratios
@@ -44,8 +44,14 @@ $(TESTING): requirements-test.lock $(INSTALLED)
 	@grep '^[^#]' requirements-test.lock | xargs $(BIN)/pip install -qq --no-deps
 	@touch $@
 
+# The measured loop needs one core for half a minute, which the other leaves idle now and then; it is told afterwards.
 loop: setup
-	$(BIN)/armloop loop --out out/loop
+	@mkdir -p out
+	@nice $(BIN)/armloop loop --measured --out out/measured >out/measured.txt 2>&1 & measured=$$!; \
+	trap 'kill $$measured 2>/dev/null' INT TERM; \
+	echo "$(BIN)/armloop loop --out out/loop"; $(BIN)/armloop loop --out out/loop || { kill $$measured; exit 1; }; \
+	echo "$(BIN)/armloop loop --measured --out out/measured"; \
+	wait $$measured; status=$$?; cat out/measured.txt; exit $$status
 
 test: setup $(TESTING)
 	$(BIN)/ruff check .
@@ -77,8 +83,9 @@ mutants: setup $(TESTING)
 
 # Whole loops with an effect hidden from a seed, and clean ones: how often the verdict is right (about ten minutes).
 blind: setup $(TESTING)
-	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5
-	$(BIN)/python tests/blind/run.py --arms 20 --cases 16
+	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5 --keep out/blind/loops
+	$(BIN)/python tests/blind/run.py --arms 20 --cases 16 --keep out/blind/arms
+	$(BIN)/python tests/blind/run.py --outside --arms 12 --cases 8 --keep out/blind/outside
 
 clean:
 	rm -rf $(VENV) out dist

@@ -4,6 +4,7 @@ Every seed is a whole loop without the tracking: its own data collection, its ow
 own second run. Clean runs have nothing hidden in them. The diagnosis is handed the model's file and the log.
 
     python tests/blind/loops.py --seeds 20 --clean 5
+    python tests/blind/loops.py --keep DIR     keep finished loops, and go on with the rest
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import argparse
 import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from threadpoolctl import threadpool_limits
 from armloop.diagnosis import diagnose
 from armloop.drake_systems.collection import collect, measure_run
 from armloop.drake_systems.scenarios import load_plan, load_plant
+from armloop.keeping import Kept
 from armloop.log import read_log, write_log
 from armloop.loop.undeclared import draw
 from armloop.model import load_model
@@ -86,12 +88,20 @@ def main() -> int:
     parser.add_argument("--arm", default="three_axis")
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--clean", type=int, default=5)
+    parser.add_argument("--keep", default=None, metavar="DIR", help="keep what is finished here")
     options = parser.parse_args()
+    kept = Kept(Path(options.keep) if options.keep else None, Path(__file__).read_text(encoding="utf-8"))
     jobs = [(options.arm, seed, False) for seed in range(1, options.seeds + 1)]
     jobs += [(options.arm, 100 + seed, True) for seed in range(1, options.clean + 1)]
     cases = []
+    found = {job: kept.get(job) for job in jobs}
     with ProcessPoolExecutor(2, get_context("fork")) as workers:
-        for case in workers.map(run, *zip(*jobs, strict=True)):
+        made = {job: workers.submit(run, *job) for job in jobs if found[job] is None}
+        for job in jobs:
+            if job in made:
+                found[job] = asdict(made[job].result())
+                kept.put(job, found[job])
+            case = Case(**found[job])
             cases.append(case)
             verdict = "right" if case.right else "WRONG"
             print(

@@ -6,7 +6,8 @@ hidden in it. The logs go into one folder, what is hidden into another: the diag
 that is handed the path of the logs alone, and the answers are opened when all verdicts are in.
 
     python tests/blind/run.py --arms 20 --cases 16
-    python tests/blind/run.py --arms 20 --keep DIR     keep logs, models and answers
+    python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
+    python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
 
@@ -29,14 +30,21 @@ from threadpoolctl import threadpool_limits
 
 from armloop.drake_systems.scenarios import load_plan
 from armloop.errors import InputError
+from armloop.keeping import Kept
 
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path) -> str:
+def make(seed: int, cases: int, place: Path, outside: bool = False) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
+        if outside:
+            sys.path.insert(0, str(Path(__file__).parents[1]))
+            from outside_generate import generate_outside
+
+            generate_outside(seed, cases, place / "logs", place / "answers")
+            return ""
         generate(seed, cases, load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
         return str(error)
@@ -66,6 +74,7 @@ def main() -> int:
     parser.add_argument("--arms", type=int, default=20)
     parser.add_argument("--cases", type=int, default=16, help="runs per arm")
     parser.add_argument("--first", type=int, default=1, help="seed of the first arm")
+    parser.add_argument("--outside", action="store_true", help="arms simulated by MuJoCo instead of our own")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", default=None, metavar="DIR", help="keep logs, models and answers here")
     parser.add_argument("--again", default=None, metavar="DIR", help="judge the kept logs of DIR once more")
@@ -75,26 +84,44 @@ def main() -> int:
         ProcessPoolExecutor(options.processes, get_context("fork")) as workers,
     ):
         place = Path(options.again or options.keep or temporary)
+        # --again is asked for to judge once more
+        scripts = {
+            path.name: path.read_text(encoding="utf-8") for path in sorted(VERDICTS.parent.glob("*.py"))
+        }
+        kept = Kept(Path(options.keep) if options.keep and not options.again else None, scripts)
         if not options.again:
             seeds = range(options.first, options.first + options.arms)
-            made = {seed: workers.submit(make, seed, options.cases, place) for seed in seeds}
-            for seed, job in made.items():
-                if job.result():
-                    _say(f"arm {seed} cannot be used: {job.result()}")
-            _say(f"{options.cases} runs of each of {len(made)} arms are simulated")
+            reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
+            made = {
+                s: workers.submit(make, s, options.cases, place, options.outside)
+                for s in seeds
+                if reasons[s] is None
+            }
+            for seed in seeds:
+                if seed in made:
+                    reasons[seed] = made[seed].result()
+                    kept.put(["made", seed, options.cases], reasons[seed])
+                if reasons[seed]:
+                    _say(f"arm {seed} cannot be used: {reasons[seed]}")
+            _say(f"{options.cases} runs of each of {len(seeds)} arms are simulated")
         folders = sorted((place / "logs").iterdir())
-        jobs = [
-            workers.submit(judge, folder, Path(temporary) / f"{folder.name}.json")
+        folders = [folder for folder in folders if list(folder.glob("run_*.csv"))]
+        found = {folder.name: kept.get(["judged", folder.name, options.cases]) for folder in folders}
+        jobs = {
+            folder.name: workers.submit(judge, folder, Path(temporary) / f"{folder.name}.json")
             for folder in folders
-            if list(folder.glob("run_*.csv"))
-        ]
+            if found[folder.name] is None
+        }
         verdicts: dict[str, dict[str, Any]] = {}
-        for k, job in enumerate(jobs):
+        for k, (name, given) in enumerate(found.items()):
             try:
-                verdicts |= job.result()
+                if given is None:
+                    given = jobs[name].result()
+                    kept.put(["judged", name, options.cases], given)
+                verdicts |= given
             except RuntimeError as error:
                 _say(str(error))
-            _say(f"{k + 1}/{len(jobs)} arms judged")
+            _say(f"{k + 1}/{len(found)} arms judged")
         if options.keep or options.again:
             (place / "verdicts.json").write_text(json.dumps(verdicts, indent=1), encoding="utf-8")
         sealed = {

@@ -15,6 +15,7 @@ HERE = Path(__file__).parent
 # Scripts that import each other by name, as they do when they are run.
 sys.path.insert(0, str(HERE))
 
+import loops  # noqa: E402
 from generate import generate  # noqa: E402
 from judge import LARGE, Case, is_right  # noqa: E402
 from run import judge  # noqa: E402
@@ -53,6 +54,27 @@ def test_verdicts_are_right_without_the_answers(cases: dict[str, Case]) -> None:
 def test_no_false_alarms(cases: dict[str, Case]) -> None:
     clean = [verdict for hidden, verdict in cases.values() if hidden["kind"] == "clean"]
     assert all(verdict["verdict"] == "no_effect" for verdict in clean)
+
+
+def test_finished_loops_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = tmp_path / "made"
+
+    def run(arm: str, seed: int, clean: bool) -> loops.Case:
+        with made.open("a") as file:
+            file.write(f"{seed} ")
+        if seed == 3 and made.read_text().split().count("3") == 1:
+            raise KeyboardInterrupt
+        return loops.Case(seed, "nothing", "nothing", True, "", 1.0, 1.0)
+
+    run.__module__, run.__qualname__ = loops.__name__, "run"  # as the processes look for it
+    monkeypatch.setattr(loops, "run", run)
+    monkeypatch.setattr(
+        sys, "argv", ["loops.py", "--seeds", "3", "--clean", "0", "--keep", str(tmp_path / "k")]
+    )
+    with pytest.raises(KeyboardInterrupt):
+        loops.main()
+    assert loops.main() == 0
+    assert sorted(made.read_text().split()) == ["1", "2", "3", "3"]
 
 
 def test_the_judging_process_imports_nothing_of_the_generator() -> None:

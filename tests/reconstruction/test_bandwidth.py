@@ -12,8 +12,8 @@ from armloop.cli import main
 from armloop.errors import LogError
 from armloop.log import MotionLog, read_log, write_log
 from armloop.model import load_model
-from armloop.reconstruction import reconstruct
-from armloop.reconstruction.bandwidth import choose_bandwidth
+from armloop.reconstruction import bandwidth, reconstruct
+from armloop.reconstruction.bandwidth import Table, choose_bandwidth
 from armloop.reconstruction.options import Options
 from armloop.signals import Conditioning
 
@@ -116,3 +116,19 @@ def test_measured_arms_get_the_corner_that_suits_them(measured: Path) -> None:
     assert (
         4.5 <= choose_bandwidth(panda, load_arm(measured / "panda" / "panda.urdf"), shared).cutoff_hz <= 9.5
     )
+
+
+def test_a_block_is_judged_with_what_the_blocks_beside_it_showed_alone() -> None:
+    """Noise, and columns enough to fit much of it: what was fitted would leave less than all, what was not leaves more."""
+    rng = np.random.default_rng(4)
+    instants, joints, columns = 400, 2, 160
+    table = Table(
+        rng.standard_normal((instants, joints, columns)),
+        rng.standard_normal((instants, joints)),
+        np.arange(instants) // 10,
+        np.ones((instants, joints), dtype=bool),
+    )
+    # of R rows and p columns, what is fitted leaves 1 − p/R of the energy, what is not 1 + p/(R − p − 1)
+    left = bandwidth._held_out(table)
+    rows = instants * joints / 2
+    np.testing.assert_allclose(left**2, 1 + columns / (rows - columns - 1), rtol=0.25)

@@ -104,6 +104,18 @@ def test_broken_and_foreign_logs_are_set_aside_with_their_reason(fleet: Path, tm
     assert (again.counts.read, len(again.aside)) == (1, 2)
 
 
+def test_the_folder_of_one_arm_is_taken_for_its_logs(fleet: Path, tmp_path: Path) -> None:
+    for of_one in ("healthy", "loaded"):
+        (file, *_) = find_logs([fleet / "logs" / of_one])
+        outcome = watch(fleet / "models", [file], tmp_path / of_one, Options(full=False))
+        assert [arm["arm"] for arm in outcome.arms] == [of_one] and not outcome.aside
+    stray = tmp_path / "stray"
+    stray.mkdir()
+    shutil.copy(file.path, stray)
+    outcome = watch(fleet / "models", find_logs([stray]), tmp_path / "store", Options(full=False))
+    assert "put it into a folder named after the arm" in outcome.aside[0]["reason"]
+
+
 def test_arm_programme_and_warmth_come_from_columns(fleet: Path, tmp_path: Path) -> None:
     import pyarrow
     import pyarrow.parquet

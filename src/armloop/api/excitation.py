@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from armloop.api.reading import as_arm
 from armloop.api.shown import page
 from armloop.arm import Arm, load_arm
-from armloop.design import Excitation, Settings
+from armloop.design import Excitation, Settings, baseline_noise
 from armloop.design import excite as run
 from armloop.errors import InputError
 from armloop.excitation import MotionRanges, ranges_with, write_reference
@@ -113,6 +113,7 @@ def excite(
     """
     arm = as_arm(arm)
     chosen = library or default_library(arm)
+    given = None if noise is None else tuple(map(float, noise))
     settings = Settings(
         library=chosen,
         criterion=criterion,
@@ -121,7 +122,7 @@ def excite(
         harmonics=harmonics,
         order=order,
         reserve=reserve,
-        noise=_noise(noise, model),
+        noise=baseline_noise(model.baseline.get("rmse")) if noise is None and model is not None else given,
         cutoff_hz=default_conditioning(chosen).cutoff_hz,
         starts=starts,
         random=random,
@@ -144,10 +145,3 @@ def _plants(arm: Arm) -> MotionRanges | None:
     from armloop.drake_systems.scenarios import load_plant
 
     return load_plant(arm.name).config.ranges
-
-
-def _noise(noise: Sequence[float] | None, model: ReconstructedModel | None) -> tuple[float, ...] | None:
-    if noise is not None:
-        return tuple(map(float, noise))
-    rmse = [] if model is None else model.baseline.get("rmse") or []
-    return tuple(float(x) for x in rmse) if rmse and all(rmse) else None

@@ -82,7 +82,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Design an exciting reference and write it."""
     from armloop.commands.shared import arm_of, out_file, print_json, progress
-    from armloop.design import Settings, excite
+    from armloop.design import Settings, baseline_noise, excite
     from armloop.errors import InputError
     from armloop.excitation import write_reference
     from armloop.files import write_text
@@ -104,7 +104,7 @@ def run(options: argparse.Namespace) -> None:
     model = load_model(options.model, arm) if options.model else None
     noise = numbers(options.noise, "--noise", arm)
     if noise is None and model is not None:
-        noise = _baseline_noise(model.baseline.get("rmse"))
+        noise = baseline_noise(model.baseline.get("rmse"))
     settings = Settings(
         library=library,
         criterion=options.criterion,
@@ -146,10 +146,3 @@ def run(options: argparse.Namespace) -> None:
     for note in result.notes:
         print(f"note: {note}")
     print(f"reference written to {options.out}, {rows} rows")
-
-
-def _baseline_noise(rmse: list[float | None] | None) -> tuple[float, ...] | None:
-    """What a model leaves on its own data, as noise; None where it does not say for every joint."""
-    if not rmse or not all(rmse):
-        return None
-    return tuple(float(x) for x in rmse if x)

@@ -12,7 +12,7 @@ from armloop.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
 from armloop.design.optimise import Design, Problem
 from armloop.design.random import random_references
 from armloop.design.series import Series, sampled
-from armloop.design.settings import Settings, Timing
+from armloop.design.settings import Settings, Timing, baseline_noise
 
 __all__ = [
     "CRITERIA",
@@ -30,6 +30,7 @@ __all__ = [
     "Timing",
     "TorqueLaw",
     "amount_needed",
+    "baseline_noise",
     "check_rest",
     "condition_number",
     "data_ratio",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armloop.design.criteria import CRITERIA
@@ -133,3 +134,8 @@ def _period(duration: float, base_frequency: float | None) -> tuple[float, int]:
             f"{periods / base_frequency:g} s"
         )
     return 1 / base_frequency, periods
+
+
+def baseline_noise(rmse: Sequence[float | None] | None) -> tuple[float, ...] | None:
+    """What a model leaves on its own data (n,), as the noise of each joint's torque; None where it does not say for all."""
+    return tuple(float(x) for x in rmse if x) if rmse and all(rmse) else None

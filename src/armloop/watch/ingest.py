@@ -115,7 +115,7 @@ def _put_aside(
 
 
 def _whose(file: LogFile, models: dict[str, Path]) -> tuple[str, str]:
-    """Arm and programme of a log: its folder's, else its columns', else the only model's."""
+    """Arm and programme of a log: its folder's below DIR, else its columns', else the only model's, else DIR's name."""
     arm, programme = file.arm, file.programme
     if not arm or model_for(models, arm) is None:
         by_column, in_column = arm_in(file.path)
@@ -124,7 +124,8 @@ def _whose(file: LogFile, models: dict[str, Path]) -> tuple[str, str]:
         programme = arm_in(file.path)[1]
     if not arm and len(models) == 1:
         arm = next(iter(models)) or "arm"
-    return arm, programme
+    folder = file.path.absolute().parent.name
+    return arm or (folder if folder in models else ""), programme
 
 
 def _side_by_side(folder: Path, todo: dict[tuple[str, Path], list[tuple[LogFile, str]]]) -> list[Piece]:
