@@ -115,7 +115,14 @@ def test_a_joint_at_rest_has_a_residual_in_time_alone(loop: SimpleNamespace) -> 
     keep = np.ones(evidence.rows.sum(), dtype=bool)
     keep[loop.diagnosis.outcome.before.stacked.joint == 0] = False
     before, after = (
-        replace(fit, held_out=fit.held_out[keep])
+        replace(
+            fit,
+            outside=fit.outside[:, keep],
+            stacked=replace(
+                fit.stacked,
+                **{key: getattr(fit.stacked, key)[keep] for key in ("X", "y", "joint", "fold", "block")},
+            ),
+        )
         for fit in (loop.diagnosis.outcome.before, loop.diagnosis.outcome.after)
     )
     outcome = replace(loop.diagnosis.outcome, before=before, after=after)
