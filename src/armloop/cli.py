@@ -52,6 +52,11 @@ class _Command(_Parser):
     """The parser of one command, which learns its options when it is called: the help of all names them not."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self.learn()
+        return super().parse_known_args(args, namespace)
+
+    def learn(self) -> None:
+        """Declare the command's options."""
         command = import_module(f"armloop.commands.{self.prog.split()[-1]}")
         command.arguments(self)
         self.add_argument(
@@ -60,7 +65,24 @@ class _Command(_Parser):
             help="replace files that are read, or that this command has not written",
         )
         self.set_defaults(run=command.run)
-        return super().parse_known_args(args, namespace)
+
+
+class _Completion(argparse.Action):
+    """Print a shell's completion of all commands and options, and end."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *values: Any) -> None:
+        import shtab
+
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for command in action.choices.values():
+                    command.learn()
+                    for option in command._actions:  # whatever has no choices of its own may be a path
+                        if option.nargs != 0 and not option.choices:
+                            option.complete = shtab.FILE
+        _, shell, *_ = values
+        print(shtab.complete(parser, shell=str(shell)))
+        parser.exit()
 
 
 class _Ended(BaseException):
@@ -153,6 +175,12 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Start with `armloop loop`. Each command has its own --help.",
     )
     parser.add_argument("--version", action="version", version=f"armloop {__version__}")
+    parser.add_argument(
+        "--print-completion",
+        action=_Completion,
+        choices=("bash", "zsh", "tcsh"),
+        help='what your shell completes with: eval "$(armloop --print-completion bash)" in ~/.bashrc',
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Command)
     for name in COMMANDS:
         command = import_module(f"armloop.commands.{name}")

@@ -87,6 +87,7 @@ OTHERS = {
     "time_delay": DELAY,
     "encoder_offset": SHIFT,
     "external_contact": CONTACT,
+    "external_torque": {"start": 3.0, "end": 4.5, "torque": -2.0},
 }
 #: Effects whose columns are a slope: their torque is columns times coefficients for small parameters only.
 NONLINEAR = ("gravity_tilt", "encoder_offset", "stribeck_friction", "friction_drift", "presliding_hysteresis")
@@ -98,13 +99,14 @@ def build(name: str) -> Effect:
 
 
 def test_the_published_effects_are_there():
-    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 20
+    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 21
     assert all(EFFECTS[name].joint_wise for name in LAWS)
     whole = {"payload", "gravity_tilt", "time_delay", "external_contact"}
     assert {name for name, kind in EFFECTS.items() if not kind.joint_wise} == whole
     sensors = {"torque_offset", "torque_gain", "encoder_offset", "time_delay"}
     assert {name for name, kind in EFFECTS.items() if kind.sensor} == sensors
     labels = [h.label() for h in hypotheses(an_arm())]
+    assert not any("external_torque" in label for label in labels)
     assert len(labels) == len(set(labels)) == 15 * 3 + 3 + 3
     assert "viscous_friction at joint 3" in labels and "payload" in labels
     assert "transmission_coupling of joints 1 and 3" in labels
@@ -206,6 +208,38 @@ def test_a_contact_does_the_work_of_its_force(context):
         speed = (tip(q + step * v) - tip(q - step * v)) / (2 * step)
         assert tau[k] @ v == pytest.approx(-np.array(CONTACT["force"]) @ speed, abs=1e-6)
         np.testing.assert_allclose(tool_jacobian(arm, q[None])[0] @ v, speed, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["external_contact", "external_torque"])
+def test_an_event_belongs_to_the_log_in_which_it_was(name, context):
+    """Two logs with one clock: what happened in the first must not be taken off the second."""
+    first, event = context.motion, build(name)
+    second = replace(first, q=first.q + 0.01)
+    both = Motion(
+        *(np.concatenate([getattr(m, key) for m in (first, second)]) for key in ("time", "q", "v", "vdot")),
+        np.array([0, first.samples]),
+    )
+    start = int(np.argmin(np.abs(first.time - 3.0)))
+    posture = {**OTHERS[name], "start": float(first.time[start]), "posture": first.q[start].tolist()}
+    tau = event.torque(replace(context, motion=both), posture)
+    np.testing.assert_array_equal(tau[: first.samples], event.torque(context, posture))
+    assert tau[: first.samples].any() and not tau[first.samples :].any()
+
+
+def test_a_drift_starts_with_each_log(context):
+    motion, drift = context.motion, build("friction_drift")
+    parameters = LAWS["friction_drift"][1]
+    both = Motion(
+        *(np.concatenate([getattr(motion, key)] * 2) for key in ("time", "q", "v", "vdot")),
+        np.array([0, motion.samples]),
+    )
+    tau = drift.torque(replace(context, motion=both), parameters)
+    np.testing.assert_array_equal(tau[motion.samples :], drift.torque(context, parameters))
+
+
+def test_joints_beyond_a_link_feel_nothing_of_a_push_on_it(context):
+    pushed = build("external_contact").torque(context, {**CONTACT, "link": 2.0})
+    assert pushed[:, :2].any() and not pushed[:, 2:].any()
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -12,7 +12,18 @@ from pathlib import Path
 
 import pytest
 
+from armloop.drake_systems.scenario_schema import FILES
+from armloop.schemas.checking import checked
+
 ROOT = Path(__file__).resolve().parents[2]
+# the command with the package of a wheel before that of the checkout
+FROM_WHEEL = """
+import sys
+sys.path.insert(0, sys.argv.pop(1))
+import armloop.cli
+assert armloop.__file__.startswith(sys.path[0]), armloop.__file__
+sys.exit(armloop.cli.main())
+"""
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 
 
@@ -64,13 +75,14 @@ def test_pictures_and_paths_of_the_text_exist():
 
 
 @pytest.mark.slow
-def test_every_command_and_the_python_run(tmp_path):
+def test_every_command_and_the_python_run(tmp_path, unpacked):
     assert "make loop" in commands("make")
     page = tmp_path / "out" / "loop" / "report.html"
-    # What `make loop` calls, without setting up an environment of its own.
-    out = armloop("armloop loop --out out/loop", tmp_path)
+    # What `make loop` calls, without setting up an environment of its own, and from the wheel.
+    out = run([sys.executable, "-c", FROM_WHEEL, str(unpacked), "loop", "--out", "out/loop"], tmp_path)
     assert "the verdict was right" in out
     assert page.is_file() and (page.parent / "replay.html").is_file()
+    checked(json.loads((page.parent / "loop.json").read_text(encoding="utf-8")), FILES["loop"])
     for line in commands("armloop"):
         if "$UR10E" not in line:
             assert armloop(line, tmp_path).strip(), line
@@ -83,21 +95,30 @@ def test_every_command_and_the_python_run(tmp_path):
     assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
 
 
+@pytest.mark.slow
 @pytest.mark.measured
 def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path, measured):
-    outputs = [
-        armloop(line.replace("$UR10E", str(measured / "ur10e")), tmp_path)
-        for line in commands("armloop")
-        if "$UR10E" in line
-    ]
-    assert len(outputs) == 4
+    lines = [line for line in commands("armloop") if "$UR10E" in line]
+    assert [line.split()[1] for line in lines] == ["reconstruct", "evaluate", "diagnose", "crossvalidate"]
+    *_, diagnosed, answered = (
+        armloop(
+            line.replace("$UR10E", str(measured / "ur10e")) + " --json" * ("crossvalidate" in line), tmp_path
+        )
+        for line in lines
+    )
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     (mass,) = re.findall(r"`payload`, ([\d.]+) ± ", text)
-    assert mass in outputs[2]
+    assert mass in diagnosed
     answer = json.loads((tmp_path / "out" / "ur10e" / "diagnosis.json").read_text(encoding="utf-8"))
     nrmse = answer["error"]["nrmse"]
     for values in nrmse.values():
         assert f"| {sum(values) / 6:.3f} |" in text
+    found = json.loads(answered)
+    assert found["leave_out"] == "file" and len(found["files"]) == 9
+    assert f"| each of the nine no-load files left out in turn | {found['mean']['nrmse']:.3f} |" in text
+    assert found["mean"]["nrmse"] <= 0.045
+    ladder = {note.split(":")[0] for notes in found["notes"].values() for note in notes}
+    assert "friction, presliding" in ladder
 
 
 @pytest.mark.slow

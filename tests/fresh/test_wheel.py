@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -18,28 +17,6 @@ for path in [*map(urdf_path, urdf_names()), *map(scenario_path, scenario_names()
 print(*urdf_names())
 print(*scenario_names())
 """
-
-
-@pytest.fixture(scope="module")
-def unpacked(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel from the checkout, without a network, and unpack it."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [
-        sys.executable,
-        "-m",
-        "build",
-        "--wheel",
-        "--no-isolation",
-        "--outdir",
-        str(folder),
-        str(repository),
-    ]
-    answer = subprocess.run(build, capture_output=True, text=True)
-    assert answer.returncode == 0, answer.stderr
-    (wheel,) = folder.glob("armloop-*.whl")
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(folder / "site")
-    return folder / "site"
 
 
 @pytest.mark.slow

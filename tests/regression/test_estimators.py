@@ -8,6 +8,7 @@ import pytest
 
 from armloop.regression.estimators import Problem, Reduction
 from armloop.regression.estimators.lasso import lasso
+from armloop.regression.estimators.problem import halves
 from armloop.regression.estimators.rooted import rooted
 from armloop.regression.estimators.stability import stability
 from armloop.regression.estimators.stlsq import stlsq
@@ -144,3 +145,12 @@ def test_noise_alone_has_no_terms():
 def test_an_unknown_name_is_refused():
     with pytest.raises(ValueError, match="there are: evidence, lasso"):
         Sparse("lars")
+
+
+@pytest.mark.parametrize(("parts", "held"), [(10, [8, 9]), (6, [5]), (3, [2])])
+def test_a_penalty_is_chosen_on_parts_that_were_not_fitted(parts, held):
+    # each part is a power of two of its own: a sum says of which parts it is
+    marked = [Moments(np.array([[2.0**k]]), np.zeros(1), 0.0, 1.0) for k in range(parts)]
+    fitted, left_out = halves(marked)
+    assert left_out.G[0, 0] == sum(2.0**k for k in held)
+    assert fitted.G[0, 0] + left_out.G[0, 0] == 2.0**parts - 1
