@@ -85,6 +85,7 @@ mutants: setup $(TESTING)
 blind: setup $(TESTING)
 	$(BIN)/python tests/blind/loops.py --seeds 20 --clean 5 --keep out/blind/loops
 	$(BIN)/python tests/blind/run.py --arms 20 --cases 16 --keep out/blind/arms
+	$(BIN)/python tests/blind/run.py --outside --arms 12 --cases 8 --keep out/blind/outside
 
 clean:
 	rm -rf $(VENV) out dist

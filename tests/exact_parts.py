@@ -49,6 +49,7 @@ EFFECT_PARAMETERS = {
     "gravity_tilt": {"roll": 0.1, "pitch": -0.05},
     "transmission_coupling": {"inertia": 0.02, "viscous": 0.4, "coulomb": 0.15, "ratio": -1.0},
     "external_contact": {"start": 0.0, "end": 40.0, "force": [3.0, -2.0, 5.0]},
+    "external_torque": {"start": 0.0, "end": 40.0, "torque": 2.0},
     "torque_gain": {"gain": 1.1},
     "torque_offset": {"offset": -0.3},
     "encoder_offset": {"offset": 0.05},

@@ -150,14 +150,18 @@ def nominal_parameters(arm: Arm) -> Array:
     return np.concatenate([np.array(row) for row in rows])
 
 
-def tool_jacobian(arm: Arm, q: Array) -> Array:
+def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
     """(N, 3, n) translational Jacobian of the tool's origin in the base frame, at postures q (N, n).
 
     The tool is the frame X_tool fixed to the last link (that link's own frame where there is none).
+
+    Args:
+        link: of the far end of this link (from 1) instead: where the next joint sits, which with all joints beyond
+            does not move the point.
     """
     N, n = q.shape
     R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
-    axes, origins = np.empty((n, N, 3)), np.empty((n, N, 3))
+    axes, origins = np.zeros((n, N, 3)), np.zeros((n, N, 3))
     for i, joint in enumerate(arm.joints):
         s = arm.axis[i]
         p = p + R @ arm.X_PF[i, :3, 3]
@@ -167,6 +171,10 @@ def tool_jacobian(arm: Arm, q: Array) -> Array:
             R = R @ _rotations(s, q[:, i])
         else:
             p = p + q[:, i : i + 1] * axes[i]
-    tip = p + R @ arm.X_tool[:3, 3]
+        if link == i + 1 < n:
+            break
+    tip = p + R @ (arm.X_tool if i + 1 == n else arm.X_PF[i + 1])[:3, 3]
     turning = np.asarray(arm.revolute)[:, None, None]
-    return np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
+    J = np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
+    J[:, :, i + 1 :] = 0.0
+    return J

@@ -55,6 +55,16 @@ class Motion:
         usual = np.abs(steps - median) <= 1e-2 * median
         return float(steps[usual].mean()) if usual.any() else float(median)
 
+    def elapsed(self) -> NDArray[np.float64]:
+        """(N,) seconds since the start of each sample's log.
+
+        Runs whose clock goes on belong to one log; a clock that goes back is another's.
+        """
+        steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
+        first = np.concatenate([[0], self.starts[1:][steps <= 0]]).astype(np.intp)
+        lengths = np.diff(np.append(first, self.samples))
+        return np.asarray(self.time - np.repeat(self.time[first], lengths))
+
     def runs(self) -> list[slice]:
         """Return the samples of each run as a slice, in order."""
         ends = [*self.starts[1:], self.samples]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from armloop.arm import Arm
+from armloop.drake_systems.effects import EFFECTS as REALISED
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
 from armloop.effects import EFFECTS, Context, effect
@@ -76,7 +77,7 @@ def draw(run: Run, seed: int) -> Hidden:
     effects: list[UndeclaredEffect] = []
     sizes: list[float] = []
     while len(effects) < (2 if kind == "two" else 1):
-        name = str(rng.choice([n for n in EFFECTS if n not in names]))
+        name = str(rng.choice([n for n in REALISED if n not in names]))
         size = float(np.exp(rng.uniform(np.log(0.01), np.log(0.3))))
         found = _sized(run, name, size, rng)
         if found is not None:

@@ -7,6 +7,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
 
     python tests/blind/run.py --arms 20 --cases 16
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
+    python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
 
@@ -34,10 +35,16 @@ from armloop.keeping import Kept
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path) -> str:
+def make(seed: int, cases: int, place: Path, outside: bool = False) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
+        if outside:
+            sys.path.insert(0, str(Path(__file__).parents[1]))
+            from outside_generate import generate_outside
+
+            generate_outside(seed, cases, place / "logs", place / "answers")
+            return ""
         generate(seed, cases, load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
         return str(error)
@@ -67,6 +74,7 @@ def main() -> int:
     parser.add_argument("--arms", type=int, default=20)
     parser.add_argument("--cases", type=int, default=16, help="runs per arm")
     parser.add_argument("--first", type=int, default=1, help="seed of the first arm")
+    parser.add_argument("--outside", action="store_true", help="arms simulated by MuJoCo instead of our own")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", default=None, metavar="DIR", help="keep logs, models and answers here")
     parser.add_argument("--again", default=None, metavar="DIR", help="judge the kept logs of DIR once more")
@@ -84,7 +92,11 @@ def main() -> int:
         if not options.again:
             seeds = range(options.first, options.first + options.arms)
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
-            made = {s: workers.submit(make, s, options.cases, place) for s in seeds if reasons[s] is None}
+            made = {
+                s: workers.submit(make, s, options.cases, place, options.outside)
+                for s in seeds
+                if reasons[s] is None
+            }
             for seed in seeds:
                 if seed in made:
                     reasons[seed] = made[seed].result()

@@ -96,10 +96,6 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
         r"gaps: the longest run .* at least",
     ),
     "gaps everywhere, to diagnose": ((*DIAGNOSE, given("gaps.csv"), "--out", OUT), r"gaps: the longest run"),
-    "too short to diagnose": (
-        (*DIAGNOSE, given("short.csv"), "--out", OUT),
-        r"short: too little motion .* 9 s",
-    ),
     "a joint that never moves": ((*RECONSTRUCT, given("still.csv")), r"q2: joint 'joint_2' hardly moves"),
     "a joint that never moves, rigid body": (
         (*RECONSTRUCT, "--library", "rigid-body", given("still.csv")),

@@ -286,7 +286,7 @@ def test_several_runs_are_judged_together_and_order_does_not_matter(model: Recon
 
 def test_the_answer_has_the_published_shape(model: ReconstructedModel) -> None:
     answer = json.loads(json.dumps(diagnose(model, [run(CASES["torque_offset", 3][0], seed=8)]).to_dict()))
-    assert answer["schema"] == "armloop/diagnosis/1"
+    assert answer["schema"] == "armloop/diagnosis/2"
     assert set(answer) >= {"schema", "verdict", "effects", "error"}
     assert set(answer["error"]) >= {"metric", "held_out", "unit", "before", "after", "noise_floor"}
     (effect,) = answer["effects"]

@@ -51,6 +51,40 @@ def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
     assert chosen((9, 11)) == (11.0, 9.0)
 
 
+def slow_friction_in_one_fold(at_fold_0: float) -> tuple[Evidence, np.ndarray, np.ndarray]:
+    """A run with viscous friction of joint 2 by 3 N·m·s/rad outside fold 0 and by another coefficient in it."""
+    model = exact("three_axis")
+    motion = fourier_motion(40.0, 100.0, 3)
+    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + motion.v
+    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    evidence = Evidence.of(model, samples, hypotheses(model.arm))
+    column = np.zeros_like(samples.tau)
+    column[evidence.kept] = evidence.columns(effect("viscous_friction", 2), 0.0)[:, :, 0]
+    return evidence, column, np.where(evidence.fold == 0, at_fold_0, 3.0)[:, None] * column
+
+
+def test_what_judges_a_fold_was_not_fitted_to_it():
+    evidence, column, residual = slow_friction_in_one_fold(1.0)
+    found = fit(evidence, residual, [effect("viscous_friction", 2)], [Shape.fixed(0.0)])
+    of_one = evidence.stack(column, []).y
+    np.testing.assert_allclose(
+        found.held_out, np.where(found.stacked.fold == 0, -2.0, 2.0) * of_one, atol=1e-5
+    )
+
+
+def test_a_shape_for_judging_a_fold_does_not_see_what_other_effects_are_in_it():
+    """Nor through effects found earlier: what they leave elsewhere depends on where they were fitted."""
+    chosen = []
+    for at_fold_0 in (3.0, 40.0):
+        evidence, _, residual = slow_friction_in_one_fold(at_fold_0)
+        residual[:, 1] += 0.2 * np.sin(11 * evidence.samples.motion.q[:, 1])
+        current = fit(evidence, residual, [effect("viscous_friction", 2)], [Shape.fixed(0.0)])
+        trial = Known(evidence, residual, current).trial(effect("torque_ripple", 2))
+        assert trial is not None
+        chosen.append(trial.shapes[-1].without[0])
+    assert chosen == [11.0, 11.0]
+
+
 def test_a_fold_is_judged_with_what_the_other_folds_showed_alone():
     model = exact("three_axis")
     motion = fourier_motion(40.0, 100.0, 3)

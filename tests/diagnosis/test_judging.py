@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armloop.diagnosis.evidence import Stacked
+from armloop.diagnosis.evidence import FOLDS, Stacked
 from armloop.diagnosis.fit import Fit, solve
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead
 from armloop.effects import Estimate, effect
@@ -15,7 +15,7 @@ def left(held_out: np.ndarray, block: np.ndarray) -> Fit:
     """A fit of one joint that leaves this, with blocks as given."""
     rows = len(held_out)
     stacked = Stacked(np.zeros((rows, 0)), held_out, block, block % 2, np.zeros(rows, dtype=np.intp), 1)
-    return Fit((), (), (), held_out, stacked)
+    return Fit((), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
 
 
 def test_a_gain_that_lies_in_few_blocks_is_no_chance() -> None:

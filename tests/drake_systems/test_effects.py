@@ -267,5 +267,7 @@ def test_refuses_a_joint_the_arm_does_not_have(arm):
         realise(arm, [UndeclaredEffect("torque_offset", 4, {"offset": 1.0})])
 
 
-def test_every_effect_of_the_table_is_here():
-    assert set(EFFECTS) == set(LISTED)
+def test_every_effect_of_the_table_is_here_but_a_torque_from_outside_on_one_joint():
+    assert set(LISTED) - set(EFFECTS) == {"external_torque"}
+    with pytest.raises(ScenarioError, match="the plant cannot have it"):
+        UndeclaredEffect("external_torque", 1, {"start": 1.0, "end": 2.0, "torque": 1.0})

@@ -5,43 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from effect_arm import PAYLOAD, TILT, an_arm, fitted, torque
 from scipy.spatial.transform import Rotation
-from synthetic import fourier_motion, three_axis
 
-from armloop.arm import Arm
-from armloop.diagnosis.fit import solve
-from armloop.effects import EFFECTS, Context, Effect, Estimate, effect, hypotheses
-from armloop.effects.payload import Payload
+from armloop.effects import EFFECTS, Effect, Estimate, effect, hypotheses
 from armloop.errors import ModelError
-from armloop.kinematics import link_motion, nominal_parameters, regressor, tool_jacobian
+from armloop.kinematics import tool_jacobian
 from armloop.library.hysteresis import stop_operator
 from armloop.motion import Motion
-from armloop.regression.moments import Moments
 
 Law = Callable[[Motion], np.ndarray]
-
-X_TOOL = np.eye(4)
-X_TOOL[:3, :3] = Rotation.from_euler("xyz", [0.4, -0.7, 1.1]).as_matrix()
-X_TOOL[:3, 3] = [0.3, -0.05, 0.02]
-
-
-def an_arm() -> Arm:
-    """The three-axis arm with a tool that is turned and shifted against the last link."""
-    return replace(three_axis(), X_tool=X_TOOL)
-
-
-@pytest.fixture(scope="module")
-def context() -> Context:
-    motion = fourier_motion(20.0, 50.0, seed=3)
-    return Context(
-        an_arm(), motion, nominal_parameters(an_arm()), 0.02, torque(motion), torque, torque(motion)
-    )
-
-
-def torque(motion: Motion) -> np.ndarray:
-    """What the known model of the context predicts: the bare arm."""
-    arm = an_arm()
-    return regressor(arm, motion.q, motion.v, motion.vdot) @ nominal_parameters(arm)
 
 
 def on_joint_2(torque: Law) -> Law:
@@ -103,10 +76,6 @@ LAWS: dict[str, tuple[Law, dict[str, float], float]] = {
     ),
     "torque_gain": (on_joint_2(lambda m: 0.1 * torque(m)[:, 1]), {"gain": 1.1}, 0.0),
 }
-PAYLOAD = {"mass": 0.6, "com": [0.04, -0.02, 0.05], "own_inertia": 2e-3}
-TILT = {"roll": 0.05, "pitch": -0.03}
-
-
 COUPLING = {"inertia": 0.05, "viscous": 0.3, "coulomb": 0.2, "ratio": -1.0}
 DELAY = {"seconds": 0.02}
 SHIFT = {"offset": 0.03}
@@ -118,6 +87,7 @@ OTHERS = {
     "time_delay": DELAY,
     "encoder_offset": SHIFT,
     "external_contact": CONTACT,
+    "external_torque": {"start": 3.0, "end": 4.5, "torque": -2.0},
 }
 #: Effects whose columns are a slope: their torque is columns times coefficients for small parameters only.
 NONLINEAR = ("gravity_tilt", "encoder_offset", "stribeck_friction", "friction_drift", "presliding_hysteresis")
@@ -128,22 +98,15 @@ def build(name: str) -> Effect:
     return effect(name, 2 if kind.joint_wise else None, 3 if kind.pair_wise else None)
 
 
-def fitted(kind: Effect, context: Context, tau: np.ndarray, shape: float) -> dict[str, Estimate]:
-    """The parameters by plain least squares on the effect's columns."""
-    columns = kind.full_columns(context, shape)
-    beta = np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), tau.ravel(), rcond=None)[0]
-    x = kind.start(beta)
-    return kind.estimates(context.arm, x, np.zeros((len(x), len(x))), shape)
-
-
 def test_the_published_effects_are_there():
-    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 20
+    assert set(EFFECTS) == {*LAWS, *OTHERS} and len(EFFECTS) == 21
     assert all(EFFECTS[name].joint_wise for name in LAWS)
     whole = {"payload", "gravity_tilt", "time_delay", "external_contact"}
     assert {name for name, kind in EFFECTS.items() if not kind.joint_wise} == whole
     sensors = {"torque_offset", "torque_gain", "encoder_offset", "time_delay"}
     assert {name for name, kind in EFFECTS.items() if kind.sensor} == sensors
     labels = [h.label() for h in hypotheses(an_arm())]
+    assert not any("external_torque" in label for label in labels)
     assert len(labels) == len(set(labels)) == 15 * 3 + 3 + 3
     assert "viscous_friction at joint 3" in labels and "payload" in labels
     assert "transmission_coupling of joints 1 and 3" in labels
@@ -163,128 +126,6 @@ def test_columns_give_the_parameters_back(name, context):
     assert set(found) == set(parameters)
     for key, value in parameters.items():
         assert found[key].value == pytest.approx(value, rel=1e-9), key
-
-
-def potential_energy(
-    arm: Arm, q: np.ndarray, mass: float, com_link: np.ndarray, gravity: np.ndarray
-) -> float:
-    """Of a point mass on the last link, by walking along the chain with rotation vectors."""
-    R, p = np.eye(3), np.zeros(3)
-    for i in range(arm.n):
-        p = p + R @ arm.X_PF[i, :3, 3]
-        R = R @ arm.X_PF[i, :3, :3] @ Rotation.from_rotvec(q[i] * arm.axis[i]).as_matrix()
-    return float(-mass * gravity @ (p + R @ com_link))
-
-
-def by_differences(f: Callable[[np.ndarray], float], q: np.ndarray) -> np.ndarray:
-    step = 1e-6 * np.eye(len(q))
-    return np.array([(f(q + d) - f(q - d)) / 2e-6 for d in step])
-
-
-def test_a_payload_at_rest_is_the_slope_of_its_potential_energy_and_the_tool_frame_counts():
-    arm = an_arm()
-    com_link = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
-    for q in np.random.default_rng(0).uniform(-1.5, 1.5, (5, 3)):
-        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
-        expected = by_differences(
-            lambda q: potential_energy(arm, q, PAYLOAD["mass"], com_link, arm.gravity), q
-        )
-        np.testing.assert_allclose(Payload().torque(Context(arm, rest), PAYLOAD)[0], expected, atol=1e-7)
-
-
-def test_a_payload_in_motion_is_mass_times_acceleration():
-    # power balance: v·tau = d/dt of the kinetic energy, which needs no regressor
-    arm = an_arm()
-    motion = fourier_motion(1.0, 1000.0, seed=8)
-    com = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
-    without_gravity = replace(arm, gravity=np.zeros(3))
-    tau = Payload().torque(Context(without_gravity, motion), PAYLOAD)
-    w = link_motion(arm, motion.q, motion.v, motion.vdot).w[-1]
-    step = 1e-6
-
-    def centre(q: np.ndarray) -> np.ndarray:
-        return np.array([potential_energy(arm, q, 1.0, com, -e) for e in np.eye(3)])
-
-    speed = np.array(
-        [
-            (centre(q + step * v) - centre(q - step * v)) / (2 * step)
-            for q, v in zip(motion.q, motion.v, strict=True)
-        ]
-    )
-    energy = 0.5 * PAYLOAD["mass"] * (speed**2).sum(axis=1) + 0.5 * PAYLOAD["own_inertia"] * (w**2).sum(
-        axis=1
-    )
-    power = (tau * motion.v).sum(axis=1)
-    rate = np.gradient(energy, 1e-3)
-    np.testing.assert_allclose(power[5:-5], rate[5:-5], atol=1e-4 * np.abs(rate).max())
-
-
-def test_a_payload_is_found_from_its_columns(context):
-    tau = Payload().torque(context, PAYLOAD)
-    x = np.array([PAYLOAD["mass"], *(PAYLOAD["mass"] * com_in_link()), PAYLOAD["own_inertia"]])
-    np.testing.assert_allclose(Payload().columns(context, 0.0) @ Payload().embed(x)[0], tau, atol=1e-10)
-    found = Payload().estimates(context.arm, x, np.zeros((5, 5)), 0.0)
-    for key, value in PAYLOAD.items():
-        np.testing.assert_allclose(found[key].value, value, rtol=1e-9, err_msg=key)
-    # what the ten columns reveal without any constraint: mass and centre as far as the motion shows them
-    start = fitted(Payload(), context, tau, 0.0)
-    again = Payload().torque(context, {k: e.value for k, e in start.items()})
-    assert np.abs(again - tau).max() < 0.2 * np.abs(tau).max()
-
-
-def com_in_link() -> np.ndarray:
-    return X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_slope_of_the_payloads_constraint_is_that_of_finite_differences(seed):
-    rng = np.random.default_rng(seed)
-    x = np.array([rng.uniform(0.3, 4), *rng.uniform(-0.4, 0.4, 3), rng.uniform(1e-3, 0.05)])
-    _, J = Payload().embed(x)
-    for k in range(5):
-        h = 1e-6 * np.eye(5)[k]
-        slope = (Payload().embed(x + h)[0] - Payload().embed(x - h)[0]) / 2e-6
-        np.testing.assert_allclose(J[:, k], slope, atol=1e-7)
-
-
-def test_a_payload_is_always_a_possible_body():
-    rng = np.random.default_rng(5)
-    for x in rng.normal(size=(20, 5)):
-        beta, _ = Payload().embed(x)
-        mass, moment = beta[0], beta[1:4]
-        tensor = np.array(
-            [[beta[4], beta[7], beta[8]], [beta[7], beta[5], beta[9]], [beta[8], beta[9], beta[6]]]
-        )
-        c = moment / mass
-        about_centre = np.linalg.eigvalsh(tensor - mass * (c @ c * np.eye(3) - np.outer(c, c)))
-        assert mass > 0 and about_centre.min() > -1e-9 * np.abs(tensor).max()
-
-
-def test_a_tilt_at_rest_is_the_slope_of_the_potential_energy_under_turned_gravity():
-    base = an_arm()
-    # rolled about the base's x axis, then pitched about the level y axis
-    R_WB = Rotation.from_euler("xy", [TILT["roll"], TILT["pitch"]]).as_matrix()
-    only_last = np.zeros(30)
-    mass, com = 1.3, np.array([0.1, -0.2, 0.05])
-    only_last[20:24] = [mass, *(mass * com)]
-    for q in np.random.default_rng(1).uniform(-1.5, 1.5, (4, 3)):
-        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
-        level, turned = (
-            by_differences(lambda q, g=g: potential_energy(base, q, mass, com, g), q)
-            for g in (base.gravity, R_WB.T @ base.gravity)
-        )
-        got = effect("gravity_tilt", None).torque(Context(base, rest, only_last), TILT)[0]
-        np.testing.assert_allclose(got, turned - level, atol=1e-7)
-
-
-def test_a_tilt_is_found_from_its_columns(context):
-    tilt = effect("gravity_tilt", None)
-    columns = tilt.columns(context, 0.0)
-    moments = Moments.of(columns.reshape(-1, columns.shape[2]), tilt.torque(context, TILT).ravel())
-    x = solve(moments, [tilt], [columns.shape[2]])[1][0]
-    found = tilt.estimates(context.arm, x, np.zeros((2, 2)), 0.0)
-    for key, value in TILT.items():
-        assert found[key].value == pytest.approx(value, rel=1e-4)
 
 
 SEARCHED = [name for name, kind in EFFECTS.items() if kind.searched]
@@ -367,6 +208,38 @@ def test_a_contact_does_the_work_of_its_force(context):
         speed = (tip(q + step * v) - tip(q - step * v)) / (2 * step)
         assert tau[k] @ v == pytest.approx(-np.array(CONTACT["force"]) @ speed, abs=1e-6)
         np.testing.assert_allclose(tool_jacobian(arm, q[None])[0] @ v, speed, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["external_contact", "external_torque"])
+def test_an_event_belongs_to_the_log_in_which_it_was(name, context):
+    """Two logs with one clock: what happened in the first must not be taken off the second."""
+    first, event = context.motion, build(name)
+    second = replace(first, q=first.q + 0.01)
+    both = Motion(
+        *(np.concatenate([getattr(m, key) for m in (first, second)]) for key in ("time", "q", "v", "vdot")),
+        np.array([0, first.samples]),
+    )
+    start = int(np.argmin(np.abs(first.time - 3.0)))
+    posture = {**OTHERS[name], "start": float(first.time[start]), "posture": first.q[start].tolist()}
+    tau = event.torque(replace(context, motion=both), posture)
+    np.testing.assert_array_equal(tau[: first.samples], event.torque(context, posture))
+    assert tau[: first.samples].any() and not tau[first.samples :].any()
+
+
+def test_a_drift_starts_with_each_log(context):
+    motion, drift = context.motion, build("friction_drift")
+    parameters = LAWS["friction_drift"][1]
+    both = Motion(
+        *(np.concatenate([getattr(motion, key)] * 2) for key in ("time", "q", "v", "vdot")),
+        np.array([0, motion.samples]),
+    )
+    tau = drift.torque(replace(context, motion=both), parameters)
+    np.testing.assert_array_equal(tau[motion.samples :], drift.torque(context, parameters))
+
+
+def test_joints_beyond_a_link_feel_nothing_of_a_push_on_it(context):
+    pushed = build("external_contact").torque(context, {**CONTACT, "link": 2.0})
+    assert pushed[:, :2].any() and not pushed[:, 2:].any()
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -38,6 +38,9 @@ WARMING = ["friction_drift"]
 LASTING = [name for name in ACTING if name not in (*EVENTS, *WARMING)]
 REMEMBERING = ["presliding_hysteresis"]
 
+#: A torque from outside on one joint is found in logs; Drake's systems have none.
+REALISED = [name for name in ACTING if name != "external_torque"]
+
 BARE = model_of(ARM)
 
 
@@ -99,7 +102,7 @@ def check(found: np.ndarray, name: str, atol: float = 1e-9) -> None:
 
 def test_every_effect_is_here():
     assert set(EFFECT_PARAMETERS) == set(EFFECTS)
-    assert EVENTS == ["external_contact"]
+    assert sorted(EVENTS) == ["external_contact", "external_torque"]
     memory = {name for name in ACTING if EFFECTS[name].memory}
     assert memory == {*EVENTS, *WARMING, *REMEMBERING}
 
@@ -162,7 +165,7 @@ def test_equations_of_motion_and_their_parts(name):
         assert_allclose(dynamics.bias(q, v), bare.bias(q, v), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("name", REALISED)
 def test_effect_torque(name):
     """Of the smoothed sign of a system of its own; the time is that of the run."""
     inertial = BARE.inertial_parameters() if name == "gravity_tilt" else None
@@ -222,7 +225,7 @@ def test_sticking_forward_dynamics(name):
 FRICTION = (JointFriction(0.72, 0.55, 0.1, 2.65),) * 3
 
 
-@pytest.mark.parametrize("name", ACTING)
+@pytest.mark.parametrize("name", REALISED)
 def test_the_simulated_plant(name):
     """One short step of the plant, driven by the torque of its own exact model, accelerates as that says."""
     joint, other = joints(name)

@@ -55,3 +55,14 @@ def test_a_tutorial_is_python_with_text(page):
     text = page.read_text(encoding="utf-8")
     assert text.startswith("# %% [markdown]\n# # ")
     assert any(isinstance(node, ast.Import) for node in ast.parse(text.replace(";\n", "\n")).body)
+
+
+def test_what_the_guide_names_is_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = [
+        *re.findall(r"`((?:src|tests|scenarios|docs)/[\w./]*)`", text),
+        *re.findall(r"\]\(([^)\s]+)\)", text),
+    ]
+    assert len(named) > 12
+    for path in named:
+        assert (ROOT / path).exists(), path

@@ -10,12 +10,13 @@ from synthetic import conditioned_samples, fourier_motion, friction, measured, r
 from armloop.dynamics import check_physics
 from armloop.dynamics.physics import PhysicsChecks
 from armloop.errors import ExcitationError, InputError
+from armloop.library.lagrangian import candidates as energies
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.progress import silent
 from armloop.reconstruction import Options, Reconstruction, reconstruct
 from armloop.reconstruction.data import Chunk
-from armloop.reconstruction.libraries import Contender, choose, contender
+from armloop.reconstruction.libraries import Contender, choose, comparison_notes, contender, undetermined
 from armloop.reconstruction.stepwise import stepwise
 from armloop.regression.sparse import Sparse
 from armloop.signals import condition
@@ -92,6 +93,22 @@ def test_a_library_that_the_logs_do_not_carry_is_left_out_with_the_reason() -> N
     assert out.to_dict() == {"library": "lagrangian", "chosen": False, "refused": out.refused}
     with pytest.raises(InputError, match="lagrangian: the motion leaves 9 of 12"):
         choose([out])
+
+
+def test_a_library_of_more_candidates_than_independent_torques_is_not_tried() -> None:
+    """Torque below 5 Hz takes 20 values a second: three joints' in one second are fewer than the energies' candidates."""
+    log = a_run(1)
+    short = log.select(slice(0, int(1 / log.period)))
+    why = undetermined("lagrangian", three_axis(), [short], 5.0)
+    assert why == f"{energies(three_axis()).count} candidates, but 59 independent values of torque"
+    assert undetermined("lagrangian", three_axis(), [log], 5.0) == ""
+    assert undetermined("rigid-body", three_axis(), [short], 5.0) == ""
+    note, *_ = comparison_notes(
+        [Contender("rigid-body", SimpleNamespace(), chosen=True), Contender("lagrangian", refused=why)]  # type: ignore[arg-type]
+    )
+    assert note.startswith(
+        "library rigid-body: the only one that the logs can determine; lagrangian not tried ("
+    )
 
 
 def test_blocks_choose_the_library_or_judge_the_model_and_neither_is_fitted(logs: list[MotionLog]) -> None:

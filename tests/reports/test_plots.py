@@ -1,16 +1,21 @@
 """Figures show every joint and every controller, and thin lines without losing their extremes."""
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 from synthetic import friction
 
 from armloop.diagnosis import Diagnosis, close
+from armloop.files import write_figure
 from armloop.motion import Motion
 from armloop.reports import plots
+from armloop.reports.html import svg
+from armloop.reports.plots import style
 from armloop.reports.plots.style import thin, with_gaps
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
 from armloop.signals import smooth
@@ -110,7 +115,14 @@ def test_a_joint_at_rest_has_a_residual_in_time_alone(loop: SimpleNamespace) -> 
     keep = np.ones(evidence.rows.sum(), dtype=bool)
     keep[loop.diagnosis.outcome.before.stacked.joint == 0] = False
     before, after = (
-        replace(fit, held_out=fit.held_out[keep])
+        replace(
+            fit,
+            outside=fit.outside[:, keep],
+            stacked=replace(
+                fit.stacked,
+                **{key: getattr(fit.stacked, key)[keep] for key in ("X", "y", "joint", "fold", "block")},
+            ),
+        )
         for fit in (loop.diagnosis.outcome.before, loop.diagnosis.outcome.after)
     )
     outcome = replace(loop.diagnosis.outcome, before=before, after=after)
@@ -147,6 +159,14 @@ def test_residuals_are_those_behind_the_errors(loop: SimpleNamespace) -> None:
 def test_the_ring_has_eight_stages() -> None:
     with pytest.raises(ValueError, match="8 stages, there are 0"):
         plots.ring_figure([], "", "")
+
+
+def test_a_picture_is_opaque_and_a_figure_in_a_page_is_not(tmp_path: Path) -> None:
+    figure = style.figure(4.0, 3.0)
+    style.panels(figure, 1, 1)
+    write_figure(tmp_path / "a.png", figure)
+    assert (imread(tmp_path / "a.png")[..., 3] == 1).all()
+    assert "#ffffff" not in svg(figure)
 
 
 def test_thinning_keeps_spikes_and_gaps() -> None:

@@ -97,7 +97,7 @@ def diagnose(
         held_out: further runs of the arm as it is now, never fitted: error before and after on each.
 
     Raises:
-        InputError: a log does not fit the model, or holds too little motion.
+        InputError: a log does not fit the model.
     """
     runs = logs_for(model, as_logs(logs))
     plain = Model.of(model).plain()

@@ -20,5 +20,5 @@ def page(text: str, figure: Figure | None = None) -> str:
     import io
 
     png = io.BytesIO()
-    figure.savefig(png, format="png", dpi=90, facecolor="white")
+    figure.savefig(png, format="png", dpi=90)
     return f'{shown}<img alt="" src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'

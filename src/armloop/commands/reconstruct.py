@@ -98,13 +98,15 @@ def run(options: argparse.Namespace) -> None:
     from armloop.pieces import IN_MEMORY, first_samples, log_sources
     from armloop.reconstruction import Options
     from armloop.reconstruction import reconstruct as run
-    from armloop.regression.sparse import ESTIMATORS, Sparse
+    from armloop.regression.estimators import LISTED, REGISTRY
+    from armloop.regression.sparse import Sparse
     from armloop.reports.tables import formulas, libraries_table, parts_table, score_table, steps_table
     from armloop.signals import Conditioning
     from armloop.workers import Cluster, Processes
 
-    if options.estimator not in ESTIMATORS:
-        raise InputError(f"unknown estimator {options.estimator!r}; there are: {', '.join(ESTIMATORS)}")
+    if REGISTRY.find(options.estimator) is None:
+        names = ", ".join([*LISTED, *REGISTRY.own_names()])
+        raise InputError(f"unknown estimator {options.estimator!r}; there are: {names}")
     if options.penalty is not None and not 0 < options.penalty < math.inf:
         raise InputError(f"--penalty {options.penalty}: λ must be positive")
     if not 1 <= options.max_order <= 6:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
-from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
+from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
+from armloop.diagnosis.reasons import Standing, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import Found, Outcome
@@ -29,7 +30,7 @@ from armloop.signals import condition
 
 Array = NDArray[np.float64]
 
-SCHEMA = "armloop/diagnosis/1"
+SCHEMA = "armloop/diagnosis/2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +38,14 @@ class Diagnosis:
     """The verdict on a run.
 
     Attributes:
-        verdict: ``no_effect``, ``effects_found`` or ``unlisted_effect``.
+        verdict: ``no_effect``, ``effects_found``, ``unlisted_effect`` or ``cannot_tell``.
         outcome: the search's result.
         model: the model with the effects found.
         unlisted: the law of a residual that no listed effect explains, if there is such a residual.
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
         reversals: what was found at reversals, if anything.
+        standing: how far the run can be judged: what a reader must know beside the verdict.
     """
 
     verdict: str
@@ -53,6 +55,12 @@ class Diagnosis:
     evidence: Evidence
     contacts: list[Contact]
     reversals: AtReversals | None = None
+    standing: Standing = field(default_factory=lambda: Standing([], [], False))
+
+    @property
+    def reasons(self) -> list[str]:
+        """What a reader must know before relying on the verdict."""
+        return self.standing.reasons
 
     @property
     def samples(self) -> Samples:
@@ -62,7 +70,7 @@ class Diagnosis:
     @property
     def judged(self) -> bool:
         """Whether the run, contacts apart, holds enough motion to look for anything else in it."""
-        return not _too_still(self.evidence)
+        return not too_still(self.evidence)
 
     def errors(self) -> dict[str, Any]:
         """RMSE per joint of held-out moving samples, before and after, beside the baseline's; NaN for joints at rest."""
@@ -105,6 +113,8 @@ class Diagnosis:
                 {
                     **added.to_dict(),
                     "share": found.share,
+                    "when": "changed",
+                    "probability": found.probability,
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
@@ -126,16 +136,34 @@ class Diagnosis:
             {
                 **contact.added.to_dict(),
                 "share": contact.share,
+                "when": "event",
+                "probability": 1 / (1 + len(contact.rivals)),
                 "words": contact.added.effect.sentence(contact.added.parameters),
                 "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
-                "alternatives": [],
+                "alternatives": [
+                    {
+                        "effect": rival.name,
+                        "joint": rival.joint,
+                        "share": share,
+                        "why": why_alike(contact.added.effect, rival),
+                    }
+                    for rival, share in contact.rivals
+                ],
             }
             for contact in self.contacts
         ]
         if self.unlisted is not None:
             where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
-            effects.append({**self.unlisted.to_dict(), "where": where.to_dict()})
-        return {"schema": SCHEMA, "verdict": self.verdict, "effects": effects, "error": _null(self.errors())}
+            entry = {"when": "changed", "probability": None, "where": where.to_dict()}
+            effects.append({**self.unlisted.to_dict(), **entry})
+        return {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "reasons": self.reasons,
+            "joints": self.standing.joints,
+            "effects": effects,
+            "error": _null(self.errors()),
+        }
 
 
 def _by_joint(fit: Fit, values: Array) -> Array:
@@ -166,7 +194,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
         logs: one or more runs of the same arm under the same circumstances, torque in the model's unit.
 
     Raises:
-        InputError: the logs do not fit the model, or hold too little motion to judge.
+        InputError: the logs do not fit the model.
     """
     if model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None:
         raise InputError(
@@ -189,24 +217,24 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     whole = Evidence.of(model, samples, hypotheses(model.arm))
     contacts = find_contacts(whole, whole.residual([]))
     evidence = without(whole, contacts)
-    if _too_still(evidence):
-        if not contacts and not known_contacts(whole).any():
-            raise InputError(f"{logs[0].name}: {_too_still(evidence)}")
+    if too_still(evidence):
         left = evidence.residual([])
         nothing = fit(evidence, left, [], [])
         added = [contact.added for contact in contacts]
-        verdict = "effects_found" if contacts else "no_effect"
-        return Diagnosis(
-            verdict,
+        augmented = model.with_effects(added)
+        found = Diagnosis(
+            "effects_found" if contacts else "no_effect" if known_contacts(whole).any() else "cannot_tell",
             Outcome([], nothing, nothing, left),
-            model.with_effects(added),
+            augmented,
             None,
             evidence,
             contacts,
         )
+        stand = standing(evidence, augmented, found.errors()["after"], range(1, model.arm.n + 1))
+        return replace(found, standing=replace(stand, reasons=[too_still(evidence), *stand.reasons]))
     blocks = len(np.unique(evidence.blocks))
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
-    account = best_account(whole, contacts, not _too_still(whole), progress)
+    account = best_account(whole, contacts, not too_still(whole), progress)
     contacts, evidence = account.contacts, account.evidence
     outcome, unlisted = account.outcome, account.unlisted
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
@@ -215,23 +243,14 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
-    found = bool(outcome.found or contacts)
-    verdict = "effects_found" if found else "unlisted_effect" if unlisted is not None else "no_effect"
+    named = bool(outcome.found or contacts)
+    verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]
-    return Diagnosis(verdict, outcome, model.with_effects(added), unlisted, evidence, contacts, turned)
-
-
-def _too_still(evidence: Evidence) -> str:
-    """What keeps the run from being judged, empty if nothing does."""
-    # A joint that is pushed about within its friction has not moved.
-    ranges = evidence.model.history.get("range")
-    slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
-    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
-    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < 20]
-    blocks = len(np.unique(evidence.blocks))
-    if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
-        return ""
-    return (
-        f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
-        f"{FEWEST_BLOCKS + 1} s in which the joints move"
-    )
+    augmented = model.with_effects(added)
+    found = Diagnosis(verdict, outcome, augmented, unlisted, evidence, contacts, turned)
+    progress("how far the run can be judged")
+    known = [] if unlisted is None else [unlisted.joint]
+    stand = standing(evidence, augmented, found.errors()["after"], known)
+    if verdict == "no_effect" and stand.unknown:
+        found = replace(found, verdict="cannot_tell")
+    return replace(found, standing=stand)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
+#: So many times its trained range, a joint is where the model knows nothing.
+FAR = 1.2
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
@@ -74,6 +77,7 @@ class Evidence:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
         rows = _sliding(samples, model) & independent_rows(samples)[:, None]
+        rows &= ~far_outside(samples.motion, model.history.get("range"))
         return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
@@ -137,6 +141,15 @@ class Evidence:
             joints,
             residual.shape[1],
         )
+
+
+def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
+    """(N, n) samples in which a joint's q, v or vdot lies so far beyond the trained range that nothing is judged there."""
+    if not ranges:
+        return np.zeros(motion.q.shape, dtype=bool)
+    half, v, vdot, centre = np.asarray(ranges, dtype=float)
+    parts = [(motion.q - centre, half), (motion.v, v), (motion.vdot, vdot)]
+    return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
 def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -44,15 +45,20 @@ class Fit:
     Attributes:
         effects, shapes: what was fitted.
         parameters: one dict of estimates per effect, from all blocks.
-        held_out: (R,) residual of every weighted row after parameters fitted on the other folds.
+        outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
         stacked: the rows.
     """
 
     effects: tuple[Effect, ...]
     shapes: tuple[Shape, ...]
     parameters: tuple[dict[str, Estimate], ...]
-    held_out: Array
+    outside: Array
     stacked: Stacked
+
+    @cached_property
+    def held_out(self) -> Array:
+        """(R,) residual of every row after parameters fitted on the other folds: what judges."""
+        return np.asarray(self.outside[self.stacked.fold, np.arange(len(self.stacked.y))])
 
     @property
     def complexity(self) -> int:
@@ -66,13 +72,10 @@ class Fit:
 
 def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
     """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
-    held_out = np.zeros(0)
+    outside = []
     for k in range(FOLDS):
         judged, beta, _, _, _ = _solved(evidence, residual, effects, [s.without[k] for s in shapes], k)
-        if k == 0:
-            held_out = np.array(judged.y)
-        mine = judged.fold == k
-        held_out[mine] -= judged.X[mine] @ beta
+        outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(evidence, residual, effects, [s.final for s in shapes], None)
     covariance = _block_covariance(stacked, beta, J)
     parameters, start = [], 0
@@ -80,7 +83,7 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         block = slice(start, start + len(free))
         parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], value))
         start += len(free)
-    return Fit(tuple(effects), tuple(shapes), tuple(parameters), held_out, stacked)
+    return Fit(tuple(effects), tuple(shapes), tuple(parameters), np.array(outside), stacked)
 
 
 def _solved(

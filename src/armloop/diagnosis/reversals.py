@@ -132,9 +132,12 @@ def _joints(effect: Effect) -> set[int]:
 
 
 def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
-    """Effects that act on some joints and were not found yet: those of all joints are."""
+    """Effects in some joints that were not found yet.
+
+    A sensor's fault, a load or a tilt is there while a joint slides, too, where the search has asked for it.
+    """
     taken = {effect.place for effect in current.effects}
-    return [e for e in hypotheses(arm) if e.place not in taken and (not _joints(e) or _joints(e) & joints)]
+    return [e for e in hypotheses(arm) if e.place not in taken and not e.sensor and _joints(e) & joints]
 
 
 @dataclass(frozen=True, eq=False)

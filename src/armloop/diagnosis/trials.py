@@ -83,37 +83,43 @@ class Known:
 def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     """The shape whose columns explain most of what the known effects leave on the effect's joints.
 
-    Chosen on all blocks for the parameters, and without each fold in turn for judging that fold.
+    Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
+    blocks, and on what the known effects leave there when they, too, are fitted without that fold.
     """
     n = known.residual.shape[1]
     joints = range(n) if effect.other_joint or effect.joint is None else [effect.joint - 1]
-    X, y, fold = _shape_problem(known, effect, shapes, joints)
-    width = X.shape[2]
-    G = [np.einsum("ksp,ksr->spr", X[fold == k], X[fold == k]) for k in range(FOLDS)]
-    b = [np.einsum("ksp,k->sp", X[fold == k], y[fold == k]) for k in range(FOLDS)]
+    columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
+    every = list(range(FOLDS))
+    ridge = 1e-12 * len(columns) * np.eye(columns.shape[2])
+    X = [columns[fold == k] for k in every]
+    G = [np.einsum("ksp,ksr->spr", x, x) for x in X]
 
-    def best(folds: list[int]) -> float:
-        A = sum((G[k] for k in folds), 1e-12 * len(X) * np.eye(width))
-        c = sum((b[k] for k in folds), np.zeros_like(b[0]))
+    def best(folds: list[int], y: Array) -> float:
+        A = sum((G[k] for k in folds), ridge)
+        c = np.sum([np.einsum("ksp,k->sp", X[k], y[fold == k]) for k in folds], axis=0)
         explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
         return shapes[int(np.argmax(explained))]
 
-    every = list(range(FOLDS))
-    return Shape(best(every), tuple(best([other for other in every if other != k]) for k in every))
+    without = (best([other for other in every if other != k], outside[k]) for k in every)
+    return Shape(best(every, held_out), tuple(without))
 
 
 def _shape_problem(
     known: Known, effect: Effect, shapes: list[float], joints: Iterable[int]
-) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Columns (R, S, p) of every shape, what is left (R,), and the fold of each row, of the effect's joints."""
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Of the effect's joints: columns (R, S, p) of every shape, what is left on held-out rows (R,) and after a fit
+    outside each fold (FOLDS, R), and the fold of each row.
+    """
     evidence, current = known.evidence, known.fit
     each = [effect.columns(evidence.context, shape) for shape in shapes]
     width = each[0].shape[-1]
-    parts, left, fold = [], [], []
+    parts, left, outside, fold = [], [], [], []
     for j in joints:
         rows = evidence.rows[:, j]
         columns = smooth(evidence.samples, np.hstack([c if c.ndim == 2 else c[:, j] for c in each]))[rows]
         parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
-        left.append(current.held_out[current.stacked.joint == j])
+        mine = current.stacked.joint == j
+        left.append(current.held_out[mine])
+        outside.append(current.outside[:, mine])
         fold.append(evidence.fold[rows])
-    return np.concatenate(parts), np.concatenate(left), np.concatenate(fold)
+    return np.concatenate(parts), np.concatenate(left), np.hstack(outside), np.concatenate(fold)

@@ -105,11 +105,27 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
         mine = after.stacked.joint == j
         if mine.sum() < _FEWEST or _energy(after, j) < REMAINDER * _energy(before, j):
             continue
-        error = after.held_out[mine] ** 2
+        # Noise has energy, too, but no memory: only what lasts can be a law.
+        error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
         sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
         if np.sort(sums)[:-EVENTS].sum() > 0:
-            ratios[j] = np.sqrt(error.mean())
+            ratios[j] = np.sqrt((after.held_out[mine] ** 2).mean())
     return int(np.argmax(ratios)) if ratios.any() else None
+
+
+def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
+    """Part of a joint's residual that is still there a period of the filter's corner later: its autocorrelation."""
+    samples = evidence.samples
+    if samples.cutoff_hz <= 0:
+        return 1.0  # samples that are no time series tell nothing of memory
+    time = samples.motion.time[evidence.rows[:, j]]
+    later = np.searchsorted(time, time + 1 / samples.cutoff_hz - 0.5 * samples.period)
+    there = later < len(time)
+    there[there] = np.abs(time[later[there]] - time[there] - 1 / samples.cutoff_hz) < 0.3 / samples.cutoff_hz
+    if there.sum() < _FEWEST:
+        return 1.0
+    now, then = residual[there], residual[later[there]]
+    return float(np.clip(np.mean(now * then) / max(float(np.mean(now**2)), 1e-300), 0.0, 1.0))
 
 
 def _energy(fit: Fit, j: int) -> float:

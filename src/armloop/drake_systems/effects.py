@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 Fault = Callable[[Array, Array, Array], tuple[Array, Array]]
 """What a sensor makes of q and tau (N, n), recorded at times (N,)."""
 
-EFFECTS: tuple[str, ...] = tuple(LISTED)
-"""The listed effects, all of which can be put into a plant; a user's own can, too."""
+EFFECTS: tuple[str, ...] = tuple(name for name in LISTED if name != "external_torque")
+"""The listed effects that can be put into a plant; a user's own can, too. A torque from outside on one joint cannot."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,10 @@ class UndeclaredEffect:
         except ModelError as error:
             names = ", ".join([*EFFECTS, *REGISTRY.own_names()])
             raise ScenarioError(f"effect {self.name!r} is unknown; the plant can have: {names}") from error
+        if self.name in LISTED and self.name not in EFFECTS:
+            raise ScenarioError(
+                f"effect {self.name}: the plant cannot have it; it can have: {', '.join(EFFECTS)}"
+            )
         fault = _fault(kind, self)
         if fault:
             raise ScenarioError(f"effect {self.name}: {fault}")

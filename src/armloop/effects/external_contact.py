@@ -1,4 +1,4 @@
-"""A push at the tool during an interval: somebody leans on the arm, or it touches something."""
+"""A push on the arm during an interval: somebody leans on the arm, or it touches something."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 
 from armloop.arm import Arm
 from armloop.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.effects.events import during
 from armloop.effects.payload import link_parameters
 from armloop.kinematics import tool_jacobian
-from armloop.motion import Motion
 
 
 class ExternalContact(Effect):
-    """tau -= J(q)^T F from ``start`` to ``end``, F the mean force on the tool in the base frame.
+    """tau -= J(q)^T F from ``start`` to ``end``, F the mean force in the base frame.
 
-    The drives have to hold against it. It is an event of one run, not a property of the arm: no controller
-    supplies it. Its interval is found by :mod:`armloop.diagnosis.contacts`, before everything else.
+    The force acts on the tool, or, with a parameter ``link``, on the far end of that link (from 1): the joints beyond
+    feel nothing of it. The drives have to hold against it. It is an event of one run, not a property of the arm: no
+    controller supplies it. Its interval is found by :mod:`armloop.diagnosis.contacts`, before everything else.
     """
 
     name = "external_contact"
@@ -32,20 +33,16 @@ class ExternalContact(Effect):
     memory = True
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        during = self.during(context.motion, parameters)
+        rows = during(context.motion, parameters)
         tau = np.zeros_like(context.motion.q)
         force = np.asarray(parameters["force"], dtype=float)
-        tau[during] = -force @ tool_jacobian(context.arm, context.motion.q[during])
+        link = int(number(parameters["link"])) if "link" in parameters else None
+        tau[rows] = -force @ tool_jacobian(context.arm, context.motion.q[rows], link)
         return tau
 
-    @staticmethod
-    def during(motion: Motion, parameters: dict[str, Value]) -> np.ndarray:
-        """(N,) samples within the interval."""
-        start, end = number(parameters["start"]), number(parameters["end"])
-        return np.asarray((motion.time >= start) & (motion.time <= end))
-
     def columns(self, context: Context, shape: float) -> Array:
-        return -np.swapaxes(tool_jacobian(context.arm, context.motion.q), 1, 2)
+        link = int(shape) or None
+        return -np.swapaxes(tool_jacobian(context.arm, context.motion.q, link), 1, 2)
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
@@ -66,7 +63,8 @@ class ExternalContact(Effect):
         start, end, force = (parameters[key] for key in ("start", "end", "force"))
         size = float(np.linalg.norm(np.asarray(force.value)))
         at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
+        where = f"link {number(parameters['link'].value):.0f}" if "link" in parameters else "the tool"
         return (
-            f"something pushed the tool with {size:.3g} N on average, ({at}) N in the base frame, from "
+            f"something pushed {where} with {size:.3g} N on average, ({at}) N in the base frame, from "
             f"{number(start.value):.2f} to {number(end.value):.2f} s"
         )

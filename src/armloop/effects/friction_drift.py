@@ -11,7 +11,7 @@ from armloop.effects.law import Law
 
 
 class FrictionDrift(Law):
-    """tau_j += f exp(-t/T) sign(v_j), t from the start of the log.
+    """tau_j += f exp(-t/T) sign(v_j), t from the start of the log, each log's own.
 
     A controller does not know when the joint was started: it supplies what is left once the joint is warm.
     """
@@ -26,6 +26,6 @@ class FrictionDrift(Law):
     memory = True
 
     def shapes(self, context: Context) -> Sequence[float]:
-        length = float(np.ptp(context.motion.time))
+        length = float(np.max(context.motion.elapsed()))
         # Shorter than a few blocks it is no drift; longer than the run it is a constant level.
         return [] if length < 12.0 else [float(T) for T in np.geomspace(4.0, 1.5 * length, 10)]

@@ -26,7 +26,9 @@ def _defined(module: str) -> list[type[Effect]]:
 
 
 _FOLDER = str(Path(__file__).parent)
-_FILES = sorted({module.name for module in iter_modules([_FOLDER])} - {"base", "law", "listed", "own"})
+_FILES = sorted(
+    {module.name for module in iter_modules([_FOLDER])} - {"base", "events", "law", "listed", "own"}
+)
 
 #: Every listed effect by its name in ``diagnosis.json``. Of two that do equally well with as many numbers a search names
 #: the first: what looks like another comes after it, what leans on the known model after what the motion tells alone, and

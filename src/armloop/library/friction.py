@@ -182,7 +182,7 @@ def column(
         )
     else:
         sign = np.tanh(v / parameter) if element.way == "fading" else np.sign(v)
-    values = element.value(Sliding(q, v, sign, motion.time - motion.time[:1]), parameter, NUMPY)
+    values = element.value(Sliding(q, v, sign, motion.elapsed()), parameter, NUMPY)
     if element.by_load:
         assert load is not None
         values = values * np.abs(load[:, along.joint])

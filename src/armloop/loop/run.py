@@ -152,7 +152,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     with _Clock(seconds, "report", progress, "6/6 writing the report"):
         write_json(folder / "loop.json", loop_answer(result, scenario))
         write_text(folder / "report.html", loop_report(result))
-        write_figure(folder / "loop.png", loop_figure(result), facecolor="white")
+        write_figure(folder / "loop.png", loop_figure(result))
     print(f"open {folder}/report.html  ({sum(seconds.values()):.0f} s)")
     return result
 

@@ -60,7 +60,7 @@ def tune_scenario(
         write_json(folder / "tune.json", answer)
         write_text(folder / "report.html", tuning_report(tuning))
         for name, draw in (("bode.png", bode_figure), ("step.png", step_figure)):
-            write_figure(folder / name, draw(tuning), facecolor="white")
+            write_figure(folder / name, draw(tuning))
     return answer, tuning
 
 

@@ -47,7 +47,7 @@ def run_wear_scenario(
 
         write_json(folder / "tracking.json", answer)
         save_made(folder, chosen, models)
-        write_figure(folder / "spread.png", spread_figure(result), facecolor="white")
+        write_figure(folder / "spread.png", spread_figure(result))
     kept.clear()
     return answer, result
 

@@ -96,13 +96,15 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         np.zeros(r, dtype=bool),
     )
 
+    memory = options.correlation_seconds / samples.period
+
     def regressed(rows: Rows) -> Found:
         pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
         solution = pooled.solve(pooled.everything)
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, shape, ladder.laws, options.insist)
+                physical = physical_solution(solution, shape, ladder.laws, options.insist, memory)
                 theta = physical.theta
                 physics = {
                     "constraints": physical.binding,

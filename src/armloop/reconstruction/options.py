@@ -19,6 +19,8 @@ class Options:
         folds: the data are dealt into so many folds by blocks; one is held out from everything and scored
             at the end, one more chooses the orders.
         block_seconds: longest block.
+        correlation_seconds: how long what a plain model leaves remembers; samples nearer than that speak for
+            or against physics as one does.
         seed: of k-means.
         snr: signal-to-noise ratios in dB of q, v and v̇ of samples that are no time series, where they are known:
             coefficients are corrected for the noise after the terms are chosen.
@@ -36,6 +38,7 @@ class Options:
     max_candidates: int = 1400
     folds: int = 5
     block_seconds: float = 1.0
+    correlation_seconds: float = 0.0
     seed: int = 0
     snr: tuple[float, float, float] | None = None
     physical: bool = True

@@ -82,7 +82,12 @@ class PhysicalSolution:
 
 
 def physical_solution(
-    solution: Solution, body: Body, laws: list[list[FrictionTerm]], insist: bool = False, seed: int = 0
+    solution: Solution,
+    body: Body,
+    laws: list[list[FrictionTerm]],
+    insist: bool = False,
+    memory: float = 1.0,
+    seed: int = 0,
 ) -> PhysicalSolution:
     """The coefficients that solve the normal equations as well as physics allows.
 
@@ -91,6 +96,9 @@ def physical_solution(
     not the URDF's. Then M is kept positive definite at the postures of the motion alone, and if the data speak against that,
     too, it stays free, for a wrong model predicts no better for being positive, unless ``insist``.
 
+    Args:
+        memory: samples over which the residual is correlated: they add to the cost as often, and say it once.
+
     Raises:
         ExcitationError: there are none.
     """
@@ -98,9 +106,10 @@ def physical_solution(
     beyond = rng.uniform(body.low, body.high, (_BEYOND, len(body.low)))
     tried = ((LIMITS, np.concatenate([body.seen, beyond])), (TRAINED, body.seen))
     failed: ArithmeticError | None = None
+    repeats = max(solution.repeats, memory)
     # no more conditions can bind than there are shared coefficients, and bounds of them
     conditions = len(body.positive) + int(body.positive.sum())
-    most = np.inf if insist else float(chi2.ppf(_CHANCE, conditions)) * solution.repeats
+    most = np.inf if insist else float(chi2.ppf(_CHANCE, conditions)) * repeats
     for where, q in tried:
         try:
             theta, binding = _kept_positive(solution, body, laws, q, rng if where == LIMITS else None, most)
@@ -109,7 +118,7 @@ def physical_solution(
         except ArithmeticError as error:
             failed = error
             continue
-        cost = (_cost(solution, theta) - _cost(solution, solution.theta)) / solution.repeats
+        cost = (_cost(solution, theta) - _cost(solution, solution.theta)) / repeats
         if insist or cost <= chi2.ppf(_CHANCE, max(binding, 1)):
             return PhysicalSolution(theta, binding, where)
     if failed is not None:
@@ -214,9 +223,9 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
     """What the user should know of constraints, in a line."""
     where = history.get("kept_positive")
     if where == FREE:
-        return [
-            "the data contradict a positive definite M(q) by more than noise (sensors that lag?): M(q) was left free"
-        ]
+        free = "the data contradict a positive definite M(q) by more than noise (sensors that lag?): M(q) was left free"
+        below = ", ".join(history.get("negative", {}))
+        return [free + (f"; negative, as for no arm: {below}" if below else "")]
     notes = []
     if where == TRAINED:
         notes.append(

@@ -176,7 +176,7 @@ def reconstruct(
     wanted = candidates(arm, settings) if library is None else [library]
     usual = [conditioning or default_conditioning(one) for one in wanted]
     bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
-    settings = replace(settings, block_seconds=apart.seconds)
+    settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
     refused = {one: undetermined(one, arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}

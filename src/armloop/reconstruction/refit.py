@@ -20,24 +20,23 @@ from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.fitted import step_rows
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.sorter import Sorter
+from armloop.regression.estimators import Estimator
 from armloop.uncertainty.solving import solve
 from armloop.uncertainty.standard_errors import Assembled
 
-#: Estimators whose coefficients are those of least squares on the few terms they keep.
-LEAST_SQUARES = ("evidence", "debiased_lasso", "thresholded", "stability")
 _FARTHEST = 2.5
 #: What the user is told of it.
 REFITTED = "coefficients regressed once more on columns that are filtered like the torque"
 
 
-def refit(found: Found, data: Data, estimator: str) -> bool:
+def refit(found: Found, data: Data, estimator: Estimator) -> bool:
     """Replace a stepwise result's coefficients; tell whether it was done.
 
     It is not done for samples that passed no filter, for estimators that shrink or choose nothing, and where the
     squared error of the fitted samples would not fall; nor for a joint whose v_s would move by more than a factor
     of two and a half.
     """
-    if data.reference.samples.cutoff_hz <= 0 or estimator not in LEAST_SQUARES:
+    if data.reference.samples.cutoff_hz <= 0 or not estimator.least_squares:
         return False
     before = ReconstructedModel(found.arm, tuple(found.components), found.law)
     try:

@@ -22,7 +22,7 @@ from armloop.progress import Progress
 from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
-from armloop.reconstruction.refit import LEAST_SQUARES, REFITTED, refit
+from armloop.reconstruction.refit import REFITTED, refit
 from armloop.reconstruction.sorter import Sorter
 from armloop.reconstruction.step import PARTS, StepPlan, candidates_of, regress_step
 from armloop.reconstruction.sums import Choice
@@ -45,7 +45,7 @@ def revised(
     regressed, are left alone.
     """
     filtered = data.reference.samples.cutoff_hz > 0
-    if found.sorter is None or not filtered or options.sparse.estimator not in LEAST_SQUARES:
+    if found.sorter is None or not filtered or not options.sparse.how.least_squares:
         return found
     left = data.sum(partial(Leftover.of, model=_model(found), sorter=found.sorter))
     share, joint, condition = left.worst()
@@ -57,7 +57,7 @@ def revised(
     choice = Choice(None, plan.conditions, alone)
     terms, friction, reports = regress_step(data, revolute, choice, plan, options)
     new = replace(found, components=list(terms), friction=friction, together=True, notes=[])
-    was_refit = refit(new, data, options.sparse.estimator)
+    was_refit = refit(new, data, options.sparse.how)
     again = data.sum(partial(Leftover.of, model=_model(new), sorter=found.sorter))
     correlation = options.sparse.correlation
     if again.criterion(_counts(new), correlation) >= left.criterion(_counts(found), correlation):

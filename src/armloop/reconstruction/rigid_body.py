@@ -80,12 +80,14 @@ def rigid_body(
         np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
     )
 
+    memory = options.correlation_seconds / samples.period
+
     def regressed(rows: NDArray[np.bool_]) -> Found:
         pooled = Pooled(samples, columns, ladder.laws, rows, load, passive=options.physical)
         solution = pooled.solve(pooled.everything, ladder.prior)
         theta, physics = solution.theta, {}
         if options.physical:
-            physical = physical_solution(solution, shape, ladder.laws, options.insist)
+            physical = physical_solution(solution, shape, ladder.laws, options.insist, memory)
             theta = physical.theta
             physics = {
                 "constraints": physical.binding,
@@ -96,6 +98,8 @@ def rigid_body(
                 base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
             )
             physics["held"] = {base.names[k]: float(solution.theta[k]) for k in held}
+            below = np.flatnonzero(base.positive & (theta[: base.count] < 0))
+            physics["negative"] = {base.names[k]: float(theta[k]) for k in below}
         values = theta[: base.count]
         body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
         inertial = body.parameters[: 10 * arm.n].tolist()

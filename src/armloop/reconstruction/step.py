@@ -158,7 +158,7 @@ class _Joint:
         library = library[self.distinct[library]]
         chosen = np.zeros(0, dtype=np.intp)
         best: Index = np.zeros(0, dtype=np.intp)
-        parts = (self.fit, self.all - self.fit) if moments is self.all and sparse.needs_parts else ()
+        parts = (self.fit, self.all - self.fit) if moments is self.all and sparse.how.needs_parts else ()
         for _ in range(3):
             previous = best
             best = self._profiled(moments, np.concatenate([self.fixed, chosen]))
@@ -173,7 +173,7 @@ class _Joint:
             if np.array_equal(best, previous):
                 break
         kept = sparse.prune(moments, support, support[support >= self.size], self.scale**2)
-        shrunk = sparse.shrinks and len(kept) == len(support)
+        shrunk = sparse.how.shrinks and len(kept) == len(support)
         return Fit(kept, beta if shrunk else moments.solve(kept))
 
     def _profiled(self, moments: Moments, base: Index) -> Index:
@@ -217,7 +217,7 @@ def regress_step(
     errors = np.sqrt(tried.errors.mean(axis=1)).tolist()
     trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
     final = [_fit(joint, joint.all, chosen, options) for joint in joints]
-    if not options.sparse.shrinks:
+    if not options.sparse.how.shrinks:
         final = _corrected(final, joints, partial(_gradients, data, choice, columns))
     if options.snr is not None:
         final = unattenuated(data, choice, columns, final, options.snr)

@@ -58,7 +58,7 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
     if note:
         found = _in_steps(arm, data, _together(revolute, options), None, clusters, options, progress)
         found.notes.append(note)
-    if refit(found, data, options.sparse.estimator):
+    if refit(found, data, options.sparse.how):
         found.notes.append(REFITTED)
     return revised(found, data, revolute, options, progress)
 

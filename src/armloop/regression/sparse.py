@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.regression.estimators import ESTIMATORS as _BY_NAME
-from armloop.regression.estimators import Problem, Reduction
+from armloop.regression.estimators import LISTED, REGISTRY, Estimator, Problem, Reduction
 from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-ESTIMATORS = tuple(_BY_NAME)
+ESTIMATORS = tuple(LISTED)
 
 # Relative squared error below which data count as noise-free: round-off of the normal equations.
 _FLOOR = 1e-12
@@ -26,7 +25,7 @@ class Sparse:
     """How to choose terms.
 
     Attributes:
-        estimator: one of :data:`ESTIMATORS`.
+        estimator: one of :data:`ESTIMATORS`, or a user's own.
         penalty: for the Lassos the λ of Eq. (32), read as ‖y − Xξ‖²/(2 m) + λ‖ξ‖₁ on columns scaled to unit RMS
             and y likewise; for ``thresholded``, ``stlsq`` and ``sr3`` the threshold in the same units. None:
             chosen by the error on held-out parts of the data, or by the criterion where no parts are given.
@@ -45,18 +44,16 @@ class Sparse:
     correlation: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.estimator not in ESTIMATORS:
-            raise ValueError(f"unknown estimator {self.estimator!r}; there are: {', '.join(ESTIMATORS)}")
+        if REGISTRY.find(self.estimator) is None:
+            names = ", ".join([*ESTIMATORS, *REGISTRY.own_names()])
+            raise ValueError(f"unknown estimator {self.estimator!r}; there are: {names}")
 
     @property
-    def shrinks(self) -> bool:
-        """Whether coefficients are smaller than those of least squares on the terms kept."""
-        return self.estimator in ("lasso", "adaptive_lasso")
-
-    @property
-    def needs_parts(self) -> bool:
-        """Whether parts of the data change the estimate."""
-        return self.estimator not in ("evidence", "least_squares")
+    def how(self) -> Estimator:
+        """The estimator."""
+        kind = REGISTRY.find(self.estimator)
+        assert kind is not None
+        return kind()
 
     def support(
         self, moments: Moments, forced: Index, power: float = 0.0, parts: Sequence[Moments] = ()
@@ -81,7 +78,8 @@ class Sparse:
             ArithmeticError: the estimator's solver does not converge.
         """
         forced = np.sort(np.asarray(forced, dtype=np.intp))
-        if self.estimator == "least_squares":
+        estimator = self.how
+        if estimator.keeps_all:
             return np.arange(len(moments.b), dtype=np.intp), moments.solve()
         reduction = Reduction.of(moments, forced)
         floor = _floor(moments, power)
@@ -96,7 +94,7 @@ class Sparse:
             max_terms=self.max_terms,
             penalty=self.penalty,
         )
-        chosen = _BY_NAME[self.estimator](problem)
+        chosen = estimator.choose(problem)
         support = np.sort(np.concatenate([forced, reduction.free[np.flatnonzero(chosen)]])).astype(np.intp)
         return support, reduction.coefficients(chosen)[support]
 

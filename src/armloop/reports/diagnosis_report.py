@@ -15,7 +15,7 @@ from armloop.reports.diagnosis_tables import (
     feedforward_table,
     held_out_table,
 )
-from armloop.reports.findings import alternatives, blame, findings, headline, nothing_to_supply
+from armloop.reports.findings import alternatives, blame, findings, headline, nothing_to_supply, reasons
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import (
     feedforward_figure,
@@ -73,7 +73,7 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
         [intro, *findings(diagnosis)],
         [Picture(shares_figure(diagnosis), _SHARES)] if diagnosis.outcome.found else [],
         [*tables, errors_table(diagnosis)],
-        notes=[*([accused] if accused else []), *alternatives(diagnosis)],
+        notes=[*reasons(diagnosis), *([accused] if accused else []), *alternatives(diagnosis)],
     )
     pictures = [Picture(residual_time_figure(diagnosis), _TIME)]
     if moving_joints(diagnosis):
@@ -144,6 +144,8 @@ def diagnosis_report(
 
 def _lead(diagnosis: Diagnosis) -> str:
     name = diagnosis.model.arm.name
+    if diagnosis.verdict == "cannot_tell":
+        return f"A run of {name} by which this model cannot tell whether anything has changed."
     if diagnosis.verdict == "no_effect":
         return f"A run of {name} that the model explains as well as its own baseline data."
     if diagnosis.verdict == "unlisted_effect":
@@ -214,11 +216,16 @@ def _with_unit(title: str, of: str) -> str:
 
 
 def _contact_card(diagnosis: Diagnosis, k: int) -> Card:
-    contact = diagnosis.contacts[k]
-    start, end, force = (contact.added.parameters[key].value for key in ("start", "end", "force"))
-    size = float(np.linalg.norm(np.asarray(force)))
-    when = f"{number(float(np.asarray(start)))} to {number(float(np.asarray(end)))} s"
-    return Card(f"{number(size, 2)} N", f"Contact {k + 1}, {when}", "mean force on the tool", "accent")
+    added = diagnosis.contacts[k].added
+    start, end = (number(float(np.asarray(added.parameters[key].value))) for key in ("start", "end"))
+    what = added.parameters["force" if added.effect.joint is None else "torque"]
+    size = float(np.linalg.norm(np.asarray(what.value)))
+    where = (
+        "mean force on the arm"
+        if added.effect.joint is None
+        else f"mean torque on joint {added.effect.joint}"
+    )
+    return Card(f"{number(size, 2)} {unit(what.unit)}", f"Event {k + 1}, {start} to {end} s", where, "accent")
 
 
 def _residual_words(diagnosis: Diagnosis) -> str:

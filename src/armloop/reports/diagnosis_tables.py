@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.reports.findings import blame, findings, nothing_to_supply, rivals
+from armloop.reports.findings import blame, findings, nothing_to_supply, reasons, rivals
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
 
@@ -36,12 +36,14 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
     return make_table(headers, rows, title, left=(0, 1, 3, 5))
 
 
-def events_table(diagnosis: Diagnosis, title: str | None = "Contacts") -> Table:
-    """Each contact's interval and mean force on the tool, in the base frame."""
+def events_table(diagnosis: Diagnosis, title: str | None = "Events") -> Table:
+    """Each event's interval, where it acted, and its mean: a force in the base frame, or the torque the drive supplied."""
     rows = []
     for k, contact in enumerate(diagnosis.contacts):
-        p = contact.added.parameters
-        force = np.asarray(p["force"].value, dtype=float)
+        p, joint = contact.added.parameters, contact.added.effect.joint
+        size = p["force"] if joint is None else p["torque"]
+        value = np.atleast_1d(np.asarray(size.value, dtype=float))
+        where = f"link {int(np.asarray(p['link'].value))}" if "link" in p else "tool"
         rows.append(
             [
                 k + 1,
@@ -49,14 +51,16 @@ def events_table(diagnosis: Diagnosis, title: str | None = "Contacts") -> Table:
                     f"{float(np.asarray(p[key].value)):.2f} ± {float(np.asarray(p[key].std_error)):.2f}"
                     for key in ("start", "end")
                 ),
-                float(np.linalg.norm(force)),
-                vector(force.tolist()),
-                vector(np.asarray(p["force"].std_error, dtype=float).tolist(), 2),
+                where if joint is None else f"joint {joint}",
+                float(np.linalg.norm(value)),
+                unit(size.unit),
+                vector(value.tolist()),
+                vector(np.atleast_1d(np.asarray(size.std_error, dtype=float)).tolist(), 2),
                 percent(contact.share),
             ]
         )
-    headers = ["contact", "from [s]", "to [s]", "force [N]", "(x, y, z) [N]", "std. error [N]", "explains"]
-    return make_table(headers, rows, title)
+    headers = ["event", "from [s]", "to [s]", "at", "mean", "unit", "(x, y, z)", "std. error", "explains"]
+    return make_table(headers, rows, title, left=(3, 5))
 
 
 def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not fitted, RMSE") -> Table:
@@ -122,7 +126,7 @@ def held_out_table(
 
 def diagnosis_table(diagnosis: Diagnosis, closing: Closing | None = None) -> str:
     """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
-    sentences = [*findings(diagnosis), *blame(diagnosis)]
+    sentences = [*findings(diagnosis), *reasons(diagnosis), *blame(diagnosis)]
     parts = [f"Verdict: {diagnosis.verdict}", "\n".join(map(_wrapped, sentences))]
     if diagnosis.outcome.found or diagnosis.unlisted is not None:
         parts.append(str(effects_table(diagnosis)))

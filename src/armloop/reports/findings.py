@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.reports.words import counted, effect_label, effect_name, listed, number, percent, unit
@@ -17,10 +19,10 @@ def headline(diagnosis: Diagnosis) -> str:
     """The verdict in a few words."""
     found = [effect_label(f.effect) for f in diagnosis.outcome.found]
     if diagnosis.contacts:
-        found.append(counted(len(diagnosis.contacts), "external contact"))
+        found.append(counted(len(diagnosis.contacts), "event"))
     if diagnosis.unlisted is not None:
         found.append(f"unlisted effect, joint {diagnosis.unlisted.joint}")
-    return listed(found) or "no effect"
+    return listed(found) or ("cannot tell" if diagnosis.verdict == "cannot_tell" else "no effect")
 
 
 def findings(diagnosis: Diagnosis) -> list[str]:
@@ -33,12 +35,12 @@ def findings(diagnosis: Diagnosis) -> list[str]:
     if len(diagnosis.contacts) == 1:
         (contact,) = diagnosis.contacts
         sentences.append(
-            f"Found: {contact.added.effect.sentence(contact.added.parameters)}. The force explains "
+            f"Found: {contact.added.effect.sentence(contact.added.parameters)}. It explains "
             f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
         )
     elif diagnosis.contacts:
         sentences.append(
-            f"Found: {len(diagnosis.contacts)} pushes at the tool, listed below; their samples are kept out of "
+            f"Found: {len(diagnosis.contacts)} {_events(diagnosis)}, listed below; their samples are kept out of "
             "everything else."
         )
     if diagnosis.contacts and not diagnosis.judged:
@@ -57,9 +59,34 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}; "
             f"{unit(where.words())}."
         )
-    return sentences or [
-        "The residual is that of the baseline: the model lacks nothing that this run could show."
-    ]
+    return sentences or [_nothing(diagnosis)]
+
+
+def _events(diagnosis: Diagnosis) -> str:
+    """What all events of a run were, in words."""
+    forces = all(contact.added.effect.joint is None for contact in diagnosis.contacts)
+    links = any("link" in contact.added.parameters for contact in diagnosis.contacts)
+    return "events" if not forces else "pushes on the arm" if links else "pushes at the tool"
+
+
+def _nothing(diagnosis: Diagnosis) -> str:
+    """What can be said where nothing was found, with its number."""
+    if not diagnosis.evidence.rows.any():
+        return "Nothing can be said of this run: no joint moves in it long enough."
+    errors = diagnosis.errors()
+    ratio = np.asarray(errors["before"], dtype=float) / np.asarray(errors["noise_floor"], dtype=float)
+    most = float(np.nanmax(ratio)) if np.isfinite(ratio).any() else 0.0
+    size = f"At its largest the residual is {number(most, 2)} times the baseline"
+    if diagnosis.verdict == "cannot_tell":
+        return (
+            f"{size}; whether the arm has changed this model cannot tell by this run, for the reasons given."
+        )
+    return f"{size}, and no listed effect nor a law accounts for more of it than for the model's own shortcomings."
+
+
+def reasons(diagnosis: Diagnosis) -> list[str]:
+    """What a reader must know before relying on the verdict, as sentences."""
+    return [f"{words[:1].upper()}{words[1:]}." for words in diagnosis.reasons]
 
 
 def blame(diagnosis: Diagnosis) -> list[str]:

@@ -137,7 +137,8 @@ def svg(figure: Figure | str) -> str:
     text = io.StringIO()
     # a fixed salt makes equal figures equal text; without a date the file does not change from run to run
     with matplotlib.rc_context({"svg.hashsalt": "armloop", "svg.fonttype": "path"}):
-        figure.savefig(text, format="svg", dpi=_DPI, metadata={"Date": None})
+        # without its background: the page has its own, light or dark
+        figure.savefig(text, format="svg", dpi=_DPI, metadata={"Date": None}, transparent=True)
     body = text.getvalue()
     body = body[body.index("<svg") :]
     body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)

@@ -19,7 +19,11 @@ def gains_table(tuning: Tuning, title: str | None = "Gains") -> Table:
         for name, loop in _both(tuning)
         for j in range(len(loop.margins))
     ]
-    return make_table(["gains", "joint", "kp [N·m/rad]", "ki [N·m/(rad·s)]", "kd [N·m·s/rad]"], rows, title)
+    return make_table(
+        ["gains", "joint", "kp [N·m/rad, N/m]", "ki [N·m/(rad·s), N/(m·s)]", "kd [N·m·s/rad, N·s/m]"],
+        rows,
+        title,
+    )
 
 
 def margins_table(tuning: Tuning, title: str | None = "Loops, the other joints' closed") -> Table:

@@ -55,7 +55,7 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
         for contact in diagnosis.contacts:
             start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
             inside = time[contact.rows & (samples.motion.time >= start) & (samples.motion.time <= end)]
-            axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="external contact")
+            axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="event")
         for values, color, label in series:
             line = thin(*with_gaps(time[rows], values[:, j]))
             axes.plot(*line, color=color, linewidth=0.9, label=label, rasterized=True)

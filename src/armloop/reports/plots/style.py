@@ -39,13 +39,8 @@ def controller_colors(names: Sequence[str]) -> dict[str, str]:
 
 
 def figure(width: float = 10.0, height: float = 4.0) -> Figure:
-    """Make an empty figure without pyplot's global state; no background, so that it lies on any page."""
-    made = Figure(
-        figsize=(width, height),
-        dpi=110,
-    )
-    made.patch.set_alpha(0.0)
-    return made
+    """Make an empty figure without pyplot's global state; white, so that a PNG of it can be read on any page."""
+    return Figure(figsize=(width, height), dpi=110, facecolor="white")
 
 
 def panels(

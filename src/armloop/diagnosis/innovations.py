@@ -1,0 +1,114 @@
+"""Innovations: what of a residual a model's noise, its dry friction and its timing cannot account for.
+
+Two kinds of ignorance are kept apart. Noise, and errors that grow with the motion, have a variance: the innovation is
+measured in it. Dry friction has a bound: at rest it may hold anything within its level, and near rest its level is
+known only in part; what lies within that is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from armloop.diagnosis.evidence import Evidence
+from armloop.library.friction import FrictionLaw
+from armloop.motion import Motion, Samples
+from armloop.signals import smooth
+
+Array = NDArray[np.float64]
+
+#: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
+WINDOW = 0.2
+#: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
+CREEP = 0.01
+#: Dry friction of a joint that creeps is known but for this part; it creeps below this part of its trained speed …
+_UNSURE, _SLOW = 0.8, 0.05
+#: … and at rest it can hold this many times its sliding level.
+_STICTION = 1.2
+#: Torque and motion of one sample may be apart by this part of a sample period.
+_APART = 0.5
+
+
+def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """(N, n) signed innovations in standard deviations, and (N, n) whether a joint rests.
+
+    Args:
+        residual: (N, n) what the model, with the effects found so far, leaves; N·m (N).
+    """
+    samples, model = evidence.samples, evidence.model
+    motion = samples.motion
+    rest = ~samples.moving | (np.abs(motion.v) < CREEP)
+    # Where sliding takes more than the model says, so does sticking.
+    sliding_more = [
+        float(np.median((np.sign(motion.v[:, j]) * residual[:, j])[evidence.rows[:, j]]))
+        if evidence.rows[:, j].any()
+        else 0.0
+        for j in range(motion.joints)
+    ]
+    dry = dry_level(evidence) + np.abs(sliding_more)
+    # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
+    bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
+    held = np.minimum(np.abs(residual) - dry, np.abs(bare) - _STICTION * dry)
+    ranges = model.history.get("range")
+    slow = _SLOW * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
+    sliding = np.abs(residual) - _UNSURE * dry * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
+    size = np.maximum(np.where(rest, held, sliding), 0.0)
+    sign = np.sign(np.where(rest, bare, residual))
+    return sign * size / deviations(evidence, residual), rest
+
+
+def averaged(samples: Samples, values: Array) -> Array:
+    """(N, ...) running means over :data:`WINDOW`, run by run: what a push adds stays, what oscillates goes."""
+    width = max(1, round(WINDOW / samples.period))
+    return np.concatenate([uniform_filter1d(values[run], width, axis=0) for run in samples.motion.runs()])
+
+
+def deviations(evidence: Evidence, residual: Array) -> Array:
+    """(N, n) standard deviation of the averaged residual, N·m (N).
+
+    The baseline's, at least what the run's own noise leaves in an average: the sensor may have become a noisier one.
+    """
+    model, motion = evidence.model, evidence.samples.motion
+    predicted = evidence.context.predicted
+    own = np.broadcast_to(evidence.scale, motion.q.shape)
+    rough = np.abs(residual - averaged(evidence.samples, residual))
+    noise = [
+        1.4826 * float(np.median(rough[rows, j])) if (rows := evidence.rows[:, j]).any() else 0.0
+        for j in range(motion.joints)
+    ]
+    if evidence.samples.cutoff_hz > 0:
+        # An average holds so many independent values.
+        own = np.maximum(own, np.array(noise) / np.sqrt(max(2 * evidence.samples.cutoff_hz * WINDOW, 1.0)))
+    tau = smooth(evidence.samples, model.predict(motion) if predicted is None else predicted)
+    rate = np.zeros_like(tau)
+    for run in motion.runs():
+        if run.stop - run.start > 2:
+            rate[run] = np.gradient(tau[run], motion.time[run], axis=0)
+    return np.asarray(np.hypot(np.maximum(own, 1e-12), _APART * evidence.samples.period * rate))
+
+
+def dry_level(evidence: Evidence) -> Array:
+    """(N, n) dry friction of the model at creeping speed: half of what the direction changes."""
+    motion, model = evidence.samples.motion, evidence.model
+    load = evidence.context.load
+    sides = []
+    for direction in (1.0, -1.0):
+        v = np.full_like(motion.v, direction * CREEP)
+        creeping = Motion(motion.time, motion.q, v, np.zeros_like(v), np.arange(motion.samples))
+        sides.append(_slid(model.friction, creeping, direction, load))
+    return np.abs(sides[0] - sides[1]) / 2
+
+
+def _slid(friction: FrictionLaw, motion: Motion, direction: float, load: Array | None) -> Array:
+    """(N, n) friction torque with elasto-plastic elements fully stretched."""
+    tau = np.zeros_like(motion.q)
+    for j, terms in enumerate(friction.terms):
+        for term in terms:
+            if term.kind in ("hysteresis", "load_hysteresis"):
+                column = np.full(motion.samples, direction)
+                weight = np.abs(load[:, j]) if term.by_load and load is not None else 1.0
+                tau[:, j] += term.coefficient * column * weight
+            else:
+                tau[:, j] += term.coefficient * term.column(motion, j, load)
+    return tau

@@ -1,0 +1,195 @@
+"""What an event was: a force on the tool, on a link, or a torque on one joint, by which explains its samples best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.blocks import block_numbers
+from armloop.diagnosis.evidence import Evidence
+from armloop.effects import Context, Effect, Estimate, effect
+from armloop.effects.events import interval
+from armloop.model import AddedEffect
+from armloop.motion import Motion
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Events this close together are one, and so long around one its samples are kept out of everything else, s.
+PAUSE = 0.3
+#: The filter has smeared this much of an event's edges, s; interval and size are found in turn so many times.
+_SMEARED, _REFINEMENTS = 0.05, 3
+#: What was there must explain this part of the event's energy …
+_EXPLAINED = 0.5
+#: … and a torque on one joint, or a force on the tool, is it if nothing with more freedom explains so much more.
+_MORE = 0.05
+#: So many joints or fewer feel a force as if it were a torque on any of them.
+_FEW = 3
+#: Directions in which the arm feels a force less than this part of what it feels of another tell nothing of it.
+_FELT = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One event.
+
+    Attributes:
+        added: the effect with its interval and mean force or torque, ready to be composed with a model.
+        rows: (N,) samples that it touches, with a margin for the filter.
+        before, after: (n,) RMS residual within the interval without and with it, N·m (N); the latter in samples that
+            it was not fitted on.
+        share: part of the event's energy that it removes on samples it was not fitted on.
+        rivals: what explains the samples as well, with its share.
+    """
+
+    added: AddedEffect
+    rows: Mask
+    before: Array
+    after: Array
+    share: float
+    rivals: list[tuple[Effect, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kind:
+    """A force on a link (0: the tool) or a torque on a joint."""
+
+    effect: Effect
+    link: int = 0
+
+    def columns(self, evidence: Evidence, part: Motion) -> Array:
+        """(N, n, p) torque per unit."""
+        context = Context(evidence.model.arm, part)
+        return self.effect.on_all_joints(self.effect.columns(context, float(self.link)), part.joints)
+
+
+def around(motion: Motion, burst: slice) -> Mask:
+    """(N,) samples of a stretch of one run, with a margin."""
+    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    start, end = motion.time[burst.start] - PAUSE, motion.time[burst.stop - 1] + PAUSE
+    rows = np.zeros(motion.samples, dtype=bool)
+    rows[run] = (motion.time[run] >= start) & (motion.time[run] <= end)
+    return rows
+
+
+def push(evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int]) -> Contact | None:
+    """The event in a stretch of samples; None where neither a force nor a torque explains it.
+
+    Args:
+        judged: joints (0-based) whose residual it has to explain.
+    """
+    n = evidence.model.arm.n
+    residual = np.where(np.isin(np.arange(n), judged), residual, 0.0)
+    kinds = [_Kind(effect("external_torque", j + 1)) for j in judged]
+    # Two or three joints cannot tell a force on a link from one on the tool, or from torques on the joints before it.
+    kinds += [_Kind(effect("external_contact", None), link) for link in (0, *range(n - 1, 2, -1))]
+    tried = [
+        (trial, kind) for kind in kinds if (trial := _trial(evidence, residual, burst, kind)) is not None
+    ]
+    if not tried:
+        return None
+    most = max(trial.share for trial, _ in tried)
+    equals = [(trial, kind) for trial, kind in tried if trial.share >= most - _MORE]
+    # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
+    forceful = n > _FEW
+
+    def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
+        trial, kind = pair
+        return forceful and kind.effect.joint is not None, kind.effect.complexity, kind.link > 0, -trial.share
+
+    best, chosen = min(equals, key=order)
+    if best.share < _EXPLAINED:
+        return None
+    rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
+    rivals.pop(chosen.effect.place, None)
+    return Contact(best.added, best.rows, best.before, best.after, best.share, list(rivals.values()))
+
+
+def _trial(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> Contact | None:
+    motion = evidence.samples.motion
+    for _ in range(_REFINEMENTS):
+        burst = _interval(evidence, residual, burst, kind)
+    part, columns, y = _burst(evidence, residual, burst, kind)
+    # Every other piece of a tenth of a second is held out, in turn.
+    pieces = block_numbers(part, 0.1)
+    left = np.array(y)
+    for fold in (0, 1):
+        mine = pieces % 2 == fold
+        if mine.all() or not mine.any():
+            return None
+        left[mine] -= columns[mine] @ _size(columns[~mine], y[~mine])
+    energy = float((y**2).sum())
+    if energy <= 0:
+        return None
+    size = _size(columns, y)
+    error = _size_error(columns, size, y - columns @ size, pieces)
+    edge = max(evidence.samples.period, 0.075)
+    joints = evidence.model.arm.joints
+    unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
+    parameters = interval(float(part.time[0]), float(part.time[-1]), edge, part.q[0], unit)
+    if kind.effect.joint is not None:
+        torque = joints[kind.effect.joint - 1].torque_unit
+        parameters["torque"] = Estimate(float(size[0]), float(error[0]), torque)
+    else:
+        parameters["force"] = Estimate(size.tolist(), error.tolist(), "N")
+        if kind.link:
+            parameters["link"] = Estimate(float(kind.link), 0.0, "1")
+    before, after = (np.sqrt(np.mean(z**2, axis=0)) * evidence.scale for z in (y, left))
+    share = 1 - float((left**2).sum()) / energy
+    return Contact(AddedEffect(kind.effect, parameters), around(motion, burst), before, after, share)
+
+
+def _burst(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> tuple[Motion, Array, Array]:
+    """Motion, torque per unit (N, n, p) and residual (N, n) of a stretch, both weighted."""
+    motion = evidence.samples.motion
+    part = Motion(motion.time[burst], motion.q[burst], motion.v[burst], motion.vdot[burst], np.array([0]))
+    return part, kind.columns(evidence, part) / evidence.scale[:, None], residual[burst] / evidence.scale
+
+
+def _interval(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> slice:
+    """The stretch, in and a little around a burst, in which the size that fits its middle explains most.
+
+    A burst's edges are where the novelty falls, and how the arm moves can make it fall within a push.
+    """
+    motion = evidence.samples.motion
+    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    length = float(motion.time[burst.stop - 1] - motion.time[burst.start])
+    rate = (burst.stop - burst.start) / max(length, 1e-9)
+    inner, margin = round(min(_SMEARED, 0.2 * length) * rate), round(PAUSE * rate)
+    middle = slice(burst.start + inner, burst.stop - inner)
+    if middle.stop - middle.start < 4:
+        return burst
+    _, columns, y = _burst(evidence, residual, middle, kind)
+    size = _size(columns, y)
+    near = slice(max(run.start, burst.start - margin), min(run.stop, burst.stop + margin))
+    _, columns, y = _burst(evidence, residual, near, kind)
+    # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
+    removed = (y**2 - (y - columns @ size) ** 2).sum(axis=1)
+    running = np.concatenate([[0.0], np.cumsum(removed)])
+    # The stretch with the largest sum: up to each end, from where the running sum was least.
+    least = np.minimum.accumulate(running)
+    end = int(np.argmax(running - least))
+    start = int(np.argmin(running[: end + 1]))
+    return slice(near.start + start, near.start + end) if end - start >= 4 else burst
+
+
+def _size(columns: Array, y: Array) -> Array:
+    X = columns.reshape(-1, columns.shape[2])
+    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=_FELT)[0])
+
+
+def _size_error(columns: Array, size: Array, left: Array, pieces: NDArray[np.intp]) -> Array:
+    """(p,) standard error of the mean force or torque, pieces being the independent units.
+
+    Along directions in which the arm does not feel a force, it may be as large as the one that is felt.
+    """
+    X = columns.reshape(-1, columns.shape[2])
+    G = X.T @ X
+    bread = np.linalg.pinv(G, rcond=_FELT**2)
+    scores = np.einsum("njf,nj->nf", columns, left)
+    sums = np.array([scores[pieces == piece].sum(axis=0) for piece in np.unique(pieces)])
+    hidden = np.clip(np.diag(np.eye(len(G)) - bread @ G), 0.0, 1.0) * float(size @ size)
+    return np.asarray(np.sqrt(np.diag(bread @ (sums.T @ sums) @ bread) + hidden))

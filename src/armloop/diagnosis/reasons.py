@@ -1,0 +1,131 @@
+"""What a reader must know before relying on a verdict, one true sentence with its number each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, far_outside
+from armloop.goodness import Parts, merged, outside_trained_range, parts_of, witness
+from armloop.model import ReconstructedModel
+from armloop.signals import smooth
+
+Array = NDArray[np.float64]
+
+#: So many times the baseline is no baseline any more.
+MULTIPLE = 2.0
+#: A model that leaves this part of a joint's torque, RMS, most of it predictable, judges nothing there.
+TOO_POOR = 0.5
+#: Part of the samples outside the trained range that is worth a word, and the part that leaves too little.
+_WORTH_A_WORD, _MOSTLY = 0.02, 0.8
+#: Standard errors by which a part must be predictable to be no noise.
+_SURE = 3.0
+#: Fewest moving samples of a joint that has moved.
+_FEWEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """How far a run can be judged by a model.
+
+    Attributes:
+        reasons: sentences.
+        joints: entries of ``joints`` in ``diagnosis.json``.
+        unknown: whether neither "nothing is there" nor "something is" can be said.
+    """
+
+    reasons: list[str]
+    joints: list[dict[str, Any]]
+    unknown: bool
+
+
+def standing(
+    evidence: Evidence, augmented: ReconstructedModel, after: Sequence[float | None], explained: Sequence[int]
+) -> Standing:
+    """How far a run can be judged, once everything found is in the augmented model.
+
+    Args:
+        after: per joint the held-out RMSE with everything found, N·m (N); NaN where a joint did not move.
+        explained: joints (1-based) whose residual the verdict names already.
+    """
+    samples, model = evidence.samples, evidence.model
+    left = samples.tau - smooth(samples, augmented.predict(samples.motion))
+    parts = parts_of(witness(left, samples, evidence.context.load))
+    outside = outside_trained_range(samples.motion, model.history.get("range"))
+    far = far_outside(samples.motion, model.history.get("range")).mean(axis=0)
+    reasons: list[str] = []
+    unknown = False
+    for j, part in enumerate(parts):
+        reasons += _range(j, float(outside[j]), float(far[j]))
+        unknown |= bool(far[j] > _MOSTLY)
+        if evidence.rows[:, j].sum() < _FEWEST:
+            reasons.append(f"joint {j + 1} does not slide in this run: nothing can be said of it")
+            continue
+        poor = _too_poor(model, j)
+        if poor:
+            reasons.append(poor)
+            unknown = True
+        of = np.nan if after[j] is None else float(after[j] or 0.0)
+        if j + 1 not in explained and not poor and of >= MULTIPLE * evidence.scale[j]:
+            words, real = _multiple(model, part, j, of / float(evidence.scale[j]))
+            reasons.append(words)
+            unknown |= real
+    return Standing(reasons, merged(parts, outside), unknown)
+
+
+def too_still(evidence: Evidence) -> str:
+    """What keeps a run from being judged, empty if nothing does."""
+    # A joint that is pushed about within its friction has not moved.
+    ranges = evidence.model.history.get("range")
+    slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
+    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
+    still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < _FEWEST]
+    blocks = len(np.unique(evidence.blocks))
+    if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
+        return ""
+    return (
+        f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
+        f"{FEWEST_BLOCKS + 1} s in which the joints move"
+    )
+
+
+def _range(j: int, outside: float, far: float) -> list[str]:
+    if outside <= _WORTH_A_WORD:
+        return []
+    return [
+        f"joint {j + 1}: {outside:.0%} of the run lies outside the range the model was trained on; the {far:.0%} that lie "
+        f"beyond {FAR:g} times the range were not judged"
+    ]
+
+
+def _too_poor(model: ReconstructedModel, j: int) -> str:
+    own = model.baseline.get("nrmse") or []
+    share = own[j] if j < len(own) and own[j] is not None else 0.0
+    if share < TOO_POOR:
+        return ""
+    joints = model.baseline.get("joints") or []
+    said = Parts(**joints[j]) if j < len(joints) else Parts(j + 1)
+    if said.much_is_left:
+        return said.sentence()
+    return f"joint {j + 1}: the model leaves {share:.0%} of the torque on its own training logs: it judges nothing there"
+
+
+def _multiple(model: ReconstructedModel, part: Parts, j: int, ratio: float) -> tuple[str, bool]:
+    """A sentence on a residual that nothing accounts for, and whether it is more than noise."""
+    left, error, noise = part.predictable_left, part.std_error, part.noise
+    if left is None or error is None or noise is None or left > max(_SURE * error, 0.2 * (left + noise)):
+        return (
+            f"joint {j + 1}: the residual is {ratio:.1f} times the baseline: something is there, too weak or too short on "
+            "this run to be named; the motion of --next-run would show it",
+            True,
+        )
+    unit = model.arm.joints[j].torque_unit
+    return (
+        f"joint {j + 1}: the residual is {ratio:.1f} times the baseline, but nothing in it can be predicted from the "
+        f"motion: the torque [{unit}] is recorded with more noise than when the model was made",
+        False,
+    )

@@ -1,0 +1,49 @@
+"""What a sparse estimator says of itself."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.errors import InputError
+from armloop.regression.estimators.problem import Problem
+
+
+class Estimator:
+    """How the terms of a sparse regression are chosen.
+
+    Class attributes:
+        name: of the option ``--estimator``.
+        least_squares: whether the coefficients are those of least squares on the few terms kept; only these may be
+            regressed once more.
+        shrinks: whether they are smaller than that.
+        needs_parts: whether held-out parts of the data change the estimate.
+        keeps_all: whether no term is left out, so that there is no :class:`Problem`.
+    """
+
+    name: ClassVar[str]
+    least_squares: ClassVar[bool] = False
+    shrinks: ClassVar[bool] = False
+    needs_parts: ClassVar[bool] = True
+    keeps_all: ClassVar[bool] = False
+
+    def choose(self, problem: Problem) -> NDArray[np.float64]:
+        """(p,) coefficients of the problem's columns, zero where a term is left out.
+
+        Raises:
+            ArithmeticError: a solver does not converge.
+        """
+        raise NotImplementedError
+
+
+def check_estimator(kind: Any, where: str) -> None:
+    """Raise ``InputError`` unless ``kind`` is a complete estimator."""
+    if not (isinstance(kind, type) and issubclass(kind, Estimator)):
+        raise InputError(
+            f"{where}: is {kind!r}; it must be a subclass of armloop.regression.estimators.Estimator"
+        )
+    missing = [key for key in ("name", "choose") if getattr(kind, key, None) is getattr(Estimator, key, None)]
+    if missing:
+        raise InputError(f"{where}: {kind.__name__} lacks {', '.join(missing)}; define them in the class")

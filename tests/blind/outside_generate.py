@@ -1,0 +1,45 @@
+"""Runs of an arm from outside: a URDF, training logs and cases go into one folder, what is hidden into another."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from outside.mujoco_arms import random_arm, write_log
+from outside.references import fourier_reference, mixed_reference
+from outside_cases import draw_case
+
+#: What is hidden in one case after the other, and its size as a share of the joint's RMS torque.
+KINDS = ("clean", "one", "event", "one", "two", "one", "unlisted", "one")
+SIZES = (0.04, 0.08, 0.2)
+
+
+def generate_outside(seed: int, cases: int, logs: Path, answers: Path, seconds: float = 30.0) -> None:
+    """Write one arm's cases; joints, sample rate, noise and controller are drawn from the seed, too."""
+    rng = np.random.default_rng([seed, 0x0575])
+    joints = int(rng.choice([2, 3, 3, 4]))
+    arm = random_arm(seed, joints, sliding=rng.random() < 0.15)
+    how = {
+        "rate": float(rng.choice([100, 200, 250, 500, 1000])),
+        "controller": str(rng.choice(["computed_torque", "pd"])),
+        "noise": float(rng.choice([0.005, 0.01, 0.02])),
+        "encoder_bits": int(rng.choice([13, 15, 17, 20])),
+    }
+    name = f"outside_{seed}"
+    folder = logs / name
+    folder.mkdir(parents=True, exist_ok=True)
+    answers.mkdir(parents=True, exist_ok=True)
+    arm.write_urdf(folder / "arm.urdf", mass_error=0.1)
+    training = (fourier_reference(arm, seed, 40.0), mixed_reference(arm, seed + 1, 40.0))
+    for k, reference in enumerate(training):
+        write_log(arm.simulate(reference, seed=1000 + k, **how), folder / f"baseline_{k + 1}.csv")
+    for case in range(cases):
+        kind, size = KINDS[case % len(KINDS)], SIZES[int(rng.integers(len(SIZES)))]
+        reference = fourier_reference(arm, 1000 * seed + case, seconds, speed=float(rng.uniform(0.6, 1.0)))
+        hidden = draw_case(arm, reference, 1000 * seed + case, kind, size)
+        log = arm.simulate(reference, hidden.effects, seed=case, **how)
+        write_log(log, folder / f"run_{case}.csv")
+        (answers / f"{name}_run_{case}.json").write_text(
+            json.dumps({**hidden.sealed(), "seconds": seconds}, indent=1), encoding="utf-8"
+        )

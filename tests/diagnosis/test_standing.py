@@ -1,0 +1,106 @@
+"""What a verdict rests on: how far a run can be judged, and what is an event."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, measured, rigid_torque, three_axis
+
+from armloop.components import RigidBody
+from armloop.diagnosis import diagnose
+from armloop.diagnosis.contacts import find_contacts
+from armloop.diagnosis.evidence import Evidence
+from armloop.kinematics import nominal_parameters
+from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.log import MotionLog
+from armloop.model import ReconstructedModel
+from armloop.scoring import score
+from armloop.signals import condition
+
+VISCOUS, COULOMB = (0.8, 1.0, 0.5), (0.3, 0.4, 0.2)
+
+
+def run(seed: int, seconds: float, noise: float = 0.01, event: tuple[float, ...] = ()) -> MotionLog:
+    """A log of an arm with Coulomb and viscous friction; an event is joint, start, end and height of a smooth torque."""
+    motion = fourier_motion(seconds, 125.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau = tau + motion.v * VISCOUS + np.tanh(motion.v / 1e-3) * COULOMB
+    if event:
+        joint, start, end, height = event
+        inside = (motion.time > start) & (motion.time < end)
+        course = np.sin(np.pi * (motion.time - start) / (end - start)) ** 2
+        tau[:, int(joint) - 1] += np.where(inside, height * course, 0.0)
+    return measured(motion, tau, seed, noise)
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    """The arm as it is, with the baseline of a run that nothing was fitted to."""
+    terms = tuple(
+        (FrictionTerm("sign", f), FrictionTerm("viscous", c)) for f, c in zip(COULOMB, VISCOUS, strict=True)
+    )
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
+    samples = condition([run(90, 60.0)], bare.conditioning)
+    motion = samples.motion
+    ranges = [np.ptp(motion.q, axis=0) / 2, *(np.abs(x).max(axis=0) for x in (motion.v, motion.vdot))]
+    ranges.append((motion.q.max(axis=0) + motion.q.min(axis=0)) / 2)
+    return replace(
+        bare, baseline=score(bare, samples).moving, history={"range": [x.tolist() for x in ranges]}
+    )
+
+
+def events(model: ReconstructedModel, log: MotionLog) -> list:
+    evidence = Evidence.of(model, condition([log], model.conditioning), [])
+    return find_contacts(evidence, evidence.residual([]))
+
+
+@pytest.mark.parametrize("length", [0.4, 1.5, 4.0])
+def test_a_torque_that_comes_and_goes_smoothly_is_an_event(model: ReconstructedModel, length: float) -> None:
+    (found,) = events(model, run(5, 30.0, event=(2, 12.0, 12.0 + length, 2.0)))
+    assert (found.added.effect.name, found.added.effect.joint) == ("external_torque", 2)
+    start, end, torque = (float(found.added.parameters[key].value) for key in ("start", "end", "torque"))
+    assert 11.9 < start < 12.0 + length / 2 < end < 12.1 + length
+    assert 0.8 < torque < 2.1
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_a_run_like_the_baseline_has_no_event(model: ReconstructedModel, seed: int) -> None:
+    assert events(model, run(seed, 30.0)) == []
+
+
+def test_more_dry_friction_at_a_joint_that_turns_back_is_no_event(model: ReconstructedModel) -> None:
+    log = run(8, 40.0)
+    more = replace(log, tau=log.tau + [0.0, 0.4, 0.0] * np.tanh(log.v / 1e-2))
+    assert events(model, more) == []
+
+
+def test_what_comes_back_with_the_motion_is_no_event(model: ReconstructedModel) -> None:
+    motion = fourier_motion(60.0, 125.0, 9)
+    log = run(9, 60.0)
+    phase = motion.time % 20.0
+    again = replace(
+        log, tau=log.tau + np.where((phase > 4.0) & (phase < 4.6), 2.0, 0.0)[:, None] * [0.0, 1.0, 0.0]
+    )
+    assert events(model, again) == []
+
+
+def test_a_short_run_cannot_tell_and_says_why(model: ReconstructedModel) -> None:
+    answer = diagnose(model, [run(10, 5.0)]).to_dict()
+    assert answer["verdict"] == "cannot_tell"
+    assert any("too little motion to judge" in words for words in answer["reasons"])
+
+
+def test_a_short_run_still_shows_its_event(model: ReconstructedModel) -> None:
+    answer = diagnose(model, [run(10, 7.0, event=(3, 3.0, 3.5, 1.5))]).to_dict()
+    assert [(e["effect"], e["joint"], e["when"]) for e in answer["effects"]] == [
+        ("external_torque", 3, "event")
+    ]
+
+
+def test_a_noisier_sensor_is_no_unlisted_law(model: ReconstructedModel) -> None:
+    answer = diagnose(model, [run(11, 30.0, noise=0.03)]).to_dict()
+    assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
+    assert any("more noise" in words for words in answer["reasons"])
