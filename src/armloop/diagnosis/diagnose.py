@@ -114,7 +114,7 @@ class Diagnosis:
                     **added.to_dict(),
                     "share": found.share,
                     "when": "changed",
-                    "probability": found.probability,
+                    "probability": None,  # nothing has calibrated one
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
@@ -137,7 +137,7 @@ class Diagnosis:
                 **contact.added.to_dict(),
                 "share": contact.share,
                 "when": "event",
-                "probability": 1 / (1 + len(contact.rivals)),
+                "probability": None,
                 "words": contact.added.effect.sentence(contact.added.parameters),
                 "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
                 "alternatives": [

@@ -54,11 +54,6 @@ class Found:
     share: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
 
-    @property
-    def probability(self) -> float:
-        """Weight of the effect among what explains the run as well, all of them alike before."""
-        return 1 / (1 + len(self.rivals))
-
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
