@@ -14,7 +14,7 @@ PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
 WRITING := $(VENV)/.writing
-PYTEST_ARGS ?= -n 2 --dist loadfile
+PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: setup loop test long docs bench blind mutants clean
 

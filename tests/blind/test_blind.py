@@ -22,16 +22,20 @@ from run import judge  # noqa: E402
 
 from armloop.drake_systems.scenarios import load_plan  # noqa: E402
 
-ARMS, CASES = (1, 2), 6
+ARMS = (1, 2)
 
 
-@pytest.fixture(scope="module")
-def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(3, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.long)],
+    ids="{} runs an arm".format,
+)
+def cases(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
     """Verdicts on logs beside which no answer is left: those are read and removed before the first diagnosis."""
     place = tmp_path_factory.mktemp("blind")
     sealed: dict[str, dict[str, Any]] = {}
     for seed in ARMS:
-        generate(seed, CASES, load_plan("paper"), place / "logs", place / "answers")
+        generate(seed, request.param, load_plan("paper"), place / "logs", place / "answers")
     for path in (place / "answers").glob("*.json"):
         sealed[path.stem] = json.loads(path.read_text(encoding="utf-8"))
     shutil.rmtree(place / "answers")
@@ -42,15 +46,13 @@ def cases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
     return {name: (sealed[name], verdict) for name, verdict in verdicts.items()}
 
 
-@pytest.mark.slow
 def test_verdicts_are_right_without_the_answers(cases: dict[str, Case]) -> None:
     large = {k: c for k, c in cases.items() if min(c[0]["sizes"], default=1.0) >= LARGE}
     wrong = {k: (c[0]["effects"], c[1]) for k, c in large.items() if not is_right(*c)}
-    assert len(large) >= 6
-    assert len(wrong) <= 1, wrong
+    assert len(large) >= len(cases) // 2
+    assert len(wrong) <= len(large) // 6, wrong
 
 
-@pytest.mark.slow
 def test_no_false_alarms(cases: dict[str, Case]) -> None:
     clean = [verdict for hidden, verdict in cases.values() if hidden["kind"] == "clean"]
     assert all(verdict["verdict"] == "no_effect" for verdict in clean)

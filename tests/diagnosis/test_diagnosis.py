@@ -343,12 +343,15 @@ def test_an_effect_must_exceed_what_the_model_leaves_on_the_worst_of_its_baselin
     assert [e["effect"] for e in diagnose(model, [log]).to_dict()["effects"]] == ["coulomb_friction"]
     worst = [5 * rmse for rmse in model.baseline["rmse"]]
     careful = replace(model, baseline={**model.baseline, "worst": worst})
+    # More than the baseline, less than its worst: nothing is named, and that there is nothing is not said either.
     answer = diagnose(careful, [log]).to_dict()
-    assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
+    assert (answer["verdict"], answer["effects"]) == ("cannot_tell", [])
+    assert any(reason.startswith("joint 1: ") and "baseline" in reason for reason in answer["reasons"])
 
     def law(motion: Motion) -> np.ndarray:
         return on_joint(motion, 1, 0.1 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])
 
     strange = run(law, seed=6)
     assert diagnose(model, [strange]).verdict == "unlisted_effect"
-    assert diagnose(careful, [strange]).verdict == "no_effect"
+    answer = diagnose(careful, [strange]).to_dict()
+    assert (answer["verdict"], answer["effects"]) == ("cannot_tell", [])

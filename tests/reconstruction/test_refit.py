@@ -9,6 +9,7 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.found import Found
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.refit import refit
+from armloop.regression.sparse import Sparse
 from armloop.signals import condition
 from armloop.uncertainty.simulated import (
     COULOMB,
@@ -44,7 +45,7 @@ def biased():
 def test_friction_comes_back_from_varying_motion_alone(varying):
     found = biased()
     data = Data.of(condition(varying, true_model().conditioning), Options())
-    assert refit(found, data, "evidence")
+    assert refit(found, data, Sparse("evidence").how)
     for j in range(3):
         law = found.law.stribeck_parameters(j)
         assert law["static"] == pytest.approx(STATIC[j], rel=0.04)
@@ -56,8 +57,8 @@ def test_friction_comes_back_from_varying_motion_alone(varying):
 def test_shrunken_and_unfiltered_coefficients_are_left_alone(varying):
     found, samples = biased(), condition(varying, true_model().conditioning)
     before = found.law
-    assert not refit(found, Data.of(samples, Options()), "lasso")
-    assert not refit(found, Data.of(replace(samples, cutoff_hz=0.0), Options()), "evidence")
+    assert not refit(found, Data.of(samples, Options()), Sparse("lasso").how)
+    assert not refit(found, Data.of(replace(samples, cutoff_hz=0.0), Options()), Sparse("evidence").how)
     assert found.law == before
 
 
@@ -66,6 +67,6 @@ def test_held_out_samples_are_not_used(varying):
     data = Data.of(samples, Options())
     tau = np.where(data.reference.held_out[:, None], 1e3, samples.tau)
     one, other = biased(), biased()
-    refit(one, data, "evidence")
-    refit(other, Data.of(replace(samples, tau=tau), Options()), "evidence")
+    refit(one, data, Sparse("evidence").how)
+    refit(other, Data.of(replace(samples, tau=tau), Options()), Sparse("evidence").how)
     assert one.law == other.law
