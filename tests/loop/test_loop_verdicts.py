@@ -20,7 +20,9 @@ def blind():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "clean"), [(2, False), (13, False), (101, True)])
+@pytest.mark.parametrize(
+    ("seed", "clean"), [(2, False), pytest.param(13, False, marks=pytest.mark.long), (101, True)]
+)
 def test_the_verdict_is_right(seed, clean):
     case = blind().run("three_axis", seed, clean)
     assert case.right, f"hidden: {case.hidden}; verdict: {case.found}"
