@@ -75,15 +75,18 @@ def around(motion: Motion, burst: slice) -> Mask:
     return rows
 
 
-def push(evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int]) -> Contact | None:
+def push(
+    evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int], shown: Sequence[int]
+) -> Contact | None:
     """The event in a stretch of samples; None where neither a force nor a torque explains it.
 
     Args:
         judged: joints (0-based) whose residual it has to explain.
+        shown: those of them that it was noticed at; a torque on one joint is on one of these.
     """
     n = evidence.model.arm.n
     residual = np.where(np.isin(np.arange(n), judged), residual, 0.0)
-    kinds = [_Kind(effect("external_torque", j + 1)) for j in judged]
+    kinds = [_Kind(effect("external_torque", j + 1)) for j in shown]
     # Two or three joints cannot tell a force on a link from one on the tool, or from torques on the joints before it.
     kinds += [_Kind(effect("external_contact", None), link) for link in (0, *range(n - 1, 2, -1))]
     tried = [
