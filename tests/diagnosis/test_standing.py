@@ -135,6 +135,19 @@ def test_a_joint_that_sticks_while_another_slides_shows_no_event(model: Reconstr
     assert not _sticks(evidence, other)
 
 
+def test_what_friction_holds_meanwhile_does_not_hide_an_event(model: ReconstructedModel) -> None:
+    motion = fourier_motion(30.0, 125.0, 16)
+    for x, there in ((motion.q, 0.4), (motion.v, 0.0), (motion.vdot, 0.0)):
+        x[:, 2] = there  # joint 3 is at rest all the time
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau = tau + motion.v * VISCOUS + np.tanh(motion.v / 1e-3) * COULOMB
+    inside = (motion.time > 12.0) & (motion.time < 13.0)
+    tau[inside] += [0.0, 0.25, 0.18]  # the latter is within the dry friction of joint 3
+    (found,) = events(model, measured(motion, tau, 16, 0.01))
+    assert (found.added.effect.name, found.added.effect.joint) == ("external_torque", 2)
+    assert found.added.parameters["torque"].value == pytest.approx(0.25, abs=0.05)
+
+
 def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
     motion = fourier_motion(10.0, 25.0, 14)
 

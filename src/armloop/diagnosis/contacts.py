@@ -73,7 +73,9 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     motion = evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
-        rows, new = novelty(evidence, *innovations(evidence, residual))
+        innovation, rest = innovations(evidence, residual)
+        tells = innovation != 0.0
+        rows, new = novelty(evidence, innovation, rest)
         level = np.where(known[rows][:, None], 0.0, np.abs(new))
         bursts = _together([_bursts(motion, rows, of_joint) for of_joint in level.T])
         bursts = [
@@ -83,6 +85,7 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         ]
         bursts = _standing_out(motion, rows, level, bursts)
     else:
+        tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
@@ -95,8 +98,10 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         others = {
             j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints
         } - burst.joints
-        judged = sorted(set(range(motion.joints)) - others)
-        found.append(push(evidence, residual, burst.rows, judged, sorted(burst.joints)))
+        counted = tells.copy()
+        counted[:, sorted(burst.joints)] = True
+        counted[:, sorted(others)] = False
+        found.append(push(evidence, residual, burst.rows, counted, sorted(burst.joints)))
     return _distinct(motion, [contact for contact in found if contact is not None])
 
 
