@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from synthetic import fourier_motion
 
 from armloop.arm import Arm
-from armloop.diagnosis.fit import solve
 from armloop.effects import Context, effect
 from armloop.effects.payload import Payload
+from armloop.effects.solving import solve
 from armloop.kinematics import link_motion
 from armloop.motion import Motion
 from armloop.regression.moments import Moments
