@@ -8,7 +8,7 @@ from armloop.diagnosis.evidence import FOLDS, Stacked
 from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead
 from armloop.effects import Estimate, effect
-from armloop.effects.solving import solve
+from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 
 

@@ -12,9 +12,9 @@ from synthetic import fourier_motion
 from armloop.arm import Arm
 from armloop.effects import Context, effect
 from armloop.effects.payload import Payload
-from armloop.effects.solving import solve
 from armloop.kinematics import link_motion
 from armloop.motion import Motion
+from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 
 

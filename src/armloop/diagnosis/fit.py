@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.effects import Effect, Estimate
-from armloop.effects.solving import solve, unit_scale
+from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.effects import Estimate
-from armloop.effects.solving import Linear, solve
 from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
+from armloop.regression.embedded import Linear, solve
 from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Least squares over the free parameters of several effects, from normal equations alone (Gauss-Newton)."""
+"""Least squares over free parameters of which the coefficients are functions, from normal equations (Gauss-Newton)."""
 
 from __future__ import annotations
 
