@@ -24,6 +24,7 @@ ANSWERS = {
         "crossvalidation.json",
     ),
     "diagnosis": ("diagnose model.json good.csv --out OUT", "diagnosis.json"),
+    "cluster": ("cluster good.csv", None),
     "tracking": ("track short.yaml --out OUT", "tracking.json"),
 }
 

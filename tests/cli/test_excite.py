@@ -1,10 +1,10 @@
 """`armloop excite` as a user meets it: files, answers, and one line where the input is at fault."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from answers import answered
 
 from armloop.cli import main
 from armloop.excitation import read_reference
@@ -16,7 +16,7 @@ QUICK = ["--library", "rigid-body", "--duration", "6", "--starts", "1", "--rando
 def test_reference_and_answer(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, report = tmp_path / "reference.csv", tmp_path / "report.html"
     assert main(["excite", "three_axis", "--out", str(out), "--report", str(report), "--json", *QUICK]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = answered(capsys.readouterr().out, "excitation")
     assert answer["error"] < answer["random"]["error"]["median"]
     assert answer["random"]["condition"]["count"] == 4
     assert answer["data_ratio"]["most"] == 32

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
+from answers import answered
 from foreign_logs import NAMES, bag, libfranka, motion, rtde
 from synthetic import three_axis
 
@@ -269,11 +270,16 @@ def test_suggest_writes_a_map_with_questions_that_must_be_answered(tmp_path, log
     assert main(["convert", str(table), "--suggest", "--map", str(place)]) == 0
     assert "tau.unit" in capsys.readouterr().out
     assert read_map(place).q.unit == "deg" and read_map(place).time.unit == "ms"
+    assert main(["convert", str(table), "--suggest", "--json"]) == 0
+    suggestion = answered(capsys.readouterr().out, "suggestion")
+    assert suggestion["text"] == place.read_text() and "tau.unit" in suggestion["unsure"]
     line = ["convert", str(table), "--map", str(place), "--out", str(out)]
     assert "does not say what tau holds" in refused(line, capsys)
     assert "exists" in refused(["convert", str(table), "--suggest", "--map", str(place)], capsys)
     place.write_text(place.read_text().replace("unit: '?'", "unit: N*m"))
-    assert main(line) == 0
+    assert main([*line, "--json"]) == 0
+    answer = answered(capsys.readouterr().out, "conversion")
+    assert answer["runs"] == [[0, log.samples]] and answer["tau_unit"] == "N*m"
     assert_same(read_log(out), log)
 
 

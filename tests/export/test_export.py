@@ -1,12 +1,12 @@
 """Every export, read back by its consumer, gives the model's torques as far as the target can say them."""
 
-import json
 import subprocess
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from answers import answered
 from exact_parts import ARMS, disguised, energies, model_of, rigid_body, scara_terms
 
 from armloop.arm import load_arm
@@ -205,7 +205,7 @@ def test_the_command_prints_and_answers(tmp_path, capsys):
     out = capsys.readouterr().out
     assert "read back by Drake" in out and "cannot say" in out and "Stribeck" in out
     assert main([*line, "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = answered(capsys.readouterr().out, "export")
     assert max(answer["difference"]) < 1e-6 * max(answer["rms"])
     assert answer["files"] == [str(tmp_path / "arm.sdf")]
 

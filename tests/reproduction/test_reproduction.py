@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from answers import answered
 
 from armloop.cli import main
 from armloop.library.double_feature_set import DoubleFeatureSet
@@ -173,8 +174,8 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys, small_run, monkeypa
     monkeypatch.setattr("armloop.reproduction.run_item", lambda name, context: small_run[name])
     out = tmp_path / "out"
     assert main(["reproduce", "fig6", "fig5", "--out", str(out), "--json"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    written = json.loads((out / "reproduction.json").read_text())
+    printed = answered(capsys.readouterr().out, "reproduction")
+    written = answered((out / "reproduction.json").read_text(), "reproduction")
     assert written.pop("written_by") == "armloop reproduce"
     assert printed == written
     assert list(printed) == ["fig5", "fig6"]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from answers import answered
 from operation import contents
 
 from armloop.cli import main
@@ -52,10 +53,13 @@ def test_a_second_call_finds_nothing_new_and_changes_no_byte(
     before = contents(watched)
     arguments = ["--models", str(fleet / "models"), "--logs", str(fleet / "logs"), "--store", str(watched)]
     assert main(["watch", *arguments, "--sums-only", "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+    answer = answered(capsys.readouterr().out, "watch")
     assert answer["logs"] == {"read": 0, "known": 120, "set_aside": 0}
     assert (answer["new"], len(answer["alarms"])) == ([], 2)
     assert contents(watched) == before
+    # the same answer with the alarms told for the first time
+    told = json.dumps({**answer, "new": Store(watched).alarms(), "set_aside": []})
+    assert len(answered(told, "watch")["new"]) == 2
 
 
 def test_the_page_stands_by_itself(fleet: Path, watched: Path, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> None:
 def _suggest(options: argparse.Namespace, arm: object) -> None:
     from pathlib import Path
 
-    from armloop.commands.shared import out_file
+    from armloop.commands.shared import out_file, print_json
     from armloop.convert import doubts, read_sources, suggested, written
     from armloop.errors import InputError
     from armloop.files import write_text
@@ -114,10 +114,17 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     recording = read_sources(options.sources[:1], arm, options.topic)[0]  # type: ignore[arg-type]
     mapping, unsure = suggested(recording, arm)  # type: ignore[arg-type]
     text = written(mapping, unsure, recording)
+    if place is not None:
+        write_text(place, text)
+    if options.json:
+        answer = {"map": None if place is None else str(place), "kind": recording.kind}
+        print_json(
+            {**answer, "samples": recording.samples, "joints": mapping.n, "unsure": unsure, "text": text}
+        )
+        return
     if place is None:
         print(text, end="")
         return
-    write_text(place, text)
     print(f"{recording.path.name}: {recording.kind}, {recording.samples} rows, {mapping.n} joints")
     for line in doubts(unsure):
         print(f"  unsure of {line}")

@@ -17,6 +17,16 @@ from armloop.schemas.answers import DiagnosisData, LoopData
 from armloop.schemas.answers import TrackingData as TrackingAnswer
 from armloop.schemas.model import ModelData
 from armloop.schemas.scores import CrossValidationData, EvaluationData, MeasuredData, ReconstructionData
+from armloop.schemas.tools import (
+    ClusterData,
+    ConversionData,
+    ExcitationData,
+    ExportData,
+    ReproductionData,
+    SuggestionData,
+    TuningData,
+    WatchData,
+)
 
 FILES: dict[str, Any] = {
     "model": ModelData,
@@ -27,6 +37,14 @@ FILES: dict[str, Any] = {
     "evaluation": EvaluationData,
     "reconstruction": ReconstructionData,
     "crossvalidation": CrossValidationData,
+    "cluster": ClusterData,
+    "conversion": ConversionData,
+    "suggestion": SuggestionData,
+    "excitation": ExcitationData,
+    "export": ExportData,
+    "reproduction": ReproductionData,
+    "tune": TuningData,
+    "watch": WatchData,
     "scenario": TrackingData,
     "plant": PlantData,
     "collection_plan": PlanData,
