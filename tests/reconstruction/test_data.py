@@ -74,7 +74,7 @@ def test_shared_coefficients_are_the_same_to_the_bit_wherever_logs_are_kept(
 def test_a_long_pass_tells_how_much_time_is_left(
     logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("armloop.reconstruction.data.paced", lambda progress: progress)
+    monkeypatch.setattr("armloop.reconstruction.data.paced", lambda progress, _: progress)
     said: list[str] = []
     data = Data.streamed(logs, Conditioning(), Options(), progress=said.append)
     assert data.sum(lambda chunk: len(chunk.blocks), "counting") > 0
