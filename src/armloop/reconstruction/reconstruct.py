@@ -51,9 +51,11 @@ from armloop.reconstruction.tally import Part
 from armloop.reconstruction.torque_checks import check_torques
 from armloop.scoring import Score
 from armloop.signals import Conditioning
-from armloop.workers import Workers
+from armloop.workers import Workers, one_thread
 
 METHODS = ("stepwise", "sindy")
+#: Samples as recorded in which ripples are looked for, where the logs are not kept in memory.
+_RIPPLE = 300_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +117,7 @@ def default_conditioning(library: str) -> Conditioning:
     return Conditioning() if library == "double-feature-set" else SHARED_CONDITIONING
 
 
+@one_thread
 def reconstruct(
     logs: Sequence[LogSource],
     arm: Arm,
@@ -140,8 +143,7 @@ def reconstruct(
         recorded: how the logs recorded the torque, kept in the model for later logs.
         workers: who passes over logs that are not kept in memory; by default this process.
         in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
-            every pass by the stepwise method on the double feature set, in memory that does not grow with them;
-            the other libraries read everything, and are not compared with it.
+            every pass by the stepwise method, whatever the library, in memory that does not grow with them.
 
     Raises:
         InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
@@ -169,7 +171,7 @@ def reconstruct(
     kept = [] if large and method == "stepwise" else [log.read() for log in logs]
     require_different(kept)
     time_series = conditioning is None or conditioning.cutoff_hz > 0
-    if library is None and (not time_series or (large and arm.n <= MOST_JOINTS)):
+    if library is None and not time_series:
         library = candidates(arm, settings)[0]
     if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
@@ -187,8 +189,8 @@ def reconstruct(
     def attempt(library: str, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(default_conditioning(library))
         progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
-        if large and method == "stepwise" and library == "double-feature-set":
-            data = Data.streamed(logs, how, settings, workers)
+        if large and method == "stepwise":
+            data = Data.streamed(logs, how, settings, workers, progress)
         else:
             data = Data.kept(kept or [log.read() for log in logs], how, settings)
             data = data.nested() if nested else data
@@ -260,13 +262,12 @@ def held_apart(
 
 
 def _found(arm: Arm, data: Data, method: str, library: str, options: Options, progress: Progress) -> Found:
-    samples, held_out = data.reference.samples, data.reference.held_out
     if library == "rigid-body":
-        return rigid_body(arm, samples, held_out, options, progress)
+        return rigid_body(arm, data, options, progress)
     if library == "lagrangian":
-        return lagrangian(arm, samples, held_out, options, progress)
+        return lagrangian(arm, data, options, progress)
     if method == "sindy":
-        return sindy(arm, samples, held_out, options, progress)
+        return sindy(arm, data.reference.samples, data.reference.held_out, options, progress)
     return stepwise_on(arm, data, options, progress)
 
 
@@ -285,12 +286,15 @@ def _finished(
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if method == "stepwise" and data.in_memory:
+    if method == "stepwise":
         bare = ReconstructedModel(
             arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
         )
-        chunk = data.reference
-        ripple = find_ripple(bare, [log.read() for log in logs], chunk.samples, chunk.held_out)
+        if data.in_memory:
+            recorded_logs, chunk = [log.read() for log in logs], data.reference
+        else:
+            recorded_logs, chunk = data.recorded(_RIPPLE)
+        ripple = find_ripple(bare, recorded_logs, chunk.samples, chunk.held_out)
         found.notes += ripple_notes(ripple)
         for one in (found, *([] if found.final is None else [found.final])):
             one.effects = (*one.effects, *ripple)
