@@ -4,7 +4,7 @@ Samples of the three-axis arm with friction and 1 % torque noise are drawn anew,
 data asks for them; a chunk holds static (creeping), constant-velocity and varying ones, 1 : 10 : 10 as in the paper.
 Every size is reconstructed by the stepwise method in processes of its own; the time contains the drawing.
 
-    python benchmarks/ten_million_samples.py [--samples 10000000] [--jobs 2]
+    python benchmarks/ten_million_samples.py [--samples 10000000] [--jobs 2] [--library rigid-body]
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from armloop.kinematics import nominal_parameters
 from armloop.log import MotionLog
 from armloop.newton_euler import inverse_dynamics
 from armloop.pieces import PIECE
-from armloop.reconstruction import reconstruct
+from armloop.reconstruction import LIBRARIES, reconstruct
 from armloop.reports.tables import table
 from armloop.signals import Conditioning
 from armloop.workers import Processes
@@ -83,12 +83,13 @@ def chunks(samples: int) -> list[Drawn]:
     return [Drawn(seed, int(size)) for seed, size in enumerate(np.diff(edges))]
 
 
-def run(samples: int, jobs: int) -> dict:
+def run(samples: int, jobs: int, library: str) -> dict:
     """Reconstruct, and say how long it took, in how much memory, and what came out."""
     start = time.perf_counter()
     result = reconstruct(
         chunks(samples),
         arm(),
+        library=library,
         conditioning=Conditioning(cutoff_hz=0),
         workers=Processes(jobs),
         in_memory=0,  # small logs, too, take the way of large ones here
@@ -116,10 +117,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="reconstruction in constant memory")
     parser.add_argument("--samples", type=int, default=1_000_000, help="largest size (%(default)s)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="(%(default)s)")
+    parser.add_argument("--library", choices=LIBRARIES, default="double-feature-set", help="(%(default)s)")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
-        print(json.dumps(run(options.samples, options.jobs)))
+        print(json.dumps(run(options.samples, options.jobs, options.library)))
         return
     rows = []
     sizes = [size for size in (100_000, 1_000_000, 10_000_000) if size < options.samples]
@@ -132,6 +134,8 @@ def main() -> None:
             str(size),
             "--jobs",
             str(options.jobs),
+            "--library",
+            options.library,
         ]
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         answer = subprocess.run(
@@ -160,7 +164,7 @@ def main() -> None:
         "terms",
         "held-out nRMSE",
     ]
-    print(table(header, rows, f"Stepwise reconstruction, {options.jobs} processes"))
+    print(table(header, rows, f"{options.library}, {options.jobs} processes"))
     if options.samples < 10_000_000:
         print("ten million: python benchmarks/ten_million_samples.py --samples 10000000")
 

@@ -77,7 +77,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
         type=int,
         default=None,
         metavar="N",
-        help="processes that pass over logs too large for memory (default: one per core)",
+        help="processes that pass over logs of more than 500,000 samples, which are read piece by piece (default: one "
+        "per core)",
     )
     p.add_argument(
         "--scheduler",
@@ -120,7 +121,12 @@ def run(options: argparse.Namespace) -> None:
         out_file(getattr(options, name), f"--{name}")
     arm = arm_of(options)
     recorded = recorded_as(options, TORQUE)
-    logs = log_sources(options.logs, arm.n, recorded, 0 if options.scheduler else IN_MEMORY)
+    most = 0 if options.scheduler else IN_MEMORY
+    logs = log_sources(options.logs, arm.n, recorded, most)
+    if options.jobs is not None and sum(log.samples for log in logs) <= most:
+        progress(options)(
+            f"--jobs is not used: logs of up to {most:,} samples are kept in memory and regressed at once"
+        )
     workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)
     try:
         result = run(
@@ -139,7 +145,7 @@ def run(options: argparse.Namespace) -> None:
             progress(options),
             recorded,
             workers,
-            in_memory=0 if options.scheduler else IN_MEMORY,
+            in_memory=most,
         )
     finally:
         workers.close()
