@@ -158,8 +158,8 @@ def run() -> None:
         day, rate = 10_000 * 86400 / options.seconds, count / busier
         print(
             f"on paper, 10,000 arms day and night in logs of {options.seconds:g} s: {day:.3g} logs and "
-            f"{24e4 * kept / hours / 1e12:.2f} TB kept a day, {day / rate / 86400:.0f} workers with a processor each, {rate:.1f} logs/s;\n"
-            f"one such log an hour from each: {2.4e5 / rate / 3600:.1f} worker hours and "
+            f"{24e4 * kept / hours / 1e12:.2f} TB kept a day,\n{day / rate / 86400:.0f} workers with a processor each, "
+            f"{rate:.1f} logs/s; one such log an hour from each: {2.4e5 / rate / 3600:.1f} worker hours and "
             f"{2.4e5 * kept / count / 1e9:.1f} GB a day"
         )
 
