@@ -231,7 +231,7 @@ def found_after(
     moved = np.abs(later[-1] - values[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         parts = np.nanmax(np.where(tolerance > 0, moved / tolerance, np.nan))
-        spread = np.nanmax(moved / np.nanstd(values, axis=0))
+        spread = np.nanmax(moved / np.std(values, axis=0))
     print(
         f"{label:38s} not found in {len(level)} units; at most {parts:.1f} of the tolerance and {spread:.1f} of the "
         "healthy units' spread",
