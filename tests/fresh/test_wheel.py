@@ -14,6 +14,10 @@ home = sys.argv[1]
 assert not armloop.__file__.startswith(home), armloop.__file__
 for path in [*map(urdf_path, urdf_names()), *map(scenario_path, scenario_names()), measured_folder("ur5")]:
     assert not str(path).startswith(home) and path.exists(), path
+import importlib, pkgutil
+for module in pkgutil.walk_packages(armloop.__path__, "armloop."):
+    if not module.name.endswith("__main__"):
+        importlib.import_module(module.name)
 print(*urdf_names())
 print(*scenario_names())
 """
