@@ -1,5 +1,5 @@
 # make setup   create .venv with everything in it, from requirements.lock
-# make loop    the main job, start to end, in out/loop; and on measured data, in out/measured
+# make loop    the main job, start to end, in out/loop; `armloop loop --measured` is that on measured data
 # make test    style, types and tests
 # make docs    the documentation, tutorials executed, in out/site
 # make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel
@@ -47,14 +47,8 @@ $(TESTING): requirements-test.lock $(INSTALLED)
 	@grep '^[^#]' requirements-test.lock | xargs $(BIN)/pip install -qq --no-deps
 	@touch $@
 
-# The measured loop needs one core for half a minute, which the other leaves idle now and then; it is told afterwards.
 loop: setup
-	@mkdir -p out
-	@nice $(BIN)/armloop loop --measured --out out/measured >out/measured.txt 2>&1 & measured=$$!; \
-	trap 'kill $$measured 2>/dev/null' INT TERM; \
-	echo "$(BIN)/armloop loop --out out/loop"; $(BIN)/armloop loop --out out/loop || { kill $$measured; exit 1; }; \
-	echo "$(BIN)/armloop loop --measured --out out/measured"; \
-	wait $$measured; status=$$?; cat out/measured.txt; exit $$status
+	$(BIN)/armloop loop --out out/loop
 
 # With the packages of the documentation, whose site a test builds.
 test: setup $(WRITING)

@@ -2,8 +2,9 @@
 
 The scenario is `payload_pickup`: the reference of Fig. 14 for three periods of 20 s. The model is reconstructed from data
 collected on the scenario's own arm. In the first period the monitor learns; then the plant changes. Printed are the
-tracking errors before, from the change until what was named is supplied, and over the last period, beside those of the
-same run without the adaptive feedforward.
+tracking errors before, from the change until what was named is supplied, and over the last period. Beside them: the last
+period of the same run without the adaptive feedforward, and with the model that a diagnosis of the 20 s after the change
+identifies and that is put in by hand (`armloop track payload_pickup`), which is what watching should come near to.
 
     python benchmarks/watch_in_loop.py
 """
@@ -12,7 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from armloop.diagnosis import diagnose
 from armloop.drake_systems.effects import UndeclaredEffect
+from armloop.drake_systems.pickup import run_pickup
 from armloop.drake_systems.scenarios import load_tracking
 from armloop.drake_systems.tracking import TrackingResult
 from armloop.drake_systems.watched_run import run_watched
@@ -48,10 +51,16 @@ def run() -> None:
             ("during", found.during),
             ("last period", found.after),
         ):
-            print(f"  η {label:22s} {eta(result)}  deg")
+            print(f"  η {label:24s} {eta(result)}  deg")
         if changes:
             plain = run_watched(scenario, model, changes, at, adapt=False).after
-            print(f"  η {'last period, untouched':22s} {eta(plain)}  deg")
+            print(f"  η {'last period, untouched':24s} {eta(plain)}  deg")
+            identified = run_pickup(
+                scenario, model, lambda log: diagnose(model, [log]).model, changes=changes
+            ).phases["augmented"]
+            print(f"  η {'last period, identified':24s} {eta(identified)}  deg")
+            ratio = found.after.eta / identified.eta
+            print(f"  {'ratio to the identified':26s} {' '.join(f'{x:7.2f}' for x in ratio)}")
         jumps = np.abs(np.diff(found.supplied, axis=0)).max()
         print(
             f"  revisions {found.known.revision}, given back {found.given_back}, largest change of what is supplied "

@@ -2,6 +2,8 @@
 
 import sys
 from collections.abc import Iterator
+from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 from armloop import workers
 from armloop.errors import InputError, LogError
-from armloop.workers import Cluster, Processes, Serial, Workers, map_reduce
+from armloop.workers import Cluster, Processes, Serial, Workers
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +36,8 @@ def test_answers_come_in_order_and_sums_are_equal_to_the_bit(anyone: Workers) ->
     chunks = [np.random.default_rng(seed).normal(size=100) for seed in range(30)]
     for answer, chunk in zip(anyone.map(lambda x: 2 * x, chunks), chunks, strict=True):
         np.testing.assert_array_equal(answer, 2 * chunk)
-    total = map_reduce(anyone, lambda x: x**3, chunks)
-    np.testing.assert_array_equal(total, map_reduce(Serial(), lambda x: x**3, chunks))
+    total, serial = (reduce(add, workers.map(lambda x: x**3, chunks)) for workers in (anyone, Serial()))
+    np.testing.assert_array_equal(total, serial)
 
 
 def test_a_fault_found_by_a_worker_is_the_users(anyone: Workers) -> None:

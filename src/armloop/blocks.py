@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,3 +43,31 @@ def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray
     """(B,) sums of values (N,) over the blocks that occur, in order."""
     _, index = np.unique(blocks, return_inverse=True)
     return np.asarray(np.bincount(index, weights=values), dtype=float)
+
+
+def overlapping(samples: Samples, size: int, margin: float) -> Iterator[tuple[Samples, slice, int]]:
+    """Consecutive samples, some at a time, with what lies beside them (overlap-save): what a filter mixes is complete.
+
+    Args:
+        size: samples at a time.
+        margin: seconds beside them.
+
+    Yields:
+        The samples with their margins, the part of them that counts, and the number of its first sample.
+    """
+    N = samples.motion.samples
+    beside = int(np.ceil(margin / samples.period))
+    for start in range(0, N, size):
+        stop = min(start + size, N)
+        low, high = max(0, start - beside), min(N, stop + beside)
+        yield stretch(samples, low, high), slice(start - low, stop - low), start
+
+
+def stretch(samples: Samples, low: int, high: int) -> Samples:
+    """Samples from one number up to another; spans, which belong to whole runs, are left out."""
+    motion, cut = samples.motion, slice(low, high)
+    inner = motion.starts[(motion.starts > low) & (motion.starts < high)] - low
+    part = Motion(
+        motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
+    )
+    return Samples(part, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz)

@@ -15,17 +15,17 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import reduce
+from functools import wraps
 from multiprocessing import get_context
-from operator import add
 from threading import Thread
-from typing import Any, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from armloop.errors import InputError
 from armloop.quiet import quiet
 
 Chunk = TypeVar("Chunk")
 Answer = TypeVar("Answer")
+Arguments = ParamSpec("Arguments")
 
 #: Seconds that a scheduler has to answer.
 PATIENCE = 10.0
@@ -45,12 +45,6 @@ class Workers(Protocol):
     def close(self) -> None:
         """Let go of what was opened."""
         ...
-
-
-def map_reduce(workers: Workers, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Answer:
-    """Sum of the function's answers over the chunks (at least one); only the running sum is kept."""
-    answers: Iterator[Any] = workers.map(function, chunks)
-    return reduce(add, answers)
 
 
 class Serial:
@@ -234,6 +228,17 @@ def _inherited(function: Callable[[Any], Any], chunks: Sequence[Any]) -> Iterato
 def _call(key: int, index: int) -> Any:
     function, chunks = _INHERITED[key]
     return function(chunks[index])
+
+
+def one_thread(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+    """The function with one BLAS thread: several wait for each other longer than they compute where matrices are small."""
+
+    @wraps(function)
+    def alone(*arguments: Arguments.args, **named: Arguments.kwargs) -> Answer:
+        with _threads():
+            return function(*arguments, **named)
+
+    return alone
 
 
 def _threads() -> Any:

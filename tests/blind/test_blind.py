@@ -22,25 +22,27 @@ from run import judge  # noqa: E402
 
 from armloop.drake_systems.scenarios import load_plan  # noqa: E402
 
-ARMS = (1, 2)
-
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(3, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.long)],
-    ids="{} runs an arm".format,
+    params=[
+        pytest.param(((1,), 3), marks=pytest.mark.slow),
+        pytest.param(((1, 2), 6), marks=pytest.mark.long),
+    ],
+    ids="arms and runs {0[0]} {0[1]}".format,
 )
 def cases(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
     """Verdicts on logs beside which no answer is left: those are read and removed before the first diagnosis."""
     place = tmp_path_factory.mktemp("blind")
+    arms, runs = request.param
     sealed: dict[str, dict[str, Any]] = {}
-    for seed in ARMS:
-        generate(seed, request.param, load_plan("paper"), place / "logs", place / "answers")
+    for seed in arms:
+        generate(seed, runs, load_plan("paper"), place / "logs", place / "answers")
     for path in (place / "answers").glob("*.json"):
         sealed[path.stem] = json.loads(path.read_text(encoding="utf-8"))
     shutil.rmtree(place / "answers")
     verdicts: dict[str, dict[str, Any]] = {}
-    for seed in ARMS:
+    for seed in arms:
         verdicts |= judge(place / "logs" / f"arm_{seed}", place / f"verdicts_{seed}.json")
     assert verdicts.keys() == sealed.keys()
     return {name: (sealed[name], verdict) for name, verdict in verdicts.items()}

@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
+from armloop.components import RigidBody, SparseTerms
 from armloop.diagnosis import diagnose
-from armloop.diagnosis.contacts import find_contacts
+from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.innovations import contradiction
+from armloop.diagnosis.pushes import Contact
+from armloop.effects import Estimate, effect
 from armloop.kinematics import nominal_parameters
+from armloop.library.double_feature_set import Factors
 from armloop.library.friction import FrictionLaw, FrictionTerm
 from armloop.log import MotionLog
-from armloop.model import ReconstructedModel
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.scoring import score
 from armloop.signals import condition
 
@@ -103,4 +107,66 @@ def test_a_short_run_still_shows_its_event(model: ReconstructedModel) -> None:
 def test_a_noisier_sensor_is_no_unlisted_law(model: ReconstructedModel) -> None:
     answer = diagnose(model, [run(11, 30.0, noise=0.03)]).to_dict()
     assert (answer["verdict"], answer["effects"]) == ("no_effect", [])
-    assert any("more noise" in words for words in answer["reasons"])
+    assert any("nothing in it can be predicted from the motion" in words for words in answer["reasons"])
+
+
+@pytest.mark.parametrize(("rest", "kept"), [(3.0, 1), (5.0, 0)])
+def test_an_event_stands_out_of_all_the_rest_of_the_run(
+    model: ReconstructedModel, rest: float, kept: int
+) -> None:
+    motion = fourier_motion(10.0, 25.0, 12)
+    level = np.full((motion.samples, 3), 0.5)
+    level[100:110, 1] = 6.0  # the burst, and what the model errs by elsewhere
+    level[200, 1] = rest
+    level[200, 2] = 20.0  # what another joint shows at another time says nothing of this one
+    burst = Burst(slice(100, 110), frozenset({1}))
+    assert len(_standing_out(motion, np.arange(motion.samples), level, [burst])) == kept
+
+
+def test_a_joint_that_sticks_while_another_slides_shows_no_event(model: ReconstructedModel) -> None:
+    samples = condition([run(13, 10.0)], model.conditioning)
+    a, b = (int(np.searchsorted(samples.motion.time, t)) for t in (4.0, 5.0))
+    v = samples.motion.v.copy()
+    v[a:b] = [0.0, 0.5, 0.5]  # joint 1 is held by its friction, the others go on
+    evidence = Evidence.of(model, replace(samples, motion=replace(samples.motion, v=v)), [])
+    alone, both, other = (Burst(slice(a, b), frozenset(js)) for js in ({0}, {0, 1}, {1}))
+    assert _sticks(evidence, alone)
+    assert not _sticks(evidence, both)
+    assert not _sticks(evidence, other)
+
+
+def test_what_friction_holds_meanwhile_does_not_hide_an_event(model: ReconstructedModel) -> None:
+    motion = fourier_motion(30.0, 125.0, 16)
+    for x, there in ((motion.q, 0.4), (motion.v, 0.0), (motion.vdot, 0.0)):
+        x[:, 2] = there  # joint 3 is at rest all the time
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau = tau + motion.v * VISCOUS + np.tanh(motion.v / 1e-3) * COULOMB
+    inside = (motion.time > 12.0) & (motion.time < 13.0)
+    tau[inside] += [0.0, 0.25, 0.18]  # the latter is within the dry friction of joint 3
+    (found,) = events(model, measured(motion, tau, 16, 0.01))
+    assert (found.added.effect.name, found.added.effect.joint) == ("external_torque", 2)
+    assert found.added.parameters["torque"].value == pytest.approx(0.25, abs=0.05)
+
+
+def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
+    motion = fourier_motion(10.0, 25.0, 14)
+
+    def contact(start: float, end: float, share: float) -> Contact:
+        values = {"start": Estimate(start, None, "s"), "end": Estimate(end, None, "s")}
+        added = AddedEffect(effect("external_torque", 2), values)
+        nothing = np.zeros(3)
+        return Contact(added, np.zeros(motion.samples, dtype=bool), nothing, nothing, share)
+
+    first, same, later = contact(2.0, 3.0, 0.7), contact(2.2, 3.1, 0.9), contact(5.0, 6.0, 0.6)
+    assert _distinct(motion, [first, same, later]) == [same, later]
+
+
+def test_a_model_is_unsure_where_its_mass_matrix_is_not_symmetric(model: ReconstructedModel) -> None:
+    motion = fourier_motion(10.0, 25.0, 15)
+    assert np.abs(contradiction(model, motion)).max() < 1e-12
+    factors = Factors(3)
+    index = np.array([[0, factors.names.index("vdot2")]], dtype=np.intp)
+    lopsided = SparseTerms(3, index, np.array([[0.3, 0.0, 0.0]]))  # tau1 has 0.3 vdot2, tau2 no vdot1
+    unsure = contradiction(replace(model, components=(*model.components, lopsided)), motion)
+    assert unsure[:, 0] == pytest.approx(0.15 * motion.vdot[:, 1], abs=1e-12)
+    assert unsure[:, 1] == pytest.approx(-0.15 * motion.vdot[:, 0], abs=1e-12)

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from synthetic import fourier_motion
 
 from armloop.arm import Arm
-from armloop.diagnosis.fit import solve
 from armloop.effects import Context, effect
 from armloop.effects.payload import Payload
 from armloop.kinematics import link_motion
 from armloop.motion import Motion
+from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 
 

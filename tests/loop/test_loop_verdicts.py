@@ -21,7 +21,7 @@ def blind():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("seed", "clean"), [(2, False), pytest.param(13, False, marks=pytest.mark.long), (101, True)]
+    ("seed", "clean"), [*(pytest.param(seed, False, marks=pytest.mark.long) for seed in (2, 13)), (101, True)]
 )
 def test_the_verdict_is_right(seed, clean):
     case = blind().run("three_axis", seed, clean)

@@ -33,7 +33,7 @@ def check_payload(found: dict) -> None:
     assert np.mean(found["error"]["nrmse"]["after"]) <= 0.055
 
 
-@pytest.mark.parametrize("half", [0, 1])
+@pytest.mark.parametrize("half", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_a_half_of_the_run_tells_the_load_and_the_other_half_confirms_it(
     model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], half: int
 ) -> None:
@@ -52,7 +52,7 @@ def test_a_half_of_the_run_tells_the_load_and_the_other_half_confirms_it(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [50.0, 250.0])
+@pytest.mark.parametrize("rate", [50.0, pytest.param(250.0, marks=pytest.mark.long)])
 def test_the_load_is_found_at_another_rate(
     model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], rate: float
 ) -> None:

@@ -1,5 +1,6 @@
 """Reading and conditioning a log anew on every pass gives the model that it gives in memory."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,6 +55,43 @@ def test_streamed_logs_give_the_same_model(
     logs: list[MotionLog], in_memory: Reconstruction, workers: Workers | None
 ) -> None:
     same(reconstruct(logs, three_axis(), options=OPTIONS, workers=workers, in_memory=0), in_memory)
+
+
+@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+def test_shared_coefficients_are_the_same_to_the_bit_wherever_logs_are_kept(
+    logs: list[MotionLog], library: str
+) -> None:
+    """The same sums in the same order: models, laws, ripples and standard errors are equal, not alike."""
+    options = Options(friction=("coulomb", "viscous", "presliding"), parts=False)
+    kept, streamed = (
+        reconstruct(logs[:2], three_axis(), library=library, options=options, workers=workers, in_memory=most)
+        for workers, most in ((None, 10**6), (Processes(2), 0))
+    )
+    assert streamed.model.to_dict() == kept.model.to_dict()
+    assert streamed.to_dict() == kept.to_dict()
+
+
+def test_a_long_pass_tells_how_much_time_is_left(
+    logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armloop.reconstruction.data.paced", lambda progress, _: progress)
+    said: list[str] = []
+    data = Data.streamed(logs, Conditioning(), Options(), progress=said.append)
+    assert data.sum(lambda chunk: len(chunk.blocks), "counting") > 0
+    assert re.fullmatch(r"counting: 2 of 3 pieces, \d+ s left in this pass", said[1]) and len(said) == 2
+
+
+def test_a_window_is_of_consecutive_samples_of_all_parts(logs: list[MotionLog]) -> None:
+    data = Data.streamed(logs, Conditioning(), Options())
+    for most in (500, 10**6):
+        window = data.window(most)
+        samples, whole = window.samples, data.reference.samples
+        assert min(most / 2, whole.motion.samples) <= samples.motion.samples <= most
+        for run in samples.motion.runs():
+            np.testing.assert_allclose(np.diff(samples.motion.time[run]), samples.period)
+    kept = Data.kept(logs, Conditioning(), Options())
+    np.testing.assert_array_equal(data.window(10**6).samples.tau, kept.window(10**6).samples.tau)
+    assert data.window(10**6).samples.spans is not None and kept.window(500).samples.motion.samples <= 500
 
 
 def test_files_on_a_dask_cluster_give_the_same_model(

@@ -11,7 +11,8 @@ from armloop.library.friction import FRICTION_LAWS as LAWS
 from armloop.log import MotionLog
 from armloop.motion import Motion
 from armloop.reconstruction import Options, reconstruct
-from armloop.reconstruction.friction_ladder import inner_folds, restricted, rungs
+from armloop.reconstruction.friction_ladder import restricted, rungs
+from armloop.reconstruction.inner_folds import inner_folds
 from armloop.signals import Conditioning, condition
 
 

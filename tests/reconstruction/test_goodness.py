@@ -66,7 +66,7 @@ def test_logs_that_are_streamed_are_judged_alike(tmp_path: Path) -> None:
             logs,
             three_axis(),
             library="double-feature-set",
-            options=Options(max_order=2, standard_errors=False),
+            options=Options(max_order=1, standard_errors=False),
             in_memory=in_memory,
         )
         found.append([part.predictable_left for part in made.parts])

@@ -79,7 +79,7 @@ def test_laws_friction_and_ripple_are_chosen_and_fitted_without_them() -> None:
     held = Chunk.of(samples, OPTIONS).held_out
     noise = 30 * np.random.default_rng(0).normal(size=samples.tau.shape)
     other = replace(samples, tau=np.where(held[:, None], noise, samples.tau))
-    one, same = (rigid_body(arm, s, held, OPTIONS, silent) for s in (samples, other))
+    one, same = (rigid_body(arm, Data.of(s, OPTIONS, held), OPTIONS, silent) for s in (samples, other))
     assert [added.effect.name for added in one.effects] == ["joint_spring"]
     assert [a.parameters for a in one.effects] == [b.parameters for b in same.effects]
     assert one.friction == same.friction and one.history == same.history

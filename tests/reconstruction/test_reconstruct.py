@@ -84,7 +84,10 @@ def test_held_out_blocks_do_not_reach_the_model():
         options = Options()
         spoilt = replace(samples, tau=tau)
         found = rigid_body(
-            three_axis(), spoilt, held_out_rows(spoilt, options), options, lambda message: None
+            three_axis(),
+            Data.of(spoilt, options, held_out_rows(spoilt, options)),
+            options,
+            lambda message: None,
         )
         return found.components[0].parameters
 

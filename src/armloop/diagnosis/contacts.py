@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import Evidence, creep
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
@@ -25,6 +25,8 @@ Mask = NDArray[np.bool_]
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
+#: At one of its joints it exceeds the most of the rest of the run so many times: a model that errs much errs often.
+_STANDS_OUT = 1.5
 #: It lasts while the novelty is above this part of its peak, and this long at least, s.
 _EDGE, _SHORTEST = 0.25, 0.1
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
@@ -33,7 +35,7 @@ _SAME = 0.05
 _LONGEST = 0.4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Burst:
     """Samples in which the residual of some joints (0-based) is unlike what it is in like motion."""
 
@@ -71,11 +73,19 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     motion = evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
-        rows, new = novelty(evidence, *innovations(evidence, residual))
+        innovation, rest = innovations(evidence, residual)
+        tells = innovation != 0.0
+        rows, new = novelty(evidence, innovation, rest)
         level = np.where(known[rows][:, None], 0.0, np.abs(new))
         bursts = _together([_bursts(motion, rows, of_joint) for of_joint in level.T])
-        bursts = [burst for burst in bursts if not _comes_back(evidence, rows, level, burst)]
+        bursts = [
+            burst
+            for burst in bursts
+            if not _comes_back(evidence, rows, level, burst) and not _sticks(evidence, burst)
+        ]
+        bursts = _standing_out(motion, rows, level, bursts)
     else:
+        tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
@@ -88,8 +98,46 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         others = {
             j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints
         } - burst.joints
-        found.append(push(evidence, residual, burst.rows, sorted(set(range(motion.joints)) - others)))
-    return [contact for contact in found if contact is not None]
+        counted = tells.copy()
+        counted[:, sorted(burst.joints)] = True
+        counted[:, sorted(others)] = False
+        found.append(push(evidence, residual, burst.rows, counted, sorted(burst.joints)))
+    return _distinct(motion, [contact for contact in found if contact is not None])
+
+
+def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: list[Burst]) -> list[Burst]:
+    """Those of the bursts that exceed by far all that the run holds outside of them."""
+    outside = np.ones(len(rows), dtype=bool)
+    for burst in bursts:
+        outside &= ~around(motion, burst.rows)[rows]
+    rest = np.maximum(level[outside].max(axis=0, initial=0.0), 1.0)
+    kept = []
+    for burst in bursts:
+        inside = (rows >= burst.rows.start) & (rows < burst.rows.stop)
+        peak = level[inside].max(axis=0, initial=0.0)
+        if any(peak[j] >= _STANDS_OUT * rest[j] for j in burst.joints):
+            kept.append(burst)
+    return kept
+
+
+def _sticks(evidence: Evidence, burst: Burst) -> bool:
+    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that."""
+    motion = evidence.samples.motion
+    if len(burst.joints) > 1:
+        return False
+    (j,) = burst.joints
+    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > 0.5
+    return bool(slides.any() and not slides[j])
+
+
+def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
+    """Events without those that are, for most of the shorter one, another with a larger share."""
+    found: list[tuple[Mask, Contact]] = []
+    for contact in sorted(contacts, key=lambda contact: -contact.share):
+        mine = during(motion, {key: e.value for key, e in contact.added.parameters.items()})
+        if all(2 * (mine & other).sum() <= min(mine.sum(), other.sum()) for other, _ in found):
+            found.append((mine, contact))
+    return [contact for mine, contact in sorted(found, key=lambda one: int(np.argmax(one[0])))]
 
 
 def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst: Burst) -> bool:

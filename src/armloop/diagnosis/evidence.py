@@ -33,6 +33,9 @@ _TRAVEL = 2e-3
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
 
+#: Columns of a run are kept up to so many bytes.
+_KEPT = 1 << 28
+
 _Columns = dict[tuple[tuple[str, int | None, int | None], float], Array]
 
 
@@ -114,18 +117,24 @@ class Evidence:
         """(R,) sample of every stacked row."""
         return self.kept[np.nonzero(self.rows[self.kept])[0]]
 
-    def columns(self, effect: Effect, shape: float) -> Array:
-        """(K, n, p) columns of an effect through the run's filter, at the samples kept; computed once."""
+    def smoothed(self, effect: Effect, shape: float) -> Array:
+        """(N, p) columns of an effect on its joint, or (N, n, p) on all, through the run's filter; computed once."""
         key = (effect.place, shape)
         cache = self._of_model if effect.needs_model else self._of_motion
-        if key not in cache:
-            columns = smooth(self.samples, effect.columns(self.context, shape))[self.kept]
-            cache[key] = effect.on_all_joints(columns, self.rows.shape[1])
-        return cache[key]
+        if key in cache:
+            return cache[key]
+        columns = smooth(self.samples, effect.columns(self.context, shape))
+        if sum(kept.nbytes for kept in cache.values()) < _KEPT:
+            cache[key] = columns
+        return columns
+
+    def columns(self, effect: Effect, shape: float) -> Array:
+        """(K, n, p) columns of an effect through the run's filter, at the samples kept."""
+        return effect.on_all_joints(self.smoothed(effect, shape)[self.kept], self.rows.shape[1])
 
     def only(self, rows: NDArray[np.bool_]) -> Evidence:
         """The same run where only rows (N, n) count."""
-        return replace(self, rows=rows, _of_motion={}, _of_model={})
+        return replace(self, rows=rows)
 
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
         """The weighted regression problem of all joints, one row per joint and counted sample."""
@@ -141,6 +150,12 @@ class Evidence:
             joints,
             residual.shape[1],
         )
+
+
+def creep(model: ReconstructedModel) -> Array:
+    """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
+    ranges = model.history.get("range")
+    return 0.01 * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
 
 
 def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:

@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from armloop.diagnosis.evidence import Evidence
+from armloop.dynamics import Dynamics
+from armloop.errors import ModelError
 from armloop.library.friction import FrictionLaw
+from armloop.model import ReconstructedModel
 from armloop.motion import Motion, Samples
 from armloop.signals import smooth
 
@@ -68,6 +71,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     """(N, n) standard deviation of the averaged residual, N·m (N).
 
     The baseline's, at least what the run's own noise leaves in an average: the sensor may have become a noisier one.
+    Where a model contradicts itself, it is unsure by as much.
     """
     model, motion = evidence.model, evidence.samples.motion
     predicted = evidence.context.predicted
@@ -85,7 +89,20 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     for run in motion.runs():
         if run.stop - run.start > 2:
             rate[run] = np.gradient(tau[run], motion.time[run], axis=0)
-    return np.asarray(np.hypot(np.maximum(own, 1e-12), _APART * evidence.samples.period * rate))
+    late = _APART * evidence.samples.period * rate
+    return np.asarray(np.sqrt(np.maximum(own, 1e-12) ** 2 + late**2 + contradiction(model, motion) ** 2))
+
+
+def contradiction(model: ReconstructedModel, motion: Motion) -> Array:
+    """(N, n) skew part of M(q) times vdot, N·m (N): what sparse terms, found joint by joint, are surely wrong by.
+
+    Zero for rigid bodies and energies, whose M(q) is symmetric, and where terms are not linear in the acceleration.
+    """
+    try:
+        M = Dynamics(model).mass_matrix(motion.q)
+    except ModelError:
+        return np.zeros_like(motion.q)
+    return np.einsum("kij,kj->ki", (M - M.transpose(0, 2, 1)) / 2, motion.vdot)
 
 
 def dry_level(evidence: Evidence) -> Array:

@@ -75,19 +75,24 @@ def around(motion: Motion, burst: slice) -> Mask:
     return rows
 
 
-def push(evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int]) -> Contact | None:
+def push(
+    evidence: Evidence, residual: Array, burst: slice, counted: Mask, shown: Sequence[int]
+) -> Contact | None:
     """The event in a stretch of samples; None where neither a force nor a torque explains it.
 
     Args:
-        judged: joints (0-based) whose residual it has to explain.
+        counted: (N, n) samples of each joint that tell of it; what friction may hold, or another event did, does not.
+        shown: joints (0-based) that it was noticed at; a torque on one joint is on one of these.
     """
     n = evidence.model.arm.n
-    residual = np.where(np.isin(np.arange(n), judged), residual, 0.0)
-    kinds = [_Kind(effect("external_torque", j + 1)) for j in judged]
+    weight = counted / evidence.scale
+    kinds = [_Kind(effect("external_torque", j + 1)) for j in shown]
     # Two or three joints cannot tell a force on a link from one on the tool, or from torques on the joints before it.
     kinds += [_Kind(effect("external_contact", None), link) for link in (0, *range(n - 1, 2, -1))]
     tried = [
-        (trial, kind) for kind in kinds if (trial := _trial(evidence, residual, burst, kind)) is not None
+        (trial, kind)
+        for kind in kinds
+        if (trial := _trial(evidence, residual, weight, burst, kind)) is not None
     ]
     if not tried:
         return None
@@ -108,11 +113,11 @@ def push(evidence: Evidence, residual: Array, burst: slice, judged: Sequence[int
     return Contact(best.added, best.rows, best.before, best.after, best.share, list(rivals.values()))
 
 
-def _trial(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> Contact | None:
+def _trial(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> Contact | None:
     motion = evidence.samples.motion
     for _ in range(_REFINEMENTS):
-        burst = _interval(evidence, residual, burst, kind)
-    part, columns, y = _burst(evidence, residual, burst, kind)
+        burst = _interval(evidence, residual, weight, burst, kind)
+    part, columns, y = _burst(evidence, residual, weight, burst, kind)
     # Every other piece of a tenth of a second is held out, in turn.
     pieces = block_numbers(part, 0.1)
     left = np.array(y)
@@ -142,14 +147,16 @@ def _trial(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> Co
     return Contact(AddedEffect(kind.effect, parameters), around(motion, burst), before, after, share)
 
 
-def _burst(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> tuple[Motion, Array, Array]:
+def _burst(
+    evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind
+) -> tuple[Motion, Array, Array]:
     """Motion, torque per unit (N, n, p) and residual (N, n) of a stretch, both weighted."""
     motion = evidence.samples.motion
     part = Motion(motion.time[burst], motion.q[burst], motion.v[burst], motion.vdot[burst], np.array([0]))
-    return part, kind.columns(evidence, part) / evidence.scale[:, None], residual[burst] / evidence.scale
+    return part, kind.columns(evidence, part) * weight[burst, :, None], residual[burst] * weight[burst]
 
 
-def _interval(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) -> slice:
+def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> slice:
     """The stretch, in and a little around a burst, in which the size that fits its middle explains most.
 
     A burst's edges are where the novelty falls, and how the arm moves can make it fall within a push.
@@ -162,10 +169,10 @@ def _interval(evidence: Evidence, residual: Array, burst: slice, kind: _Kind) ->
     middle = slice(burst.start + inner, burst.stop - inner)
     if middle.stop - middle.start < 4:
         return burst
-    _, columns, y = _burst(evidence, residual, middle, kind)
+    _, columns, y = _burst(evidence, residual, weight, middle, kind)
     size = _size(columns, y)
     near = slice(max(run.start, burst.start - margin), min(run.stop, burst.stop + margin))
-    _, columns, y = _burst(evidence, residual, near, kind)
+    _, columns, y = _burst(evidence, residual, weight, near, kind)
     # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
     removed = (y**2 - (y - columns @ size) ** 2).sum(axis=1)
     running = np.concatenate([[0.0], np.cumsum(removed)])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, far_outside
+from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside
 from armloop.goodness import Parts, merged, outside_trained_range, parts_of, witness
 from armloop.model import ReconstructedModel
 from armloop.signals import smooth
@@ -71,7 +71,7 @@ def standing(
             unknown = True
         of = np.nan if after[j] is None else float(after[j] or 0.0)
         if j + 1 not in explained and not poor and of >= MULTIPLE * evidence.scale[j]:
-            words, real = _multiple(model, part, j, of / float(evidence.scale[j]))
+            words, real = _multiple(part, j, of / float(evidence.scale[j]))
             reasons.append(words)
             unknown |= real
     return Standing(reasons, merged(parts, outside), unknown)
@@ -79,10 +79,7 @@ def standing(
 
 def too_still(evidence: Evidence) -> str:
     """What keeps a run from being judged, empty if nothing does."""
-    # A joint that is pushed about within its friction has not moved.
-    ranges = evidence.model.history.get("range")
-    slow = 0.01 * np.asarray(ranges[1]) if ranges else np.full(evidence.rows.shape[1], 1e-3)
-    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > slow)
+    moving = evidence.rows & (np.abs(evidence.samples.motion.v) > creep(evidence.model))
     still = [j + 1 for j, rows in enumerate(moving.T) if rows.sum() < _FEWEST]
     blocks = len(np.unique(evidence.blocks))
     if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
@@ -114,7 +111,7 @@ def _too_poor(model: ReconstructedModel, j: int) -> str:
     return f"joint {j + 1}: the model leaves {share:.0%} of the torque on its own training logs: it judges nothing there"
 
 
-def _multiple(model: ReconstructedModel, part: Parts, j: int, ratio: float) -> tuple[str, bool]:
+def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool]:
     """A sentence on a residual that nothing accounts for, and whether it is more than noise."""
     left, error, noise = part.predictable_left, part.std_error, part.noise
     if left is None or error is None or noise is None or left > max(_SURE * error, 0.2 * (left + noise)):
@@ -123,9 +120,8 @@ def _multiple(model: ReconstructedModel, part: Parts, j: int, ratio: float) -> t
             "this run to be named; the motion of --next-run would show it",
             True,
         )
-    unit = model.arm.joints[j].torque_unit
     return (
         f"joint {j + 1}: the residual is {ratio:.1f} times the baseline, but nothing in it can be predicted from the "
-        f"motion: the torque [{unit}] is recorded with more noise than when the model was made",
+        "motion: noise, or what happened once",
         False,
     )

@@ -12,7 +12,6 @@ from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.effects import Effect
 from armloop.model import AddedEffect
-from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 
@@ -111,12 +110,12 @@ def _shape_problem(
     outside each fold (FOLDS, R), and the fold of each row.
     """
     evidence, current = known.evidence, known.fit
-    each = [effect.columns(evidence.context, shape) for shape in shapes]
+    each = [evidence.smoothed(effect, shape) for shape in shapes]
     width = each[0].shape[-1]
     parts, left, outside, fold = [], [], [], []
     for j in joints:
         rows = evidence.rows[:, j]
-        columns = smooth(evidence.samples, np.hstack([c if c.ndim == 2 else c[:, j] for c in each]))[rows]
+        columns = np.hstack([(c if c.ndim == 2 else c[:, j])[rows] for c in each])
         parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
         mine = current.stacked.joint == j
         left.append(current.held_out[mine])

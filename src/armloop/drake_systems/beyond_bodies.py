@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction_system import PreslidingFriction, Stop
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.effects.base import number
@@ -19,7 +19,7 @@ from armloop.model import ReconstructedModel
 _BODIES = ("payload", "rotor_inertia")
 
 
-@TemplateSystem.define("BeyondBodies_")
+@scalar_template("BeyondBodies_", __name__)
 def BeyondBodies_(T: type) -> Any:
     """Return the class for one scalar type."""
 

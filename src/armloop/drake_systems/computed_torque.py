@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
-from pydrake.systems.scalar_conversion import TemplateSystem
 
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
@@ -60,7 +60,7 @@ class AccelerationGains:
         return AccelerationGains(np.full(n, bandwidth**2), np.full(n, 2 * bandwidth))
 
 
-@TemplateSystem.define("ComputedTorque_")
+@scalar_template("ComputedTorque_", __name__)
 def ComputedTorque_(T: type) -> Any:
     """Return the class for one scalar type."""
 

@@ -9,9 +9,9 @@ from typing import Any
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, LeafSystem_, System
 from pydrake.systems.primitives import Adder
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.arm import Arm
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature, within
 from armloop.dynamics import effect_law
 from armloop.effects import Value, effect_kind
@@ -19,7 +19,7 @@ from armloop.effects.base import number
 from armloop.library.friction import Sliding, torque_along
 
 
-@TemplateSystem.define("EffectTorque_")
+@scalar_template("EffectTorque_", __name__)
 def EffectTorque_(T: type) -> Any:
     """Return the class for one scalar type."""
 

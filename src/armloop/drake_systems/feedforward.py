@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
-from pydrake.systems.scalar_conversion import TemplateSystem
 
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
@@ -25,7 +25,7 @@ class FeedforwardModel(Protocol):
         """Return (n,) torques at q, v, vdot (n,) by the terms of the first `step` steps (1, 2 or 3)."""
 
 
-@TemplateSystem.define("Feedforward_")
+@scalar_template("Feedforward_", __name__)
 def Feedforward_(T: type) -> Any:
     """Return the class for one scalar type."""
 

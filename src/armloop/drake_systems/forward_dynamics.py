@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
@@ -19,7 +19,7 @@ SMOOTHING = 0.01
 """Speed within which dry friction changes sign, rad/s (m/s)."""
 
 
-@TemplateSystem.define("ForwardDynamics_")
+@scalar_template("ForwardDynamics_", __name__)
 def ForwardDynamics_(T: type) -> Any:
     """Return the class for one scalar type."""
 

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.friction import JointFriction
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.library.hysteresis import stop_step
 
 
-@TemplateSystem.define("JointFrictionSystem_")
+@scalar_template("JointFrictionSystem_", __name__)
 def JointFrictionSystem_(T: type) -> Any:
     """Return the class for one scalar type."""
 
@@ -68,7 +68,7 @@ class Stop(NamedTuple):
     width: float
 
 
-@TemplateSystem.define("PreslidingFriction_")
+@scalar_template("PreslidingFriction_", __name__)
 def PreslidingFriction_(T: type) -> Any:
     """Return the class for one scalar type."""
 

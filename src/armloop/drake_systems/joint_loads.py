@@ -13,12 +13,12 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.multibody.plant import MultibodyPlant, MultibodyPlant_
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.effects import Realisation
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
 from armloop.drake_systems.own_effects import Law
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector
 from armloop.dynamics.model import solve
 from armloop.effects.base import Placed
@@ -43,7 +43,7 @@ class ServoGains:
     d: float = 1e3
 
 
-@TemplateSystem.define("JointLoads_", T_list=[float, AutoDiffXd])
+@scalar_template("JointLoads_", __name__, [float, AutoDiffXd])
 def JointLoads_(T: type) -> Any:
     """Return the class for one scalar type."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,6 +44,7 @@ def run_pickup(
     model: FeedforwardModel,
     learn: Callable[[MotionLog], FeedforwardModel],
     view: LiveView | None = None,
+    changes: Sequence[UndeclaredEffect] | None = None,
 ) -> PickupResult:
     """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
 
@@ -53,6 +54,7 @@ def run_pickup(
     integrator is then put back to what it held at the grasp: what it has learned since is in the model now.
 
     view : shows the run, and holds it to its rate
+    changes : what happens to the arm at `pickup.at` instead of the load
     """
     pickup = scenario.pickup
     if pickup is None:
@@ -60,7 +62,7 @@ def run_pickup(
     free = _Run(scenario, model, (), view)
     free.systems.start_on_reference(free.context)
     free.advance(pickup.at)
-    loaded = _Run(scenario, model, (pickup.payload,), view)
+    loaded = _Run(scenario, model, (pickup.payload,) if changes is None else tuple(changes), view)
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator
-from pydrake.systems.scalar_conversion import TemplateSystem
+
+from armloop.drake_systems.scalar_types import scalar_template
 
 Array = NDArray[np.float64]
 
@@ -126,5 +127,5 @@ def _read(q: Any, count: float) -> Any:
     return rounded if isinstance(q, float) else q + (rounded - value)
 
 
-_PidLaw_ = TemplateSystem.define("_PidLaw_")(_law)
-_EncodedPidLaw_ = TemplateSystem.define("_EncodedPidLaw_", T_list=[float, AutoDiffXd])(_law)
+_PidLaw_ = scalar_template("_PidLaw_", __name__)(_law)
+_EncodedPidLaw_ = scalar_template("_EncodedPidLaw_", __name__, [float, AutoDiffXd])(_law)

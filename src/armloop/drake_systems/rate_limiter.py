@@ -8,12 +8,12 @@ import numpy as np
 import pydrake.math as drake_math
 from numpy.typing import ArrayLike
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import vector, with_signature
 
 
-@TemplateSystem.define("RateLimiter_")
+@scalar_template("RateLimiter_", __name__)
 def RateLimiter_(T: type) -> Any:
     """Return the class for one scalar type."""
 

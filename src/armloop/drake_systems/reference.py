@@ -17,9 +17,9 @@ from pydrake.systems.framework import (
     LeafSystem_,
 )
 from pydrake.systems.primitives import Demultiplexer
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.feedforward import FeedforwardModel
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import vector
 from armloop.dynamics import ModelEquations
 from armloop.errors import ModelError
@@ -94,7 +94,7 @@ class ReferenceSource(Diagram):
         self._table.set_torques(tau)
 
 
-@TemplateSystem.define("_ReferenceTable_", T_list=[float, AutoDiffXd])
+@scalar_template("_ReferenceTable_", __name__, [float, AutoDiffXd])
 def _ReferenceTable_(T: type) -> Any:
     """Return the class for one scalar type."""
 

@@ -6,16 +6,16 @@ from typing import Any
 
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from armloop.drake_systems.implicit import ClampedLaw, implicit_torques
+from armloop.drake_systems.scalar_types import scalar_template
 from armloop.drake_systems.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
 
 
-@TemplateSystem.define("StickingForwardDynamics_", T_list=[float, AutoDiffXd])
+@scalar_template("StickingForwardDynamics_", __name__, [float, AutoDiffXd])
 def StickingForwardDynamics_(T: type) -> Any:
     """Return the class for one scalar type."""
 

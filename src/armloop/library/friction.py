@@ -166,27 +166,41 @@ FRICTION_LAWS: dict[str, tuple[str, ...]] = {
 
 
 def column(
-    element: Element, motion: Motion, along: Direction, parameter: float, load: Array | None = None
+    element: Element,
+    motion: Motion,
+    along: Direction,
+    parameter: float,
+    load: Array | None = None,
+    sign: Array | None = None,
 ) -> Array:
     """(N,) values of an element along a direction; ``load`` (N, n) is the torque that passes the joints.
 
-    Of its memory a run of a log tells nothing: it begins relaxed where the joint is at rest, else as if the acceleration
-    had been what it is now since the last reversal (v²/2a ago where the joint speeds up, without end where it slows down).
+    Args:
+        sign: (N,) direction of sliding where it is known, as of a memory that began before this motion does.
     """
     q, v, vdot = (np.asarray(along.of(x.T)) for x in (motion.q, motion.v, motion.vdot))
     if element.part == "inertia":
         return vdot
-    if element.way == "memory":
-        sign = stop_operator(
-            q, parameter, motion.starts, _entry(v[motion.starts], vdot[motion.starts], parameter)
-        )
-    else:
-        sign = np.tanh(v / parameter) if element.way == "fading" else np.sign(v)
+    sign = sliding_direction(element, motion, along, parameter) if sign is None else sign
     values = element.value(Sliding(q, v, sign, motion.elapsed()), parameter, NUMPY)
     if element.by_load:
         assert load is not None
         values = values * np.abs(load[:, along.joint])
     return np.asarray(values + np.zeros_like(v))
+
+
+def sliding_direction(element: Element, motion: Motion, along: Direction, parameter: float) -> Array:
+    """(N,) direction of sliding in [-1, 1] as an element sees it.
+
+    Of its memory a run of a log tells nothing: it begins relaxed where the joint is at rest, else as if the acceleration
+    had been what it is now since the last reversal (v²/2a ago where the joint speeds up, without end where it slows down).
+    """
+    v = np.asarray(along.of(motion.v.T))
+    if element.way == "memory":
+        vdot = np.asarray(along.of(motion.vdot.T))
+        start = _entry(v[motion.starts], vdot[motion.starts], parameter)
+        return stop_operator(np.asarray(along.of(motion.q.T)), parameter, motion.starts, start)
+    return np.asarray(np.tanh(v / parameter) if element.way == "fading" else np.sign(v))
 
 
 def _entry(v: Array, a: Array, width: float) -> Array:
@@ -235,14 +249,17 @@ class FrictionTerm:
         """Whether it is proportional to the torque that passes the joint."""
         return self.element.by_load
 
-    def column(self, motion: Motion, joint: int, load: Array | None = None) -> Array:
+    def column(
+        self, motion: Motion, joint: int, load: Array | None = None, sign: Array | None = None
+    ) -> Array:
         """(N,) values for joint ``joint`` (0-based), without the coefficient.
 
-        ``load`` (N, n) is the rigid-body torque, which kinds proportional to the load need.
+        ``load`` (N, n) is the rigid-body torque, which kinds proportional to the load need; ``sign`` (N,) the direction
+        of sliding where it is known already.
         """
         if self.by_load and load is None:
             raise ModelError(f"friction term {self.kind!r} needs the load torque")
-        return column(self.element, motion, Direction(joint), self.parameter, load)
+        return column(self.element, motion, Direction(joint), self.parameter, load, sign)
 
 
 @dataclass(frozen=True)

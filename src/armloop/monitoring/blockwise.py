@@ -27,12 +27,12 @@ _BACK = 16
 
 @dataclass(frozen=True, eq=False)
 class BlockSums:
-    """Sums of one block: gram (p, p), moment (p,), energy of the residual; and the end of the block, s."""
+    """Sums of one block: gram (p, p), moment (p,), energy of the residual; and when the block begins, s."""
 
     gram: Array
     moment: Array
     energy: float
-    time: float
+    begin: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Known:
     Attributes:
         revision: number.
         effects: with parameters, as a model takes them.
-        since: time at which the change began, s.
+        since: begin of the block in which the change began, s.
     """
 
     revision: int = 0
@@ -101,7 +101,7 @@ def block_sums(
     predicted = known.predicted if not model.effects else model.predict(motion)
     u = (tau - predicted) / scale * slides
     gram, moment = joint_sums(known.values / scale[:, None], u, slides)
-    return known.columns, BlockSums(gram, moment, float((u**2).sum()), float(motion.time[-1]))
+    return known.columns, BlockSums(gram, moment, float((u**2).sum()), float(motion.time[0]))
 
 
 def advance(
@@ -195,5 +195,5 @@ def _name(model: ReconstructedModel, columns: tuple[Column, ...], watch: Watch) 
     if not named:
         return watch
     effects = tuple(AddedEffect(Column(*one.place, 0).effect, one.parameters) for one in named)
-    began = known.since if known.revision else watch.window[0].time
+    began = known.since if known.revision else watch.window[0].begin
     return replace(watch, known=Known(known.revision + 1, effects, began))

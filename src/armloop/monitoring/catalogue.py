@@ -1,6 +1,7 @@
 """The catalogue's columns of a motion: the effects' torques per unit of each free parameter, linearised at zero.
 
-The score test of a nested model needs no more: at a parameter's zero, its column is the derivative of the torque.
+The score test of a nested model needs no more: at a parameter's zero, its column is the derivative of the torque. Of a
+body, whose law has no derivative there, the columns of all its coefficients are kept.
 """
 
 from __future__ import annotations
@@ -21,15 +22,17 @@ Array = NDArray[np.float64]
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.
 _SPECTRUM = 40
+#: Parameters this near to zero, in SI units, are of an effect that hardly is one.
+_NEAR = 1e-3
 
 
 @dataclass(frozen=True)
 class Column:
-    """One free parameter of one effect at one place.
+    """One free parameter of one effect at one place, or one coefficient of its law where that stays nonlinear.
 
     Attributes:
         name, joint, other_joint: the effect, as in ``diagnosis.json``.
-        part: index of the free parameter.
+        part: index of the free parameter, or of the coefficient.
         shape: value of the nonlinear parameter that the column was computed with.
     """
 
@@ -98,6 +101,17 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     return tuple((e, float(s[len(s) // 2])) for e, s in shapes if len(s) <= _SPECTRUM)
 
 
+def stays_nonlinear(e: Effect, coefficients: int) -> bool:
+    """Whether an effect's law is not linear in its parameters however small they are.
+
+    So it is with a body: its inertia about the joint is the square of its moment over its mass, which is as large as
+    either. Of such an effect all columns are kept; of the others the derivative at zero.
+    """
+    x = e.start(np.zeros(coefficients))
+    at, near = e.embed(x)[1], e.embed(x + _NEAR)[1]
+    return bool(np.abs(near - at).max() > 0.1 * np.abs(at).max())
+
+
 def catalogue(model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp]) -> Catalogue:
     """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`."""
     motion, period = samples.motion, samples.period
@@ -117,10 +131,10 @@ def catalogue(model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp
     parts: list[Array] = []
     for e, shape in effects:
         values = e.full_columns(thin, shape)
-        J = e.embed(e.start(np.zeros(values.shape[2])))[1]
-        linear = values @ J
-        columns += [Column(*e.place, k, shape) for k in range(linear.shape[2])]
-        parts.append(linear)
+        if not stays_nonlinear(e, values.shape[2]):
+            values = values @ e.embed(e.start(np.zeros(values.shape[2])))[1]
+        columns += [Column(*e.place, k, shape) for k in range(values.shape[2])]
+        parts.append(values)
     return Catalogue(tuple(columns), np.concatenate(parts, axis=2), whole.load[rows], whole.predicted)
 
 

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from armloop.arm import Arm
 from armloop.effects import Estimate
-from armloop.monitoring.catalogue import Column, groups
+from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
+from armloop.regression.embedded import Linear, solve
+from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]
 Place = tuple[str, int | None, int | None]
@@ -20,6 +22,8 @@ Place = tuple[str, int | None, int | None]
 _RIDGE, _HEALTHY_RIDGE = 1e-8, 1e-3
 #: An effect must explain twice its standard error over the units, a further one this part of what the others do.
 _WORTH = 0.02
+#: A column this small beside the largest, squared, is none.
+_NOTHING = 1e-20
 _MOST = 3
 
 
@@ -67,34 +71,40 @@ class Named:
         }
 
 
-def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, window: Normal) -> list[Named]:
+def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, window: Normal) -> list[Named]:
     """The effects that a window shows and the healthy units before it do not, strongest first; empty if none does.
+
+    Args:
+        given: what the columns of the normal equations are.
 
     What the model leaves on healthy units is expressed in the columns and taken out of the window first: it was there
     before, whatever it is.
     """
     moment, energy = window.moment.copy(), window.energy.copy()
     if healthy is not None and len(healthy.gram):
-        old = _ridge(healthy.gram.sum(axis=0), healthy.moment.sum(axis=0), _HEALTHY_RIDGE)
+        old = ridge(healthy.gram.sum(axis=0), healthy.moment.sum(axis=0), _HEALTHY_RIDGE)
         explained = np.einsum("upq,q->up", window.gram, old)
         energy = energy - 2 * (moment @ old) + explained @ old
         moment = moment - explained
-    rest = Normal(window.gram, moment, energy)
-    places = groups(columns)
+    full = Normal(window.gram, moment, energy)
     chosen: list[Place] = []
     rivals: list[tuple[Place, ...]] = []
     gains: list[float] = []
     last = np.zeros(len(moment))
-    while len(chosen) < _MOST:
+    while True:
+        columns, rest = _linearised(given, full, chosen)
+        if len(chosen) == _MOST:
+            break
+        places = groups(columns)
         held = {
             place: _held_out(rest, np.concatenate([*(places[c] for c in chosen), index]))
             for place, index in places.items()
-            if place not in chosen
+            if place not in chosen and _shows(rest, index)
         }
-        if not held:
-            break
         gain = {place: float((value - last).sum()) for place, value in held.items()}
-        best = max(gain, key=lambda place: gain[place])
+        best = max(gain, key=lambda place: gain[place], default=None)
+        if best is None:
+            break
         error = np.sqrt(len(last)) * float(np.std(held[best] - last, ddof=min(1, len(last) - 1)))
         if gain[best] <= max(2.0 * error, _WORTH * sum(gains)):
             break
@@ -104,7 +114,8 @@ def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, win
             if _as_good(held[best], held[place]) and _possible(arm, columns, rest, chosen, place)
         ]
         if not equals:
-            equals = [best]
+            # what explains it best cannot be, and nothing explains it as well: it has no name
+            break
         # of those that explain as much, the fewest parameters, and a law of the motion alone before one of the load
         pick = min(equals, key=lambda place: (*_simplicity(columns, places[place]), -gain[place]))
         chosen.append(pick)
@@ -118,8 +129,54 @@ def name_change(arm: Arm, columns: Sequence[Column], healthy: Normal | None, win
     ]
 
 
+def _linearised(
+    columns: Sequence[Column], full: Normal, chosen: Sequence[Place]
+) -> tuple[list[Column], Normal]:
+    """The problem with every law that stays nonlinear (a body's) linearised where the window itself puts it.
+
+    One that was chosen is put there together with the others that were, one that was not in addition to them. A body's
+    coefficients grow in proportion with it, so that the linear least squares then have their optimum at the same place
+    (Euler's theorem on homogeneous functions), and leaving units out is a jackknife to first order.
+    """
+    kept: list[Column] = []
+    parts: list[Array] = []
+    p = len(columns)
+    for place, index in groups(columns).items():
+        e = columns[index[0]].effect
+        if not stays_nonlinear(e, len(index)):
+            J = np.eye(len(index))
+        else:
+            others = [*chosen] if place in chosen else [*chosen, place]
+            J = _derivative(columns, full, others, place)
+        T = np.zeros((p, J.shape[1]))
+        T[index] = J
+        parts.append(T)
+        kept += [Column(*place, k, columns[index[0]].shape) for k in range(J.shape[1])]
+    T = np.hstack(parts)
+    return kept, Normal(T.T @ full.gram @ T, full.moment @ T, full.energy)
+
+
+def _derivative(columns: Sequence[Column], full: Normal, chosen: Sequence[Place], place: Place) -> Array:
+    """(p, k) derivative of one effect's coefficients, at the least squares of all that are chosen."""
+    places = groups(columns)
+    e = columns[places[place][0]].effect
+    sizes = [len(places[c]) for c in chosen]
+    index = np.concatenate([places[c] for c in chosen])
+    G, b = full.gram.sum(axis=0), full.moment.sum(axis=0)
+    problem = Moments(G[np.ix_(index, index)], b[index], float(full.energy.sum()), float(len(b)))
+    # the columns of the others are those of their free parameters
+    _, x, _ = solve(problem, [e if c == place else Linear() for c in chosen], sizes)
+    return e.embed(x[list(chosen).index(place)])[1]
+
+
 def _simplicity(columns: Sequence[Column], index: NDArray[np.intp]) -> tuple[int, bool]:
     return len(index), columns[index[0]].effect.needs_model
+
+
+def _shows(rest: Normal, index: NDArray[np.intp]) -> bool:
+    """Whether columns are more than rounding errors (what an encoder of a vertical axis would do to the weight)."""
+    size = np.einsum("upp->p", rest.gram)
+    return bool((size[index] > _NOTHING * size.max(initial=0.0)).any())
 
 
 def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
@@ -128,7 +185,7 @@ def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
     G_all, b_all = G.sum(axis=0), b.sum(axis=0)
     out = np.empty(len(b))
     for u in range(len(b)):
-        beta = _ridge(G_all, b_all) if len(b) == 1 else _ridge(G_all - G[u], b_all - b[u])
+        beta = ridge(G_all, b_all) if len(b) == 1 else ridge(G_all - G[u], b_all - b[u])
         out[u] = 2 * float(beta @ b[u]) - float(beta @ G[u] @ beta)
     return out
 
@@ -152,10 +209,10 @@ def _solved(
     own = slice(first, first + len(places[place]))
     G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
     G_all, b_all, U = G.sum(axis=0), b.sum(axis=0), len(b)
-    beta = _ridge(G_all, b_all)[own]
+    beta = ridge(G_all, b_all)[own]
     if U == 1:
         return beta, np.zeros((len(beta), len(beta))), columns[places[place][0]].shape
-    left = np.array([_ridge(G_all - G[u], b_all - b[u])[own] for u in range(U)])
+    left = np.array([ridge(G_all - G[u], b_all - b[u])[own] for u in range(U)])
     spread = left - left.mean(axis=0)
     return beta, (U - 1) / U * (spread.T @ spread), columns[places[place][0]].shape
 
@@ -191,8 +248,9 @@ def _named(
     return Named(place, parameters, share, effect.sentence(parameters), others)
 
 
-def _ridge(G: Array, b: Array, ridge: float = _RIDGE) -> Array:
+def ridge(G: Array, b: Array, part: float = _RIDGE) -> Array:
+    """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
     size = np.diag(G)
-    scale = np.where(size > 1e-20 * size.max(initial=0.0), 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
-    scaled = G * np.outer(scale, scale) + ridge * np.eye(len(G))
+    scale = np.where(size > _NOTHING * size.max(initial=0.0), 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
+    scaled = G * np.outer(scale, scale) + part * np.eye(len(G))
     return np.asarray(scale * np.linalg.solve(scaled, scale * b))

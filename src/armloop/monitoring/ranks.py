@@ -62,82 +62,83 @@ def scan(values: Array, programme: NDArray[np.intp], tolerance: Array) -> Scan:
 
 def _one_side(y: Array, programme: NDArray[np.intp], tolerance: Array) -> tuple[Array, NDArray[np.intp]]:
     n, S = y.shape
-    below, size = np.zeros((n, S), dtype=np.intp), np.zeros((n, S), dtype=np.intp)
-    total, best = np.full((n, S), -np.inf), np.full((n, S), -np.inf)
-    since = np.full((n, S), -1, dtype=np.intp)
+    y = np.ascontiguousarray(y.T)
     there = np.isfinite(y)
-    shifted = np.where(there, y, np.nan) - tolerance
-    table = _Table(n)
+    shifted = np.where(there, y, np.nan) - tolerance[:, None]
+    below, size = np.zeros((S, n), dtype=np.int32), np.zeros((S, n), dtype=np.int32)
+    total, best = np.zeros((S, n)), np.zeros((S, n))
+    since = np.full((S, n), -1, dtype=np.intp)
+    likelihood = _Likelihood(n)
     for j in range(n):
-        rows = slice(j, min(n, j + HORIZON))
         if j:
-            same = (programme == programme[j - 1])[:, None] & there[j - 1]
-            size += same
-            below += same & (shifted > y[j - 1])
-        counted = there[rows] & (size[rows] >= FEWEST)
-        if not counted.any():
-            continue
-        steps = table.ratio(below[rows], size[rows], programme[rows], counted)
-        path = _log_mean(np.cumsum(steps, axis=1))
+            # units before j are the reference of those from j on
+            same = (programme[j:] == programme[j - 1]) & there[:, j - 1 : j]
+            size[:, j:] += same
+            below[:, j:] += same & (shifted[:, j:] > y[:, j - 1 : j])
+        rows = slice(j, min(n, j + HORIZON))
         # a change cannot have begun at a unit that says nothing
-        path = np.where(counted[0], path, -np.inf)
-        total[rows] = np.logaddexp(total[rows], path)
-        better = path > best[rows]
-        best[rows] = np.where(better, path, best[rows])
-        since[rows] = np.where(better, j, since[rows])
-    return total, since
+        able = there[:, j] & (size[:, j] >= FEWEST)
+        if not able.any():
+            continue
+        counted = there[:, rows] & (size[:, rows] >= FEWEST)
+        steps = likelihood.ratio(below[:, rows], size[:, rows], programme[rows], counted)
+        path = np.cumprod(steps, axis=2).mean(axis=0) * able[:, None]
+        total[:, rows] += path
+        better = path > best[:, rows]
+        np.copyto(best[:, rows], path, where=better)
+        np.copyto(since[:, rows], j, where=better)
+    with np.errstate(divide="ignore"):
+        return np.log(total).T, since.T
 
 
-class _Table:
-    """Logarithms that are needed over and over, for references of up to n units."""
+class _Likelihood:
+    """Likelihood ratios of Lehmann's alternatives against Pólya's urn, for references of up to n units.
+
+    They are multiplied, not added as logarithms: a step is at most n + HORIZON, and HORIZON of them stay far from overflow.
+    """
 
     def __init__(self, n: int) -> None:
-        self._log = np.log(np.arange(1, 2 * n + 3, dtype=float))
+        # i^κ and its differences, (K, n + 2): gap g of N + 1 has the probability (N+1-g)^κ - (N-g)^κ, over (N+1)^κ
+        self._power = np.arange(n + 2.0) ** LEHMANN[:, None]
+        self._step = np.diff(self._power, axis=1)
         self._width = n + 1
-        # (K, n + 1, n + 1) log probability of each gap, lowest first, for each size of the reference
-        gaps = np.zeros((len(LEHMANN), n + 1, n + 1))
-        for size in range(FEWEST, n + 1):
-            edges = (np.arange(size + 1, -1, -1) / (size + 1))[None, :] ** LEHMANN[:, None]
-            gaps[:, size, : size + 1] = np.log(edges[:, :-1] - edges[:, 1:])
-        self._gaps = gaps.reshape(len(LEHMANN), -1)
 
     def ratio(
         self,
-        below: NDArray[np.intp],
-        size: NDArray[np.intp],
+        below: NDArray[np.int32],
+        size: NDArray[np.int32],
         programme: NDArray[np.intp],
         counted: NDArray[np.bool_],
     ) -> Array:
-        """(K, m, S) log likelihood ratio of each unit after the candidate change."""
+        """(K, S, m) likelihood ratio of each of the m units after the candidate change; 1 where it does not count."""
         # how many earlier units of the programme lie in the same gap, and how many there are at all
-        gap = np.where(counted, programme[:, None] * self._width + below, -1)
-        again = _earlier_equals(gap)
-        earlier = np.zeros_like(again)
-        for one in np.unique(programme).tolist():
-            here = counted & (programme == one)[:, None]
-            earlier = np.where(here, np.cumsum(here, axis=0) - 1, earlier)
-        null = self._log[again] - self._log[size + earlier]
-        alternative = self._gaps[:, size * self._width + below]
-        return np.asarray(np.where(counted, alternative - null, 0.0))
+        names, number = np.unique(programme, return_inverse=True)
+        again = _earlier_equals(
+            np.where(counted, number * self._width + below + 1, 0), len(names) * self._width
+        )
+        earlier = np.zeros_like(size)
+        for one in range(len(names)):
+            here = counted & (number == one)
+            np.copyto(earlier, np.cumsum(here, axis=1, dtype=np.int32) - 1, where=here)
+        odds = self._step.take(size - below, axis=1)
+        odds *= np.where(counted, (1.0 + size + earlier) / (1.0 + again), 1.0)
+        odds /= self._power.take(size + 1, axis=1)
+        np.copyto(odds, 1.0, where=~counted)
+        return np.asarray(odds)
 
 
-def _log_mean(x: Array) -> Array:
-    """Log of the mean of exp(x) over the first axis."""
-    top = x.max(axis=0)
-    return np.asarray(top + np.log(np.exp(x - top).mean(axis=0)))
-
-
-def _earlier_equals(codes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """(m, S) how many entries above each one in its column are equal to it."""
-    m = len(codes)
-    order = np.argsort(codes, axis=0, kind="stable")
-    ordered = np.take_along_axis(codes, order, axis=0)
-    index = np.broadcast_to(np.arange(m)[:, None], codes.shape)
+def _earlier_equals(codes: NDArray[np.intp], largest: int) -> NDArray[np.intp]:
+    """(S, m) how many entries before each one in its row are equal to it; codes from 0 to ``largest``."""
+    if largest < 2**16:
+        codes = codes.astype(np.uint16)  # sorted by radix
+    order = np.argsort(codes, axis=1, kind="stable")
+    ordered = np.take_along_axis(codes, order, axis=1)
+    index = np.broadcast_to(np.arange(codes.shape[1]), codes.shape)
     new = np.ones(codes.shape, dtype=bool)
-    new[1:] = ordered[1:] != ordered[:-1]
-    first = np.maximum.accumulate(np.where(new, index, 0), axis=0)
+    new[:, 1:] = ordered[:, 1:] != ordered[:, :-1]
+    first = np.maximum.accumulate(np.where(new, index, 0), axis=1)
     counts = np.empty_like(order)
-    np.put_along_axis(counts, order, index - first, axis=0)
+    np.put_along_axis(counts, order, index - first, axis=1)
     return counts
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.monitoring.catalogue import Column
+from armloop.monitoring.naming import Normal, ridge
 from armloop.monitoring.units import Stream, Units
 
 Array = NDArray[np.float64]
@@ -29,6 +32,8 @@ FRICTION = frozenset(
 _TIMES = np.array([300.0, 600.0, 1200.0, 2400.0, 4800.0])
 #: Fewest healthy units to learn from, and the part of their variance that must be explained on units left out.
 _FEWEST, _WORTH = 8, 0.3
+#: Of what warmth makes of the columns together only the strong directions are taken, see `armloop.monitoring.naming`.
+_RIDGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +44,13 @@ class Adjusted:
         values: (U, S) scores.
         known: what tells how warm the arm is: ``temperature``, ``since_start`` or nothing.
         learned: (S,) whether a dependence was found and taken out.
+        warmth: (U, n) what the friction of each joint was found to follow; zero where nothing was found.
     """
 
     values: Array
     known: str | None
     learned: NDArray[np.bool_]
+    warmth: Array
 
 
 def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> Adjusted:
@@ -55,12 +62,14 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
     """
     S = values.shape[1]
     learned, out = np.zeros(S, dtype=bool), values.copy()
+    warmth = np.zeros((units.count, units.rows.shape[1]))
     if np.isfinite(units.temperature).any():
         known = "temperature"
     elif np.isfinite(units.since_start).any():
         known = "since_start"
     else:
-        return Adjusted(out, None, learned)
+        return Adjusted(out, None, learned, warmth)
+    worths = np.zeros(units.rows.shape[1])
     for s, stream in enumerate(listed):
         if stream.name not in FRICTION or stream.joint is None:
             continue
@@ -69,12 +78,62 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
         else:
             candidates = [np.exp(-units.since_start / T) for T in _TIMES]
         fits = [_line(x, values[:, s], units.programme, healthy) for x in candidates]
-        found = [fit for fit in fits if fit is not None]
+        found = [(*fit, x) for fit, x in zip(fits, candidates, strict=True) if fit is not None]
         if found:
-            worth, line = max(found, key=lambda fit: fit[0])
+            worth, line, x = max(found, key=lambda fit: fit[0])
             if worth > _WORTH:
                 out[:, s], learned[s] = values[:, s] - line, True
-    return Adjusted(out, known, learned)
+            if worth > max(_WORTH, worths[stream.joint - 1]):
+                worths[stream.joint - 1] = worth
+                warmth[:, stream.joint - 1] = _centred(x, healthy)
+    return Adjusted(out, known, learned, warmth)
+
+
+def _centred(x: Array, healthy: int) -> Array:
+    """(U,) what was learned from, about its healthy mean and within its healthy range; zero where it is not known."""
+    known = x[:healthy][np.isfinite(x[:healthy])]
+    inside = np.clip(x, known.min(), known.max()) - known.mean()
+    return np.where(np.isfinite(inside), inside, 0.0)
+
+
+def without_warmth(
+    columns: Sequence[Column], healthy: Normal, warm: Array, unit: Normal, warm_unit: Array
+) -> Normal:
+    """Normal equations of units without what warmth makes of their friction.
+
+    The law is one for all units: the coefficients of a joint's friction columns are b + c w, w its warmth. Both are fitted
+    together on the healthy units, by ridge regression on their normal equations, and X c w is taken out of the residual.
+
+    Args:
+        healthy: of H units to learn from, warm: (H, n) :attr:`Adjusted.warmth` of theirs.
+        unit: of U units, warm_unit: (U, n).
+    """
+    rubbing = np.array(
+        [
+            k
+            for k, column in enumerate(columns)
+            if column.name in FRICTION and column.joint is not None and warm[:, column.joint - 1].any()
+        ],
+        dtype=np.intp,
+    )
+    if not len(rubbing):
+        return unit
+    joint = np.array([columns[k].joint for k in rubbing], dtype=np.intp) - 1
+    w, p = warm[:, joint], len(columns)
+    G = np.zeros((p + len(rubbing), p + len(rubbing)))
+    G[:p, :p] = healthy.gram.sum(axis=0)
+    G[:p, p:] = np.einsum("upf,uf->pf", healthy.gram[:, :, rubbing], w)
+    G[p:, :p] = G[:p, p:].T
+    G[p:, p:] = np.einsum("uef,ue,uf->ef", healthy.gram[:, rubbing[:, None], rubbing], w, w)
+    b = np.concatenate([healthy.moment.sum(axis=0), (healthy.moment[:, rubbing] * w).sum(axis=0)])
+    slope = np.zeros((len(warm_unit), p))
+    slope[:, rubbing] = ridge(G, b, _RIDGE)[p:] * warm_unit[:, joint]
+    explained = np.einsum("upq,uq->up", unit.gram, slope)
+    return Normal(
+        unit.gram,
+        unit.moment - explained,
+        unit.energy - (slope * (2.0 * unit.moment - explained)).sum(axis=1),
+    )
 
 
 def _line(x: Array, y: Array, programme: NDArray[np.intp], healthy: int) -> tuple[float, Array] | None:

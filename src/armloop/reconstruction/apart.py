@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.blocks import stretch
 from armloop.library.rigid_body import BaseParameters
-from armloop.motion import Motion, Samples
+from armloop.motion import Samples
 from armloop.pieces import LogSource
 from armloop.reconstruction.shared import PLAIN_FRICTION
 from armloop.regression.moments import Moments, total
@@ -75,7 +76,7 @@ def independent_blocks(
         except ShortRunError:
             continue
         covered += samples.motion.samples * samples.period
-        parts.append(_stretches(samples, _SAMPLES // len(some)))
+        parts.append(_middle(samples, _SAMPLES // len(some)))
     if not parts:
         return Apart(seconds, 0.5 / how.cutoff_hz, 0.0)
     covered *= len(logs) / len(some)
@@ -110,13 +111,8 @@ def _correlation(arm: Arm, parts: Sequence[Samples]) -> float:
     return max(times, default=period)
 
 
-def _stretches(samples: Samples, length: int) -> Samples:
+def _middle(samples: Samples, length: int) -> Samples:
     """The middle of a motion, so many samples."""
-    motion, N = samples.motion, samples.motion.samples
+    N = samples.motion.samples
     first = max(0, (N - length) // 2)
-    cut = slice(first, min(N, first + length))
-    inner = motion.starts[(motion.starts > cut.start) & (motion.starts < cut.stop)] - cut.start
-    taken = Motion(
-        motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
-    )
-    return Samples(taken, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz)
+    return stretch(samples, first, min(N, first + length))

@@ -50,19 +50,23 @@ class Law:
 
     Attributes:
         shape: its nonlinear parameter.
-        columns: (N, n, p) torque per unit of each coefficient, unfiltered.
+        size: number of its coefficients.
+        constant: joints (0-based) at which one of its columns is constant.
         gain: part of the squared error that it removes on left-out blocks, of the joint it shows on most.
     """
 
     effect: Effect
     shape: float
-    columns: Array
+    size: int
+    constant: tuple[int, ...] = ()
     gain: float = 0.0
 
-    @property
-    def size(self) -> int:
-        """Number of its coefficients."""
-        return self.columns.shape[2]
+    @staticmethod
+    def found(effect: Effect, shape: float, columns: Array, gain: float) -> Law:
+        """A law whose unfiltered columns on some motion are (N, n, p)."""
+        flat = (np.ptp(columns, axis=0) == 0) & columns.any(axis=0)
+        constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
+        return Law(effect, shape, columns.shape[2], constant, gain)
 
     def to_dict(self) -> dict[str, object]:
         """JSON-ready values."""
@@ -90,20 +94,24 @@ class Laws:
         """Number of coefficients of all of them."""
         return sum(law.size for law in self.chosen)
 
-    def columns(self, samples: Samples) -> Array:
-        """(N, n, p) columns of all laws through the samples' filter."""
-        n = samples.motion.joints
-        if not self.chosen:
-            return np.zeros((samples.motion.samples, n, 0))
-        return smooth(samples, np.concatenate([law.columns for law in self.chosen], axis=2))
+    @property
+    def loading(self) -> Array:
+        """(p,) one for coefficients of laws that load the joints, else zero."""
+        return np.repeat([float(law.effect.load) for law in self.chosen], [law.size for law in self.chosen])
 
-    def constant_at(self, joints: int) -> list[int]:
+    def raw(self, arm: Arm, motion: Motion, period: float) -> Array:
+        """(N, n, p) torque per unit of each coefficient, unfiltered."""
+        context = Context(arm, motion, period=period)
+        parts = [law.effect.full_columns(context, law.shape) for law in self.chosen]
+        return np.concatenate([np.zeros((motion.samples, arm.n, 0)), *parts], axis=2)
+
+    def columns(self, arm: Arm, samples: Samples) -> Array:
+        """(N, n, p) columns of all laws through the samples' filter."""
+        return smooth(samples, self.raw(arm, samples.motion, samples.period))
+
+    def constant_at(self) -> set[int]:
         """Joints (0-based) at which one of the columns is constant."""
-        found = []
-        for law in self.chosen:
-            constant = (np.ptp(law.columns, axis=0) == 0) & law.columns.any(axis=0)
-            found += [j for j in range(joints) if constant[j].any()]
-        return found
+        return {joint for law in self.chosen for joint in law.constant}
 
     def mass(self, arm: Arm, q: Array) -> Array:
         """(P, n, n, p) what each coefficient adds to M(q) at postures q (P, n)."""
@@ -122,14 +130,6 @@ class Laws:
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
             parts.append(added.transpose(0, 2, 1, 3))
         return np.concatenate(parts, axis=3)
-
-    def load(self, theta: Array) -> Array | float:
-        """(N, n) torque of those laws that load the joints, for all coefficients (p,)."""
-        total: Array | float = 0.0
-        for law, x in zip(self.chosen, self.split(theta), strict=True):
-            if law.effect.load:
-                total = total + law.columns @ x
-        return total
 
     def split(self, theta: Array) -> list[Array]:
         """Each law's coefficients."""
@@ -195,18 +195,18 @@ def search(
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
-        chosen.append(Law(effect, shape, columns.raw(effect, shape), trial.share))
+        chosen.append(Law.found(effect, shape, columns.raw(effect, shape), trial.share))
     return Laws(chosen, tried)
 
 
-def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], samples: Samples) -> Laws:
+def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, samples: Samples) -> Laws:
     """The laws without those to which the others, and the friction chosen beside them, leave nothing."""
     for k in reversed(range(len(laws.chosen))):
         others = [law for i, law in enumerate(laws.chosen) if i != k]
         own = bench(others)
-        trial = own.trial(smooth(samples, laws.chosen[k].columns))
+        trial = own.trial(Laws([laws.chosen[k]]).columns(arm, samples))
         if trial is None or not is_worth(trial, laws.tried):
-            return pruned(replace(laws, chosen=others), bench, samples)
+            return pruned(replace(laws, chosen=others), bench, arm, samples)
     return laws
 
 

@@ -6,22 +6,25 @@ small logs, an even selection from large ones.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 from math import gcd
-from typing import TypeVar
+from operator import add
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers
+from armloop.blocks import block_numbers, stretch
 from armloop.log import MotionLog
 from armloop.motion import Motion, Samples
 from armloop.pieces import LogSource
+from armloop.progress import Progress, paced, silent
 from armloop.reconstruction.options import Options
 from armloop.signals import Conditioning, ShortRunError, condition, independent_rows, velocity_noise
-from armloop.workers import Serial, Workers, map_reduce
+from armloop.workers import Serial, Workers
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,6 +32,10 @@ Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.
 REFERENCE = 50_000
+#: Seconds between two lines that tell how far a pass is.
+_PACE = 10.0
+#: Stretches of consecutive samples that stand for all.
+_STRETCHES = 64
 #: Fold that chooses the library where the held-out blocks are too few to be halved; 0 judges, 1 chooses orders.
 _CHOOSING = 2
 
@@ -84,6 +91,19 @@ class Chunk:
         held_out = fold == 0 if held_out is None else held_out
         return Chunk(samples, blocks, held_out, fold == 1, independent_rows(samples), options.folds)
 
+    def cut(self, low: int, high: int) -> Chunk:
+        """Consecutive samples."""
+        own = slice(low, high)
+        return Chunk(
+            stretch(self.samples, low, high),
+            self.blocks[own],
+            self.held_out[own],
+            self.validation[own],
+            self.independent[own],
+            self.folds,
+            None if self.choosing is None else self.choosing[own],
+        )
+
     def take(self, rows: NDArray[np.intp]) -> Chunk:
         """Some samples, in order; each run keeps at least one."""
         old, motion = self.samples, self.samples.motion
@@ -138,11 +158,13 @@ class Data:
         parts: what the chunks are made from.
         reference: samples for global statistics: all of them, or an even selection.
         workers: who computes sums over the chunks.
+        progress: who is told how far a pass over logs that are not in memory is.
     """
 
     parts: Sequence[_Conditioned | _Kept]
     reference: Chunk
     workers: Workers
+    progress: Progress = silent
 
     @staticmethod
     def of(samples: Samples, options: Options, held_out: Mask | None = None) -> Data:
@@ -180,7 +202,11 @@ class Data:
 
     @staticmethod
     def streamed(
-        logs: Sequence[LogSource], how: Conditioning, options: Options, workers: Workers | None = None
+        logs: Sequence[LogSource],
+        how: Conditioning,
+        options: Options,
+        workers: Workers | None = None,
+        progress: Progress = silent,
     ) -> Data:
         """Samples that are read and conditioned anew on every pass, each log apart from the others.
 
@@ -212,7 +238,7 @@ class Data:
                 first += blocks
         if not parts:
             condition([logs[0].read()], how, noise)  # says which run is too short
-        return Data(parts, _joined(reference), workers)
+        return Data(parts, _joined(reference), workers, progress)
 
     def sampled(self, count: int) -> Data:
         """At most so many chunks, evenly; all samples in one where they are in memory."""
@@ -220,13 +246,51 @@ class Data:
             return replace(self, parts=[_Kept(self.reference)])
         return replace(self, parts=self.parts[:: max(1, -(-len(self.parts) // count))])
 
-    def map(self, function: Callable[[Chunk], Answer]) -> Iterator[Answer]:
-        """The function's answers for all chunks, in order."""
-        return self.workers.map(partial(_on_chunk, function), self.parts)
+    def window(self, most: int) -> Chunk:
+        """All samples where there are no more, else stretches of consecutive ones, evenly, about so many together."""
+        if self.in_memory and self.reference.samples.motion.samples <= most:
+            return self.reference
+        some = self.sampled(_STRETCHES).parts
+        each = -(-_STRETCHES // len(some))
+        length = max(1, most // (each * len(some)))
+        return _joined(
+            [
+                piece
+                for pieces in self.workers.map(
+                    partial(_on_chunk, partial(_stretches, count=each, length=length)), some
+                )
+                for piece in pieces
+            ]
+        )
 
-    def sum(self, function: Callable[[Chunk], Answer]) -> Answer:
+    def map(self, function: Callable[[Chunk], Answer], what: str = "") -> Iterator[Answer]:
+        """The function's answers for all chunks, in order; of a long pass over logs it is told how far it is.
+
+        Args:
+            what: the pass is for.
+        """
+        tell, count, began = paced(self.progress, _PACE), len(self.parts), time.monotonic()
+        answers = self.workers.map(partial(_on_chunk, function), self.parts)
+        for number, answer in enumerate(answers, 1):
+            if number < count and not self.in_memory:
+                left = (time.monotonic() - began) / number * (count - number)
+                tell(
+                    f"{what or 'reading the logs'}: {number} of {count} pieces, {left:.0f} s left in this pass"
+                )
+            yield answer
+
+    def sum(self, function: Callable[[Chunk], Answer], what: str = "") -> Answer:
         """Sum of the function's answers over all chunks."""
-        return map_reduce(self.workers, partial(_on_chunk, function), self.parts)
+        answers: Iterator[Any] = self.map(function, what)
+        return reduce(add, answers)
+
+    def recorded(self, most: int) -> tuple[list[MotionLog], Chunk]:
+        """Logs as they were recorded, about so many samples of them, evenly, and the same conditioned."""
+        streamed = [part for part in self.parts if isinstance(part, _Conditioned)]
+        whole = sum(part.source.samples for part in streamed)
+        some = streamed[:: max(1, -(-whole // most))]
+        chunks = [chunk for chunk in (part.chunk() for part in some) if chunk is not None]
+        return [part.source.read() for part in some], _joined(chunks)
 
 
 def _near(rows: Mask, motion: Motion, seconds: float) -> Mask:
@@ -247,6 +311,16 @@ def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | _Kept) -
     chunk = part.chunk()
     assert chunk is not None, "a log changed between two passes"
     return function(chunk)
+
+
+def _stretches(chunk: Chunk, count: int, length: int) -> list[Chunk]:
+    """So many stretches of a chunk, evenly; all of it in one where it is no longer."""
+    N = chunk.samples.motion.samples
+    if N <= count * length:
+        return [chunk]
+    middles = (np.arange(count) + 0.5) * N / count
+    starts = np.clip(middles - length / 2, 0, N - length).astype(int)
+    return [chunk.cut(low, low + length) for low in starts.tolist()]
 
 
 def _noise(cutoff_hz: float, log: LogSource) -> Array:

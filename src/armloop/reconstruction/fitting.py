@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +14,16 @@ from armloop.library.friction import FrictionTerm
 from armloop.motion import Samples
 from armloop.progress import Progress
 from armloop.reconstruction.catalogue import Law, Laws, pruned, search
-from armloop.reconstruction.friction_ladder import Ladder, climb, inner_folds
+from armloop.reconstruction.design import Design
+from armloop.reconstruction.friction_ladder import Ladder, climb
+from armloop.reconstruction.inner_folds import inner_folds
 from armloop.reconstruction.options import Options
-from armloop.reconstruction.pooled import Pooled, Prior
+from armloop.reconstruction.pooled import Prior, Solution
 from armloop.reconstruction.projected import Projected, Rows
-from armloop.signals import independent_rows, smooth
+from armloop.reconstruction.training import Training, fitted_rows
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 #: So many rows tell laws apart as well as more do.
 _ROWS = 15_000
@@ -33,10 +36,10 @@ _FREE = 1e-9
 class Fitting:
     """A regression of shared columns with each joint's friction, to which laws of the catalogue may be added.
 
+    Laws are looked for in a window of the data (all of them where they are no more than that), and regressed on all.
+
     Args:
-        columns: (N, n, r) the shared columns, filtered; afterwards with those of the laws.
-        rows: (N, n) samples to use.
-        load: (N, n) torque that friction by load depends on; afterwards with that of the laws.
+        design: the shared columns with the load by their coefficients.
         priors: what the shared coefficients may be drawn to.
 
     Attributes:
@@ -46,102 +49,92 @@ class Fitting:
     def __init__(
         self,
         arm: Arm,
-        samples: Samples,
-        columns: Array,
-        rows: NDArray[np.bool_],
-        load: Array,
+        training: Training,
+        design: Design,
         priors: dict[str, Prior],
         options: Options,
         progress: Progress,
     ) -> None:
-        self.arm, self.samples, self.rows, self.options = arm, samples, rows, options
-        self.columns, self.load = columns, load
         self.covariance = np.zeros((0, 0))
-        self._own, self._priors, self._progress = columns, priors, progress
+        self._arm, self._own, self._design, self._training = arm, design, design, training
+        self._priors, self._options, self._progress = priors, options, progress
 
-    def with_laws(self, ladder: Ladder, load: Callable[[Array], Array]) -> tuple[Ladder, Laws]:
-        """The laws that the training data show, and every joint's friction chosen beside them.
-
-        Args:
-            load: (N, n) load of the joints by the shared coefficients (r,) alone.
-        """
-        laws = search(self.arm, self.samples, self._bench(ladder), self.options, self._progress)
+    def chosen(self) -> tuple[Ladder, Laws]:
+        """The laws that the training data show, and every joint's friction chosen beside them."""
+        self._progress("choosing each joint's friction on held-out data")
+        ladder, samples = self._climbed(), self._training.window.samples
+        laws = search(self._arm, samples, self._bench(ladder), self._options, self._progress)
         while laws.chosen:
-            self.columns = np.concatenate([self._own, laws.columns(self.samples)], axis=2)
-            theta = self._solved(ladder)
-            self.load = load(theta) + laws.load(theta[self._own.shape[2] :][: laws.count])
-            priors = {name: padded(prior, laws.count) for name, prior in self._priors.items()}
-            self._progress("choosing each joint's friction anew beside the laws found")
-            ladder = climb(self.arm, self.samples, self.columns, self.rows, self.load, self.options, priors)
-            ladder = without_offsets(ladder, laws.constant_at(self.arm.n))
-            fewer = pruned(laws, self._bench(ladder), self.samples)
+            ladder = self._beside(laws, ladder)
+            fewer = pruned(laws, self._bench(ladder), self._arm, samples)
             if len(fewer.chosen) == len(laws.chosen):
                 break
             laws = fewer
-        if not laws.chosen:
-            if self.columns is not self._own:
-                self.columns = self._own
-                self.load = load(self._solved(ladder, 0))
-                ladder = climb(
-                    self.arm, self.samples, self.columns, self.rows, self.load, self.options, self._priors
-                )
-            return ladder, laws
-        trial = self._bench(ladder)([]).trial(laws.columns(self.samples))
-        assert trial is not None
-        self.covariance = trial.covariance
+        if laws.chosen:
+            trial = self._bench(ladder)([]).trial(laws.columns(self._arm, samples))
+            assert trial is not None
+            self.covariance = trial.covariance
+        elif self._design.laws.chosen:
+            ladder = self._beside(laws, ladder)
         return ladder, laws
 
-    def _solved(self, ladder: Ladder, extra: int | None = None) -> Array:
-        extra = self.columns.shape[2] - self._own.shape[2] if extra is None else extra
-        pooled = Pooled(
-            self.samples, self.columns, ladder.laws, self.rows, self.load, passive=self.options.physical
-        )
-        prior = ladder.prior
-        if prior is not None:
-            prior = padded(cut(prior, self._own.shape[2]), extra)
-        return pooled.solve(pooled.everything, prior).theta
+    def _beside(self, laws: Laws, ladder: Ladder) -> Ladder:
+        """Friction chosen anew beside some laws, by the load of what is solved with that of a ladder before."""
+        design = self._own.with_laws(laws)
+        self._design = design.loaded(self._window_solution(design, ladder).theta)
+        self._progress("choosing each joint's friction anew beside the laws found")
+        return without_offsets(self._climbed(), laws.constant_at())
+
+    def _climbed(self) -> Ladder:
+        extra = self._design.laws.count
+        priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
+        return climb(self._arm, self._training, self._design, self._options, priors)
+
+    def _window_solution(self, design: Design, ladder: Ladder) -> Solution:
+        """The coefficients of a design and of a ladder's friction, on the window."""
+        pooled = self._training.window_pooled(design, ladder.laws, self._options.physical)
+        return pooled.solve(pooled.everything, self._prior(ladder, design.laws.count))
+
+    def _prior(self, ladder: Ladder, extra: int) -> Prior | None:
+        return None if ladder.prior is None else padded(cut(ladder.prior, self._own.count), extra)
 
     def _bench(self, ladder: Ladder) -> Callable[[Sequence[Law]], Projected]:
         """Regressions of the shared columns and some laws', with the friction of a ladder that is not zero."""
-        samples, r = self.samples, self._own.shape[2]
-        used = np.asarray(self.rows.any(axis=1))
-        fold, inside = inner_folds(samples, used, self.options)
+        chunk = self._training.window
+        samples, usable, r = chunk.samples, fitted_rows(chunk), self._own.count
+        used = np.asarray(usable.any(axis=1))
+        fold, inside = inner_folds(samples, used, self._options)
         numbers = block_numbers(samples.motion, _BLOCK_SECONDS)
         block = np.unique(fold * (numbers.max() + 1) + numbers, return_inverse=True)[1]
-        chosen = independent_rows(samples)[:, None] & self.rows
-        sample, joint = (x.astype(np.intp) for x in np.nonzero(chosen))
+        sample, joint = (x.astype(np.intp) for x in np.nonzero(chunk.independent[:, None] & usable))
         every = max(1, len(sample) // _ROWS)
         sample, joint = sample[::every], joint[::every]
         order = np.lexsort((sample, fold[sample], joint))
         sample, joint = sample[order], joint[order]
-
-        friction = []
-        for j, terms in enumerate(ladder.candidates):
-            each = [term.column(samples.motion, j, self.load) for term in terms]
-            filtered = smooth(samples, np.column_stack(each)) if each else np.zeros((len(used), 0))
-            friction.append(filtered[sample[joint == j]])
+        shared, friction = _picked(self._design, samples, ladder.candidates, sample, joint)
+        shared = shared[:, :r]
 
         def stacked(columns: Array, places: list[list[int]]) -> Array:
-            """(R, r + all terms) rows of shared columns and of some of each joint's own friction."""
-            X = np.zeros((len(sample), columns.shape[2] + sum(map(len, places))))
-            X[:, : columns.shape[2]] = columns[sample, joint]
-            start = columns.shape[2]
+            """(R, p + all terms) rows of shared columns (R, p) and of some of each joint's own friction."""
+            X = np.zeros((len(sample), columns.shape[1] + sum(map(len, places))))
+            X[:, : columns.shape[1]] = columns
+            start = columns.shape[1]
             for j, own in enumerate(places):
                 X[joint == j, start : start + len(own)] = friction[j][:, own]
                 start += len(own)
             return X
 
-        sayable = stacked(self._own, [list(range(len(terms))) for terms in ladder.candidates])
+        sayable = stacked(shared, [list(range(len(terms))) for terms in ladder.candidates])
 
         def bench(laws: Sequence[Law]) -> Projected:
             extra = Laws(list(laws))
-            columns = np.concatenate([self._own, extra.columns(samples)], axis=2)
-            pooled = Pooled(
-                samples, columns, ladder.laws, self.rows, self.load, passive=self.options.physical
-            )
-            prior = None if ladder.prior is None else padded(cut(ladder.prior, r), extra.count)
-            solution = pooled.solve(pooled.everything, prior)
-            size = columns.shape[2]
+            columns = np.hstack([shared, extra.columns(self._arm, samples)[sample, joint]])
+            prior = self._prior(ladder, extra.count)
+            if not laws and ladder.pooled.shared == r:
+                solution = ladder.solved()
+            else:
+                solution = self._window_solution(self._design.with_laws(extra), ladder)
+            size = columns.shape[1]
             active, start = [], size
             for law, terms in zip(ladder.laws, ladder.candidates, strict=True):
                 own = solution.theta[start : start + len(law)]
@@ -160,7 +153,24 @@ class Fitting:
         return bench
 
 
-def without_offsets(ladder: Ladder, joints: Sequence[int]) -> Ladder:
+def _picked(
+    design: Design, samples: Samples, candidates: list[list[FrictionTerm]], sample: Index, joint: Index
+) -> tuple[Array, list[Array]]:
+    """(R, r) shared columns at some samples of some joints, and per joint (R_j, terms) those of its friction there."""
+    shared = np.zeros((len(sample), design.size))
+    friction = [np.zeros((int((joint == j).sum()), len(terms))) for j, terms in enumerate(candidates)]
+    places = [np.flatnonzero(joint == j) for j in range(len(candidates))]
+    for columns in design.walk(samples, candidates):
+        j, M, size = columns.joint, len(columns.X), design.size
+        own = np.flatnonzero((sample[places[j]] >= columns.first) & (sample[places[j]] < columns.first + M))
+        rows = columns.X[sample[places[j][own]] - columns.first]
+        acting = columns.where < size
+        shared[np.ix_(places[j][own], columns.where[acting])] = rows[:, acting]
+        friction[j][own] = rows[:, ~acting]
+    return shared, friction
+
+
+def without_offsets(ladder: Ladder, joints: Collection[int]) -> Ladder:
     """The ladder without the constant torque of joints (0-based) where a law brings one: the two cannot be told apart."""
 
     def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:

@@ -16,7 +16,7 @@ A user may restrict the ladder to some laws, by the names in :data:`armloop.libr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -24,19 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
-from armloop.blocks import block_numbers
 from armloop.errors import InputError
 from armloop.library.friction import FRICTION_LAWS, FrictionTerm
-from armloop.motion import Motion, Samples
+from armloop.motion import Motion
+from armloop.reconstruction.design import Design
 from armloop.reconstruction.options import Options
-from armloop.reconstruction.pooled import Choice, Pooled, Prior
-from armloop.signals import at_least
+from armloop.reconstruction.pooled import Choice, Pooled, Prior, Solution
+from armloop.reconstruction.training import Training
 
 Array = NDArray[np.float64]
 
-#: Folds of the inner judges: so many where there is plenty of data, s of them; else twice as many, of blocks that
-#: may become as short as so many periods of the filter, so that what is left can still determine the rest.
-_FOLDS, _PLENTY, _SHORTEST = 5, 60.0, 5.0
 #: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
 #: Part of a joint's squared error that a rung must be worth for the joint to keep it.
@@ -82,13 +79,22 @@ class Climb:
 
 @dataclass(frozen=True, eq=False)
 class Ladder:
-    """The laws chosen, the prior of the shared coefficients, what each rung brought, and all that could be chosen."""
+    """The laws chosen, the prior of the shared coefficients, what each rung brought, all candidates, and the sums."""
 
     laws: list[list[FrictionTerm]]
     prior: Prior | None
     climbs: list[Climb]
     notes: list[str]
-    candidates: list[list[FrictionTerm]] = field(default_factory=list)
+    candidates: list[list[FrictionTerm]]
+    pooled: Pooled
+
+    def solved(self, held_out: bool = False) -> Solution:
+        """Coefficients of the shared columns and of the laws chosen."""
+        return self.pooled.solve(self.pooled.choice(self.laws), self.prior, held_out)
+
+    def errors(self, theta: Array) -> Array:
+        """(n,) nRMSE of such coefficients on the blocks that judge the model; NaN where a joint does not slide there."""
+        return self.pooled.relative_errors(theta, self.pooled.choice(self.laws))
 
 
 def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
@@ -169,77 +175,29 @@ def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
     return kept
 
 
-def climb(
-    arm: Arm,
-    samples: Samples,
-    columns: Array,
-    rows: NDArray[np.bool_],
-    load: Array,
-    options: Options,
-    priors: dict[str, Prior],
-) -> Ladder:
+def climb(arm: Arm, data: Training, design: Design, options: Options, priors: dict[str, Prior]) -> Ladder:
     """Choose the prior of the shared coefficients by its evidence, then every joint's friction on held-out folds.
 
     Args:
-        columns: (N, n, r) shared columns, filtered.
-        rows: (N, n) samples to use.
-        load: (N, n) torque that friction by load depends on.
+        data: what is fitted, and what judges.
+        design: shared columns, and the load that friction may depend on.
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    speeds = np.where(rows, np.abs(samples.motion.v), np.nan)
-    ladder = restricted(rungs(arm, samples.motion, np.nanquantile(speeds, _CREEP, axis=0)), options.friction)
+    ladder = restricted(rungs(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
     candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
-    fold, judged = inner_folds(samples, np.asarray(rows.any(axis=1)), options)
-    pooled = Pooled(samples, columns, candidates, rows, load, fold, judged, options.physical)
+    pooled = data.pooled(design, candidates, options.physical)
     ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
     places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
     state = _State(pooled, places, priors)
-    plenty = rows.any(axis=1).sum() * samples.period > _PLENTY
-    climbs = [state.take(level, rung.name, one_by_one=plenty) for level, rung in enumerate(ladder)]
-    if plenty:
+    climbs = [state.take(level, rung.name, one_by_one=data.plenty) for level, rung in enumerate(ladder)]
+    if data.plenty:
         climbs.append(state.hand_back())
     notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
-    return Ladder(laws, state.prior, climbs, notes + _notes(climbs), candidates)
-
-
-def inner_folds(
-    samples: Samples, used: NDArray[np.bool_], options: Options
-) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """(N,) folds for the choice of terms, and (N,) which samples judge their fold.
-
-    Whole runs are dealt out where there are enough of them and none outweighs the others: another run is what a
-    model is for. Else blocks are; their samples within half a period of the filter from a border do not judge.
-    """
-    motion = samples.motion
-    lengths = np.array([used[run].sum() for run in motion.runs()])
-    seconds = used.sum() * samples.period
-    if np.count_nonzero(lengths) >= _FOLDS and lengths.max() <= 0.4 * lengths.sum() and seconds > _PLENTY:
-        fold, following = np.zeros(motion.samples, dtype=np.intp), 0
-        for run, length in zip(motion.runs(), lengths, strict=True):
-            fold[run] = following % _FOLDS
-            following += int(length > 0)
-        return fold, np.ones(motion.samples, dtype=bool)
-    shortest = _SHORTEST / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
-    numbers = block_numbers(motion, max(min(options.block_seconds, seconds / (4 * _FOLDS)), shortest))
-    kept = np.unique(numbers[used])
-    count = _FOLDS if seconds > _PLENTY else 2 * _FOLDS
-    fold = np.searchsorted(kept, numbers) % max(1, min(count, len(kept)))
-    return fold.astype(np.intp), _inside(motion, numbers, samples)
-
-
-def _inside(motion: Motion, numbers: NDArray[np.intp], samples: Samples) -> NDArray[np.bool_]:
-    """(N,) samples further than half a period of the filter from the borders of their block."""
-    inside = np.ones(motion.samples, dtype=bool)
-    if samples.cutoff_hz > 0:
-        reach = at_least(0.5 / (samples.cutoff_hz * samples.period))
-        border = np.flatnonzero(np.diff(numbers)) + 1
-        near = (border[:, None] + np.arange(-reach, reach)).ravel()
-        inside[near[(near >= 0) & (near < motion.samples)]] = False
-    return inside
+    return Ladder(laws, state.prior, climbs, notes + _notes(climbs), candidates, pooled)
 
 
 class _State:

@@ -8,39 +8,42 @@ look-alikes are exchanged for what they stood in for, and terms that became supe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
-from armloop.blocks import folds
 from armloop.components import Lagrangian
 from armloop.dynamics.physics import joint_limits
 from armloop.errors import ExcitationError
 from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
+from armloop.pieces import LogSource
 from armloop.progress import Progress
+from armloop.reconstruction.data import Chunk, Data
+from armloop.reconstruction.design import Design
 from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
-from armloop.reconstruction.friction_ladder import climb
+from armloop.reconstruction.library import Find, Library
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
-from armloop.reconstruction.pooled import Pooled
 from armloop.reconstruction.shared import (
     FRICTION,
-    PLAIN_FRICTION,
+    SHARED_CONDITIONING,
     check_moves,
     check_rank,
     fast_rows,
     found_friction,
     motion_range,
-    sliding_rows,
 )
+from armloop.reconstruction.training import Survey, Training, fitted_rows
 from armloop.regression.moments import Moments
-from armloop.signals import independent_rows, smooth
+from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -60,7 +63,7 @@ _POOR = 0.1
 _CHUNK = 512
 
 
-def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, progress: Progress) -> Found:
+def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
     """Choose terms of T and U and regress them with friction on all moving samples at once.
 
     The fold after the held-out one decides how many terms there are. The joints' constant inertias are always
@@ -69,25 +72,21 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
     Raises:
         ExcitationError: a joint does not move, or the motion leaves base parameters undetermined.
     """
-    motion = samples.motion
-    rows = sliding_rows(samples) & ~held_out[:, None]
-    check_moves(arm, rows)
+    motion = data.reference.samples.motion
     base = BaseParameters.of_arm(arm, rotors=True)
-    check_rank(base.columns(arm, motion), rows, base)
+    progress("lagrangian: what the motion can tell")
+    training = Training.of(data, Design(arm, partial(base.columns, arm), base.count), options)
+    check_moves(arm, training.survey.fitted)
+    check_rank(training.survey.products(base.count), base)
     library = candidates(arm)
     progress(f"lagrangian: {library.count} candidates, {len(FRICTION) + 1} friction columns a joint")
-    fast = rows & fast_rows(samples)
-    chosen = _choose(library, samples, fast, options)
+    chosen = _choose(library, data)
     energy = library.take(chosen)
     progress(f"lagrangian: {len(chosen)} terms chosen")
-    columns = energy.columns(motion)
-    smoothed = smooth(samples, columns)
-    plain = Pooled(samples, smoothed, [list(PLAIN_FRICTION) for _ in arm.joints], fast)
-    load = columns @ plain.solve(plain.everything).theta[: energy.count]
-    ladder = climb(arm, samples, smoothed, rows, load, options, {})
-    fitting = Fitting(arm, samples, smoothed, rows, load, {}, options, progress)
-    ladder, laws = fitting.with_laws(ladder, lambda theta: columns @ theta[: energy.count])
-    smoothed, load = fitting.columns, fitting.load
+    design = Design(arm, energy.columns, energy.count)
+    design = design.loaded(data.sum(partial(Survey.of, design=design), "load").load(energy.count))
+    fitting = Fitting(arm, training, design, {}, options, progress)
+    ladder, laws = fitting.chosen()
     r = energy.count + laws.count
     shape = Body(
         lambda q: np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3),
@@ -96,15 +95,12 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         np.zeros(r, dtype=bool),
     )
 
-    memory = options.correlation_seconds / samples.period
-
-    def regressed(rows: Rows) -> Found:
-        pooled = Pooled(samples, smoothed, ladder.laws, rows, load, passive=options.physical)
-        solution = pooled.solve(pooled.everything)
+    def regressed(held_out: bool) -> tuple[Found, Array]:
+        solution = ladder.solved(held_out)
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, shape, ladder.laws, options.insist, memory)
+                physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
                 theta = physical.theta
                 physics = {
                     "constraints": physical.binding,
@@ -118,18 +114,19 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         body = Lagrangian(energy, theta[: energy.count])
         history = {"friction_ladder": [rung.to_dict() for rung in ladder.climbs], **physics}
         effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
-        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
+        friction = found_friction(ladder.laws, theta[r:])
+        return Found(arm, [body], friction, history=history, effects=effects), theta
 
-    found = regressed(rows)
-    found.final = final = regressed(sliding_rows(samples))
-    friction = final.friction
+    found, theta = regressed(held_out=False)
+    found.final, _ = regressed(held_out=True)
+    final = found.final
     acts = energy.acts
     moving, at_rest = acts & ~energy.potential, acts & energy.potential
     reports = []
     for step in (1, 2, 3):
         terms = at_rest.sum(axis=1) + (moving.sum(axis=1) if step > 1 else 0)
-        counts = [int(terms[j]) + sum(t.step <= step for t in friction[j]) for j in range(arm.n)]
-        samples_per_joint = sliding_rows(samples).sum(axis=0).tolist()
+        counts = [int(terms[j]) + sum(t.step <= step for t in final.friction[j]) for j in range(arm.n)]
+        samples_per_joint = training.survey.sliding.tolist()
         reports.append(StepReport(step, None, library.count, library.count, counts, samples_per_joint))
     notes = [
         f"{energy.count} terms of the energies serve all joints and all steps: they were regressed together and "
@@ -139,24 +136,26 @@ def lagrangian(arm: Arm, samples: Samples, held_out: Rows, options: Options, pro
         *ladder.notes,
         *laws.notes(final.effects),
         *physics_notes(final.history),
-        *_warnings(found, final, samples, held_out),
+        *_warnings(final, motion, ladder.errors(theta)),
     ]
     found.reports, found.notes = reports, notes
     return found
 
 
-def _warnings(found: Found, final: Found, samples: Samples, held_out: Rows) -> list[str]:
-    """What speaks against the terms found: a mass matrix that is none, and torques not met on the held-out blocks."""
-    motion, warnings = samples.motion, []
+def _warnings(final: Found, motion: Motion, errors: Array) -> list[str]:
+    """What speaks against the terms found: a mass matrix that is none, and torques not met on the held-out blocks.
+
+    Args:
+        errors: (n,) nRMSE there.
+    """
+    warnings = []
     (body,) = final.components
     assert isinstance(body, Lagrangian)
     lowest = np.linalg.eigvalsh(body.mass_matrix(motion.q[:: max(1, motion.samples // 1000)]))[:, 0]
     if (lowest <= 0).any():
         warnings.append(f"M(q) is not positive definite at {np.mean(lowest <= 0):.1%} of the postures")
-    judged = samples.moving & held_out[:, None]
-    residual = samples.tau - smooth(samples, found.torque(motion))
-    squares = [np.sum(x**2, axis=0, where=judged) for x in (residual, samples.tau)]
-    error = float(np.mean(np.sqrt(squares[0] / np.maximum(squares[1], 1e-300))))
+    known = errors[np.isfinite(errors)]
+    error = float(known.mean()) if len(known) else 0.0
     if error > _POOR:
         warnings.append(
             f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
@@ -171,6 +170,10 @@ class _Problem:
 
     total: int
     parts: list[tuple[Index, Moments]]
+
+    def __add__(self, other: _Problem) -> _Problem:
+        pairs = zip(self.parts, other.parts, strict=True)
+        return _Problem(self.total, [(where, a + b) for (where, a), (_, b) in pairs])
 
     def weighted(self, weights: Array) -> Moments:
         """Moments of all joints together; a joint's squares count ``weights`` times."""
@@ -190,13 +193,30 @@ class _Problem:
         )
 
 
-def _choose(library: EnergyTerms, samples: Samples, rows: Rows, options: Options) -> Index:
+@dataclass(frozen=True, eq=False)
+class _Problems:
+    """What is fitted, and what decides how many terms there are; they add over chunks."""
+
+    fit: _Problem
+    judge: _Problem
+
+    def __add__(self, other: _Problems) -> _Problems:
+        return _Problems(self.fit + other.fit, self.judge + other.judge)
+
+    @staticmethod
+    def of(chunk: Chunk, library: EnergyTerms) -> _Problems:
+        """Independent samples that slide fast."""
+        rows = fitted_rows(chunk) & fast_rows(chunk.samples) & chunk.independent[:, None]
+        judged = chunk.validation[:, None]
+        return _Problems(
+            _problem(library, chunk.samples, rows & ~judged), _problem(library, chunk.samples, rows & judged)
+        )
+
+
+def _choose(library: EnergyTerms, data: Data) -> Index:
     """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual."""
-    judged = folds(samples, options.folds, options.block_seconds) == 1
-    sparse = rows & independent_rows(samples)[:, None]
-    fit = _problem(library, samples, sparse & ~judged[:, None])
-    judge = _problem(library, samples, sparse & judged[:, None])
-    n = samples.motion.joints
+    problems = data.sum(partial(_Problems.of, library=library), "normal equations of the candidates")
+    fit, judge, n = problems.fit, problems.judge, len(library.revolute)
     forced = np.concatenate([np.arange(n), np.arange(library.count, fit.total)])
     weights = np.array([part.count / part.yy for _, part in fit.parts])
     support = forced
@@ -292,3 +312,23 @@ def _prune(
             return support
         else:
             return support
+
+
+class LagrangianLibrary(Library):
+    """Few terms of the energies."""
+
+    name = "lagrangian"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": lagrangian}
+    conditioning = SHARED_CONDITIONING
+
+    def undetermined(self, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
+        """Why there are too many candidates for the logs.
+
+        Torque below a corner takes four values per period of it, each joint apart
+        (:func:`armloop.signals.independent_rows`). Fewer values than candidates determine none of them, and the search
+        among them takes longest.
+        """
+        read = (source.read() for source in logs)
+        seconds = sum(float(np.ptp(log.time[run])) for log in read for run in log.runs())
+        values, count = int(4 * cutoff_hz * seconds * arm.n), candidates(arm).count
+        return "" if count <= values else f"{count} candidates, but {values} independent values of torque"

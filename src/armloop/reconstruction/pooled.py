@@ -1,7 +1,8 @@
 """One regression of all joints: shared columns beside each joint's own friction, as sums over folds of the data.
 
 Every joint brings its normal equations on the shared columns and on all candidates of its friction, one set per
-fold. Any choice of friction terms is then solved, and judged on the folds held out, without touching a sample.
+fold. Any choice of friction terms is then solved, and judged on the folds held out, without touching a sample. So
+is the model that is handed out, which is regressed on what judged it, too.
 
 Friction is passive where asked for: but for constant offsets, every term dissipates on its own, so its coefficient
 must not be negative. That keeps collinear candidates (widths, speeds) in check: most of them come out as zero.
@@ -17,9 +18,8 @@ from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from armloop.library.friction import FrictionTerm
-from armloop.motion import Samples
+from armloop.reconstruction.joint_sums import JointSums
 from armloop.regression.moments import Moments, total
-from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -68,48 +68,31 @@ class Pooled:
     """Normal equations of all joints.
 
     Args:
-        samples: what is regressed.
-        columns: (N, n, r) shared columns, filtered.
+        sums: by joint and fold; what comes after the folds judges the model and is not fitted.
         candidates: friction terms of every joint.
-        rows: (N, n) samples to use.
-        load: (N, n) torque that friction by load depends on; None if no candidate does.
-        folds: (N,) from 0; one fold by default.
-        judged: (N,) samples of a fold that judge it when it is held out; all by default.
+        folds: their number.
+        repeats: neighbouring samples that tell no more than one does.
         passive: whether friction terms must dissipate.
     """
 
     def __init__(
         self,
-        samples: Samples,
-        columns: Array,
+        sums: JointSums,
         candidates: list[list[FrictionTerm]],
-        rows: NDArray[np.bool_],
-        load: Array | None = None,
-        folds: NDArray[np.intp] | None = None,
-        judged: NDArray[np.bool_] | None = None,
+        folds: int = 1,
+        repeats: float = 1.0,
         passive: bool = False,
     ) -> None:
-        folds = np.zeros(len(rows), dtype=np.intp) if folds is None else folds
-        judged = np.ones(len(rows), dtype=bool) if judged is None else judged
-        self.shared = columns.shape[2]
+        self.shared = len(sums.parts[0][0].b) - len(candidates[0])
         self.candidates = candidates
         self.passive = passive
-        self.folds = int(folds.max(initial=0)) + 1
-        # neighbouring samples repeat each other: so many of them weigh as much as one of the prior's
-        self._repeats = max(1.0, 0.5 / (samples.cutoff_hz * samples.period)) if samples.cutoff_hz > 0 else 1.0
-        self._parts: list[list[Moments]] = []
-        self._judges: list[list[Moments]] = []
-        for j, terms in enumerate(candidates):
-            own = [term.column(samples.motion, j, load) for term in terms]
-            friction = smooth(samples, np.column_stack(own)) if own else np.zeros((len(rows), 0))
-            X, tau = np.hstack([columns[:, j], friction]), samples.tau[:, j]
-            fitted = [rows[:, j] & (folds == fold) for fold in range(self.folds)]
-            self._parts.append([Moments.of(X[own], tau[own]) for own in fitted])
-            if judged.all():
-                self._judges.append(self._parts[-1])
-            else:
-                self._judges.append([Moments.of(X[own & judged], tau[own & judged]) for own in fitted])
+        self.folds = folds
+        self._repeats = repeats
+        self._parts = [own[:folds] for own in sums.parts]
+        self._judges = [own[:folds] for own in sums.judges]
         self._wholes = [total(parts) for parts in self._parts]
+        self._all = [total(own) for own in sums.parts]
+        self._held_out = [total(own[folds:]) if own[folds:] else None for own in sums.parts]
 
     @property
     def everything(self) -> Choice:
@@ -126,19 +109,37 @@ class Pooled:
         """(folds, n) number of samples that judge."""
         return np.array([[judge.count for judge in judges] for judges in self._judges]).T
 
-    def solve(self, choice: Choice, prior: Prior | None = None) -> Solution:
-        """All data, each joint weighted by what its residual turns out to be."""
-        weights = np.array([part.count / max(part.yy, 1e-300) for part in self._wholes])
+    def choice(self, laws: list[list[FrictionTerm]]) -> Choice:
+        """The places of some friction terms among the candidates."""
+        pairs = zip(laws, self.candidates, strict=True)
+        return [[terms.index(term) for term in law] for law, terms in pairs]
+
+    def solve(self, choice: Choice, prior: Prior | None = None, held_out: bool = False) -> Solution:
+        """All that is fitted, each joint weighted by what its residual turns out to be.
+
+        Args:
+            held_out: fit also what judges the model.
+        """
+        wholes = self._all if held_out else self._wholes
+        weights = np.array([part.count / max(part.yy, 1e-300) for part in wholes])
         for last in [False] * _REWEIGHTINGS + [True]:
-            G, b = self._equations(self._wholes, choice, weights, prior)
+            G, b = self._equations(wholes, choice, weights, prior)
             theta = self._solved(G, b, choice)
             if not last:
                 errors = [
                     max(part.squared_error(own), 1e-12 * part.yy) / max(part.count, 1.0)
-                    for part, own in zip(self._wholes, self._spread(theta, choice), strict=True)
+                    for part, own in zip(wholes, self._spread(theta, choice), strict=True)
                 ]
                 weights = 1 / np.maximum(errors, 1e-300)
         return Solution(theta, G, b, weights, self._repeats)
+
+    def relative_errors(self, theta: Array, choice: Choice) -> Array:
+        """(n,) nRMSE of coefficients on what judges the model; NaN for a joint that does not move there."""
+        found = np.full(len(choice), np.nan)
+        for j, (part, own) in enumerate(zip(self._held_out, self._spread(theta, choice), strict=True)):
+            if part is not None and part.yy > 0:
+                found[j] = np.sqrt(part.squared_error(own) / part.yy)
+        return found
 
     def held_out(self, choice: Choice, weights: Array, prior: Prior | None = None) -> Array:
         """(folds, n) squared errors on every fold, of a regression on the others."""

@@ -7,7 +7,10 @@ What scarce data leave open is filled in from the URDF, as firmly as the data th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,25 +20,24 @@ from armloop.components import RigidBody
 from armloop.dynamics.physics import joint_limits
 from armloop.kinematics import nominal_parameters
 from armloop.library.rigid_body import BaseParameters
-from armloop.motion import Motion, Samples
+from armloop.motion import Motion
 from armloop.progress import Progress
+from armloop.reconstruction.data import Data
+from armloop.reconstruction.design import Design
 from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
-from armloop.reconstruction.friction_ladder import climb
+from armloop.reconstruction.library import Find, Library
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
-from armloop.reconstruction.pooled import Pooled, Prior
+from armloop.reconstruction.pooled import Prior
 from armloop.reconstruction.shared import (
-    PLAIN_FRICTION,
+    SHARED_CONDITIONING,
     check_moves,
-    fast_rows,
     found_friction,
     motion_range,
-    products_of,
-    sliding_rows,
     undetermined_notes,
 )
-from armloop.signals import smooth
+from armloop.reconstruction.training import Training
 
 Array = NDArray[np.float64]
 
@@ -43,9 +45,7 @@ Array = NDArray[np.float64]
 _SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
-def rigid_body(
-    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
-) -> Found:
+def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
     """Regress base parameters and friction on all moving samples at once.
 
     Which friction each joint has is chosen on a ladder (:mod:`armloop.reconstruction.friction_ladder`). The torque
@@ -55,23 +55,18 @@ def rigid_body(
     Raises:
         ExcitationError: a joint does not move.
     """
-    motion = samples.motion
-    sliding = sliding_rows(samples)
-    rows = sliding & ~held_out[:, None]
-    check_moves(arm, rows)
+    motion = data.reference.samples.motion
     base = BaseParameters.of_arm(arm, rotors=True)
-    raw = base.columns(arm, motion)
-    columns = smooth(samples, raw)
-    unknown = undetermined_notes(products_of(columns, rows), base)
-    plain = Pooled(samples, columns, [list(PLAIN_FRICTION) for _ in arm.joints], rows & fast_rows(samples))
-    load = raw @ plain.solve(plain.everything).theta[: base.count]
+    design = Design(arm, partial(base.columns, arm), base.count)
+    progress(f"rigid body: {base.count} base parameters, beside plain friction")
+    training = Training.of(data, design, options)
+    survey = training.survey
+    check_moves(arm, survey.fitted)
+    unknown = undetermined_notes(survey.products(base.count), base)
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
-    progress(f"rigid body: {base.count} base parameters; choosing each joint's friction on held-out data")
-    priors = _priors(arm, base, nominal)
-    ladder = climb(arm, samples, columns, rows, load, options, priors)
-    fitting = Fitting(arm, samples, columns, rows, load, priors, options, progress)
-    ladder, laws = fitting.with_laws(ladder, lambda theta: raw @ theta[: base.count])
-    columns, load = fitting.columns, fitting.load
+    design = design.loaded(survey.load(base.count))
+    fitting = Fitting(arm, training, design, _priors(arm, base, nominal), options, progress)
+    ladder, laws = fitting.chosen()
     r = base.count + laws.count
     shape = Body(
         lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
@@ -80,14 +75,11 @@ def rigid_body(
         np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
     )
 
-    memory = options.correlation_seconds / samples.period
-
-    def regressed(rows: NDArray[np.bool_]) -> Found:
-        pooled = Pooled(samples, columns, ladder.laws, rows, load, passive=options.physical)
-        solution = pooled.solve(pooled.everything, ladder.prior)
+    def regressed(held_out: bool) -> Found:
+        solution = ladder.solved(held_out)
         theta, physics = solution.theta, {}
         if options.physical:
-            physical = physical_solution(solution, shape, ladder.laws, options.insist, memory)
+            physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
             theta = physical.theta
             physics = {
                 "constraints": physical.binding,
@@ -111,9 +103,9 @@ def rigid_body(
         effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))
         return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
 
-    found = regressed(rows)
-    found.final = final = regressed(sliding)
-    body, samples_per_joint = final.components[0], sliding.sum(axis=0).tolist()
+    found = regressed(held_out=False)
+    found.final = final = regressed(held_out=True)
+    body, samples_per_joint = final.components[0], survey.sliding.tolist()
     size = base.count + sum(len(law) for law in ladder.laws)
     for step in (1, 2, 3):
         friction = [sum(term.step <= step for term in terms) for terms in final.friction]
@@ -152,3 +144,11 @@ def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit, np.array([0]))
     columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
     return columns.transpose(0, 2, 1, 3)
+
+
+class RigidBodyLibrary(Library):
+    """Base parameters of the URDF's chain."""
+
+    name = "rigid-body"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": rigid_body}
+    conditioning = SHARED_CONDITIONING

@@ -74,12 +74,12 @@ def motion_range(motion: Motion) -> list[list[float]]:
     return [(0.5 * (high - low)).tolist(), *rates, (0.5 * (high + low)).tolist()]
 
 
-def check_moves(arm: Arm, rows: NDArray[np.bool_]) -> None:
-    """Raise unless every joint moves in the rows (N, n) that are fitted."""
+def check_moves(arm: Arm, counts: Array) -> None:
+    """Raise unless every joint moves in enough samples that are fitted; ``counts`` (n,) of them."""
     for j, joint in enumerate(arm.joints):
-        if rows[:, j].sum() < 100:
+        if counts[j] < 100:
             raise ExcitationError(
-                f"q{j + 1}: joint {joint.name!r} moves in {int(rows[:, j].sum())} samples, at least 100 are needed; "
+                f"q{j + 1}: joint {joint.name!r} moves in {int(counts[j])} samples, at least 100 are needed; "
                 "log runs in which every joint moves"
             )
 
@@ -100,9 +100,13 @@ def found_friction(laws: list[list[FrictionTerm]], values: Array) -> list[list[F
     return friction
 
 
-def check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) -> None:
-    """Raise unless the motion tells most base parameters apart; the ridge takes care of the last few."""
-    weak = base.count - len(told_apart(products_of(columns, rows))[0])
+def check_rank(G: Array, base: BaseParameters) -> None:
+    """Raise unless the motion tells most base parameters apart; the ridge takes care of the last few.
+
+    Args:
+        G: (r, r) products of the base parameters' columns.
+    """
+    weak = base.count - len(told_apart(G)[0])
     if weak > base.count // 3:
         raise ExcitationError(
             f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
@@ -110,17 +114,11 @@ def check_rank(columns: Array, rows: NDArray[np.bool_], base: BaseParameters) ->
         )
 
 
-def products_of(columns: Array, rows: NDArray[np.bool_]) -> Array:
-    """(r, r) products of shared columns (N, n, r), summed over the rows (N, n) that are fitted."""
-    parts = [columns[rows[:, j], j] for j in range(columns.shape[1])]
-    return np.asarray(sum(part.T @ part for part in parts))
-
-
 def undetermined_notes(G: Array, base: BaseParameters) -> list[str]:
     """Which base parameters a motion does not determine by themselves, and the sums that it does, in a line.
 
     Args:
-        G: (r, r) of :func:`products_of` the base parameters' columns.
+        G: (r, r) products of the base parameters' columns.
     """
     kept, sums = told_apart(G)
     if len(kept) == base.count:

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.blocks import overlapping
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
+from armloop.motion import Samples
 from armloop.regression.determined import combination, told_apart
 from armloop.uncertainty.blocking import block_length, correlation_time, covered_time, independent_blocks
 from armloop.uncertainty.friction_lines import friction_line
@@ -250,7 +251,7 @@ class _Portion:
 def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Iterator[_Portion]:
     stages = _stages(problem, fitted)
     theta = np.array([u.value if u.linear else 0.0 for u in problem.unknowns])
-    for part, core, start in _pieces(samples):
+    for part, core, start in overlapping(samples, _PIECE, _MARGIN):
         for design in problem.designs(part):
             stage = stages[design.where]
             for s, one in enumerate(fitted):
@@ -266,25 +267,6 @@ def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Itera
 def _stages(problem: Problem, fitted: Sequence[Fitted]) -> NDArray[np.intp]:
     order = {step: s for s, one in enumerate(fitted) for step in one.steps}
     return np.array([order[unknown.step] for unknown in problem.unknowns], dtype=np.intp)
-
-
-def _pieces(samples: Samples) -> Iterator[tuple[Samples, slice, int]]:
-    """Consecutive samples with a margin on both sides, the part that counts, and where it starts."""
-    motion, N = samples.motion, samples.motion.samples
-    margin = int(np.ceil(_MARGIN / samples.period))
-    for start in range(0, N, _PIECE):
-        stop = min(start + _PIECE, N)
-        low, high = max(0, start - margin), min(N, stop + margin)
-        inner = motion.starts[(motion.starts > low) & (motion.starts < high)] - low
-        cut = slice(low, high)
-        part = Motion(
-            motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
-        )
-        yield (
-            Samples(part, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz),
-            slice(start - low, stop - low),
-            start,
-        )
 
 
 def _residuals(todo: Sequence[Problem], samples: Samples, fitted: Sequence[Fitted]) -> tuple[Array, Array]:

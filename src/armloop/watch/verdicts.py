@@ -17,10 +17,10 @@ from armloop.errors import InputError
 from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
-from armloop.monitoring.naming import Named, later_part, name_change
+from armloop.monitoring.naming import Named, Normal, later_part, name_change
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
-from armloop.monitoring.warmth import FRICTION, Adjusted, adjust
+from armloop.monitoring.warmth import FRICTION, Adjusted, adjust, without_warmth
 from armloop.watch.fleet import model_and_digest
 from armloop.watch.sources import LogFile, read_recording
 from armloop.watch.store import History, Store
@@ -167,7 +167,10 @@ def _explain(
     before = range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)
     window = later_part(alarm.since, alarm.unit)
     named = name_change(
-        model.arm, units.columns, history.normal(before) if len(before) else None, history.normal(window)
+        model.arm,
+        units.columns,
+        _equations(tested, before, task.healthy) if len(before) else None,
+        _equations(tested, window, task.healthy),
     )
     stream = tested.listed[alarm.stream]
     column = _main_column(tested, named, alarm)
@@ -201,6 +204,18 @@ def _explain(
     if task.full:
         answer["diagnosis"] = _diagnosis(task, model, [history.logs[log] for log in logs])
     return answer
+
+
+def _equations(tested: Tested, index: Sequence[int], healthy: int) -> Normal:
+    """Normal equations of some units, without what warmth makes of their friction."""
+    history, warmth = tested.history, tested.adjusted.warmth
+    own = history.normal(index)
+    if not warmth.any():
+        return own
+    first = range(min(healthy, history.units.count))
+    return without_warmth(
+        history.units.columns, history.normal(first), warmth[: len(first)], own, warmth[list(index)]
+    )
 
 
 def _label(stream: Stream) -> str:

@@ -1,0 +1,255 @@
+"""Does `armloop watch` keep its promise on every healthy measured log, and would it have seen a change there?
+
+Four measured arms, each with a model of some of its own logs (../shared/data; a folder that is not there is left out):
+
+- in the order of the files, as the command takes them (a unit is a log), and cut into short blocks, each a unit, which is
+  harder, for neighbours resemble each other. So few hours can only show that nothing is grossly wrong;
+- healthy operation resampled from them: units of ten minutes, each from one log, of its blocks with replacement. A half
+  of the logs that the model was made of are among them, as in life: a model is made of an arm's first logs;
+- the same with something added to the measured torque from the fortieth unit on, what the motion of that log asks for: 5 %
+  more of the model's friction at each joint in turn, a load of 0.3 kg, a friction that grows by 1 % a day, ten units a day.
+  An arm on which a change of that size stays below the tolerance, or is not told from the spread of its logs, says so.
+
+    python benchmarks/watch_measured.py [--hours 1000] [--arms ur10e,ur5,panda,double_pendulum]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from resampled import Blocks, Changing  # noqa: E402
+from watch_promise import EVERY_S, UNIT_SECONDS, delay, delays_header, false_alarms, false_alarms_header  # noqa: E402
+
+from armloop.arm import load_arm  # noqa: E402
+from armloop.errors import InputError  # noqa: E402
+from armloop.kinematics import regressor  # noqa: E402
+from armloop.log import MotionLog, read_log  # noqa: E402
+from armloop.model import ReconstructedModel  # noqa: E402
+from armloop.monitoring.alarms import find_alarms  # noqa: E402
+from armloop.monitoring.naming import Normal  # noqa: E402
+from armloop.monitoring.sums import log_sums  # noqa: E402
+from armloop.monitoring.units import Units, scores, streams  # noqa: E402
+from armloop.motion import Motion  # noqa: E402
+from armloop.reconstruction import reconstruct  # noqa: E402
+from armloop.signals import condition  # noqa: E402
+
+Array = NDArray[np.float64]
+
+Law = Callable[[ReconstructedModel, Motion], Array]
+
+DATA = ROOT.parent / "shared" / "data"
+HEALTHY = 40
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Logs of an arm that are healthy.
+
+    training : files that the model is made of; watched : programmes, each with its files, in the order of the names
+    gains : N*m/A; None where torque was recorded; block : s
+    """
+
+    urdf: str
+    training: tuple[str, ...]
+    watched: dict[str, tuple[str, ...]]
+    gains: tuple[float, ...] | None
+    block: float
+
+
+ARMS = {
+    "ur10e": Measured(
+        "ur10e.urdf",
+        ("noload_20_01*", "noload_20_02_05*", "noload_20_02_06*"),
+        {"exciting": ("noload_*",), "one joint at a time": ("jointwise_*",)},
+        (11.75, 11.98, 9.83, 10.75, 10.55, 10.9),
+        5.0,
+    ),
+    "ur5": Measured(
+        "ur5.urdf",
+        ("no1.csv", "no2.csv", "no8_*"),
+        {
+            "free": ("no1.csv", "no2.csv"),
+            "slow": ("no5_acc_slow_no*", "no6_*", "no7_acc_slow_verify_model_short.csv"),
+            "no singularity": ("no8_*", "no9_*_nodist*"),
+        },
+        (12.5, 12.5, 12.5, 9.2, 9.2, 9.2),
+        5.0,
+    ),
+    "panda": Measured("panda.urdf", ("exciting_1a.csv",), {"exciting": ("exciting_1a.csv",)}, None, 1.0),
+    "double_pendulum": Measured(
+        "double_pendulum.urdf",
+        ("sysid_1433*", "sysid_1435*", "sysid_1436*", "sysid_1437*"),
+        {
+            "exciting": ("sysid_*",),
+            "swing up": ("acrobot_clean_*",),
+            "swing up, other law": ("acrobot_pilco_*",),
+        },
+        None,
+        2.0,
+    ),
+}
+
+
+def read(folder: Path, patterns: tuple[str, ...], gains: tuple[float, ...] | None) -> list[MotionLog]:
+    """Logs by patterns of their names."""
+    paths = sorted({path for pattern in patterns for path in folder.glob(pattern)})
+    if not paths:
+        raise SystemExit(f"{folder}: no {', '.join(patterns)}")
+    unit = {} if gains is None else {"tau_unit": "A", "drive_gains": list(gains)}
+    return [read_log(path, quiet=True, **unit) for path in paths]
+
+
+def with_torque(model: ReconstructedModel, log: MotionLog, law: Law, level: float) -> MotionLog:
+    """A log as it would be with a further torque along the same motion."""
+    motion = condition([log], model.conditioning).motion
+    more = level * law(model, motion)
+    return replace(
+        log, tau=log.tau + np.column_stack([np.interp(log.time, motion.time, column) for column in more.T])
+    )
+
+
+def friction_of(joint: int) -> Law:
+    """The model's own friction at a joint, numbered from 0, once more."""
+
+    def law(model: ReconstructedModel, motion: Motion) -> Array:
+        return (model.predict(motion) - model.rigid_body(motion)) * (np.arange(model.arm.n) == joint)
+
+    return law
+
+
+def payload(model: ReconstructedModel, motion: Motion) -> Array:
+    """A load of 1 kg, 0.05 m out along z of the last link's frame."""
+    body = np.array([1, 0, 0, 0.05, 0.05**2, 0.05**2, 0, 0, 0, 0])  # m, mc, Ixx, Iyy, Izz, Ixy, Ixz, Iyz
+    return regressor(model.arm, motion.q, motion.v, motion.vdot, links=[model.arm.n - 1]) @ body
+
+
+def in_order(name: str, units: Units, joints: int, label: str) -> None:
+    """Print what the tests make of healthy units in the order of their files."""
+    values, tolerance = scores(units)
+    listed = streams(units.columns, joints)
+    mean_units = 1000.0 / (units.hours / units.count)
+    found = find_alarms(values, units.programme, tolerance, listed, mean_units)
+    most = float(found.evidence.max(initial=-np.inf))
+    share = f"{max(most, 0.0) / found.limit:5.2f}"
+    print(
+        f"{name:16s} {label:22s} {units.hours:7.3f} {units.count:6d} {len(found.alarms):7d} {share:>18s}",
+        flush=True,
+    )
+    for alarm in found.alarms:
+        stream = listed[alarm.stream]
+        print(f"    unit {alarm.unit}: {stream.name} at joint {stream.joint}", flush=True)
+
+
+def programmes(blocks: Blocks, counts: Array, numbers: list[int]) -> Units:
+    """Units with the programmes of their logs."""
+    units = blocks.units(counts, 600.0)
+    own = np.array([int(blocks.log[np.flatnonzero(row)[0]]) for row in counts])
+    return replace(units, programme=np.array(numbers, dtype=np.intp)[own], log=own)
+
+
+def run() -> None:
+    """Parse and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hours", type=float, default=1000.0, help="of healthy operation resampled, per arm")
+    parser.add_argument("--arms", default=",".join(ARMS))
+    parser.add_argument("--joints", default="all", help="whose friction changes, such as 1,2")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    known: dict[str, tuple[ReconstructedModel, list[MotionLog], Blocks]] = {}
+    print("Healthy measured logs in the order of their files; promised: 1000 h between false alarms")
+    print(
+        f"{'arm':16s} {'a unit is':22s} {'hours':>7s} {'units':>6s} {'alarms':>7s} {'evidence/threshold':>18s}"
+    )
+    for name in options.arms.split(","):
+        about, folder = ARMS[name], DATA / name
+        if not folder.is_dir():
+            print(f"{name:16s} (its logs are not there: left out)")
+            continue
+        arm = load_arm(folder / about.urdf)
+        gains = None if about.gains is None else list(about.gains)
+        recorded = {"unit": "N*m" if gains is None else "A", "drive_gains": gains}
+        training = read(folder, about.training, about.gains)
+        model = reconstruct(training, arm, library="rigid-body", recorded=recorded).model
+        logs, numbers, sums = [], [], []
+        for number, patterns in enumerate(about.watched.values()):
+            for log in read(folder, patterns, about.gains):
+                try:
+                    sums.append(log_sums(model, log, block_seconds=about.block))
+                except InputError as error:
+                    print(f"    set aside: {error}")
+                    continue
+                logs.append(log)
+                numbers.append(number)
+        blocks = Blocks.of(sums)
+        known[name] = model, logs, blocks
+        in_order(name, programmes(blocks, blocks.whole(), numbers), arm.n, "a log")
+        short = programmes(blocks, np.eye(len(blocks.log)), numbers)
+        in_order(name, short, arm.n, f"a block of {about.block:g} s")
+    print()
+    false_alarms_header()
+    for name, (_, logs, blocks) in known.items():
+        false_alarms(f"{len(logs)} measured logs, {name}", blocks, options.hours, 0.0, 2)
+    print(
+        f"\nThe same operation with a change from unit {HEALTHY} on; promised: 1000 h; units of ten minutes"
+    )
+    delays_header(10)
+    for name, (model, logs, blocks) in known.items():
+        for what, law, level, sizes in changes(model.arm.n, options.joints):
+            at = [
+                blocks,
+                *(
+                    Blocks.of(
+                        [
+                            log_sums(model, with_torque(model, log, law, w), block_seconds=ARMS[name].block)
+                            for log in logs
+                        ]
+                    )
+                    for w in (1.0, 2.0)
+                ),
+            ]
+            changing = Changing(*at)
+            rng = np.random.default_rng(options.seed)
+            counts = blocks.drawn(rng, HEALTHY + len(level), UNIT_SECONDS)
+            levels = np.concatenate([np.zeros(HEALTHY), level])
+
+            def normal(
+                index: Sequence[int], c: Changing = changing, counts: Array = counts, w: Array = levels
+            ) -> Normal:
+                return c.normal(counts[list(index)], w[list(index)])
+
+            label = f"{name}: {what}"
+            # what there is a day after the alarm, not a year after, tells how the change came
+            if not any(
+                delay(
+                    label, model, changing.units(counts[:end], levels[:end], EVERY_S), HEALTHY, sizes, normal
+                )
+                for end in range(HEALTHY + 20, HEALTHY + len(level) + 1, 20)
+            ):
+                print(f"{label:38s} not found in {len(level)} units", flush=True)
+
+
+def changes(joints: int, which: str) -> list[tuple[str, Law, Array, list[str]]]:
+    """What is added to the measured torque: name, law at level 1, level of each unit, and its size in words."""
+    chosen = range(joints) if which == "all" else [int(j) - 1 for j in which.split(",") if int(j) <= joints]
+    found: list[tuple[str, Law, Array, list[str]]] = [
+        (f"friction of joint {j + 1} +5 %", friction_of(j), np.full(60, 0.05), ["5 %"] * 60) for j in chosen
+    ]
+    found.append(("load of 0.3 kg", payload, np.full(60, 0.3), ["0.3 kg"] * 60))
+    drift = 0.001 * np.arange(1, 301)
+    sizes = [f"{100 * w:.1f} %" for w in drift]
+    found += [(f"friction of joint {j + 1} +1 % a day", friction_of(j), drift, sizes) for j in chosen]
+    return found
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,37 @@
+"""Systems of several scalar types: pydrake's ``TemplateSystem``, told where a template is defined.
+
+Left to itself, pydrake looks for the module in the source of every frame of the stack, three times a template: two
+seconds of each start for a dozen of them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+from unittest.mock import patch
+
+from pydrake.common import cpp_template
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+
+def scalar_template(
+    name: str, module: str, T_list: Sequence[Any] | None = None
+) -> Callable[[Callable[[Any], Any]], Any]:
+    """Decorator that makes a scalar-convertible system template of a function from T to a ``LeafSystem_[T]``.
+
+    Args:
+        name: of the template; ends in an underscore.
+        module: ``__name__`` of the module that defines it.
+        T_list: scalar types; float, AutoDiffXd and Expression if not given. The first is made at once.
+    """
+    scope = sys.modules[module]
+
+    def decorator(system: Callable[[Any], Any]) -> Any:
+        template = TemplateSystem.define(name, T_list and list(T_list), scope=scope)(system)
+        # The templates that pydrake makes inside have no argument for it.
+        with patch.object(cpp_template, "_get_module_from_stack", lambda frame=2: scope, create=True):
+            template[float]
+        return template
+
+    return decorator
