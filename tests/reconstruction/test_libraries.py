@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import conditioned_samples, fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.arm import Arm
 from armloop.dynamics import check_physics
 from armloop.dynamics.physics import PhysicsChecks
 from armloop.errors import ExcitationError, InputError
@@ -16,12 +18,22 @@ from armloop.model import ReconstructedModel
 from armloop.progress import silent
 from armloop.reconstruction import Options, Reconstruction, reconstruct
 from armloop.reconstruction.data import Chunk
-from armloop.reconstruction.libraries import Contender, choose, comparison_notes, contender, undetermined
+from armloop.reconstruction.libraries import (
+    LIBRARIES,
+    Contender,
+    candidates,
+    choose,
+    comparison_notes,
+    contender,
+    named,
+)
+from armloop.reconstruction.rigid_body import RigidBodyLibrary
 from armloop.reconstruction.stepwise import stepwise
 from armloop.regression.sparse import Sparse
 from armloop.signals import condition
 
 OPTIONS = Options(standard_errors=False)
+PLAIN = Options(standard_errors=False, parts=False)
 GOOD = PhysicsChecks(0.1, (0.0,), 0.0, 0.0, (0.0,), (0.0,), (0.0,), None)
 BAD = replace(GOOD, least=-0.1, negative=0.3)
 
@@ -51,17 +63,18 @@ def entry(
     library: str, nrmse: float, coefficients: int, checks: PhysicsChecks, spread: float = 0.0
 ) -> Contender:
     noise = spread * np.random.default_rng(len(library)).normal(size=12)
-    made = SimpleNamespace(library=library)
-    return Contender(library, made, "", (nrmse,), coefficients, checks, nrmse**2 + noise)  # type: ignore[arg-type]
+    made = SimpleNamespace()
+    kind: Any = SimpleNamespace(name=library)
+    return Contender(kind, made, "", (nrmse,), coefficients, checks, nrmse**2 + noise)  # type: ignore[arg-type]
 
 
 def taken(*entries: Contender) -> str:
-    (one,) = [entry.library for entry in choose(entries) if entry.chosen]
+    (one,) = [entry.name for entry in choose(entries) if entry.chosen]
     return one
 
 
 def test_all_three_are_compared_and_the_report_says_so(result: Reconstruction) -> None:
-    assert [one.library for one in result.libraries] == ["double-feature-set", "rigid-body", "lagrangian"]
+    assert [one.name for one in result.libraries] == ["double-feature-set", "rigid-body", "lagrangian"]
     assert result.model.history["library"] == "rigid-body" and "library rigid-body" in result.notes[0]
     answer = result.to_dict()["libraries"]
     assert [one["chosen"] for one in answer] == [False, True, False]
@@ -88,23 +101,50 @@ def test_a_library_that_the_logs_do_not_carry_is_left_out_with_the_reason() -> N
     def refused(library: str):
         raise ExcitationError("the motion leaves 9 of 12 inertial parameters undetermined")
 
-    out = contender("lagrangian", refused)
+    out = contender(named("lagrangian"), refused)
     assert taken(out, entry("b", 0.02, 9, GOOD)) == "b"
     assert out.to_dict() == {"library": "lagrangian", "chosen": False, "refused": out.refused}
     with pytest.raises(InputError, match="lagrangian: the motion leaves 9 of 12"):
         choose([out])
 
 
+def test_a_library_is_one_object(logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever registers one has it chosen by name, compared where it suits, and told what it does not know."""
+
+    class Own(RigidBodyLibrary):
+        name = "own"
+        own_friction = "its friction is its own"
+
+        def suits(self, arm: Arm) -> bool:
+            return arm.n < 3
+
+    monkeypatch.setitem(LIBRARIES, "own", Own())
+    found = reconstruct(logs[:1], three_axis(), library="own", options=PLAIN)
+    assert found.model.history["library"] == "own" and [one.name for one in found.libraries] == ["own"]
+    assert "own" not in [one.name for one in candidates(three_axis(), PLAIN)]
+    with pytest.raises(
+        InputError, match=r"its friction is its own; laws are chosen with --library rigid-body or lag"
+    ):
+        reconstruct(logs, three_axis(), library="own", options=replace(PLAIN, friction=("viscous",)))
+    with pytest.raises(
+        InputError, match=r"method 'sindy' works on the library double-feature-set, not on 'own'"
+    ):
+        reconstruct(logs, three_axis(), method="sindy", library="own")
+
+
 def test_a_library_of_more_candidates_than_independent_torques_is_not_tried() -> None:
     """Torque below 5 Hz takes 20 values a second: three joints' in one second are fewer than the energies' candidates."""
     log = a_run(1)
     short = log.select(slice(0, int(1 / log.period)))
-    why = undetermined("lagrangian", three_axis(), [short], 5.0)
+    why = named("lagrangian").undetermined(three_axis(), [short], 5.0)
     assert why == f"{energies(three_axis()).count} candidates, but 59 independent values of torque"
-    assert undetermined("lagrangian", three_axis(), [log], 5.0) == ""
-    assert undetermined("rigid-body", three_axis(), [short], 5.0) == ""
+    assert named("lagrangian").undetermined(three_axis(), [log], 5.0) == ""
+    assert named("rigid-body").undetermined(three_axis(), [short], 5.0) == ""
     note, *_ = comparison_notes(
-        [Contender("rigid-body", SimpleNamespace(), chosen=True), Contender("lagrangian", refused=why)]  # type: ignore[arg-type]
+        [
+            Contender(named("rigid-body"), SimpleNamespace(), chosen=True),
+            Contender(named("lagrangian"), refused=why),
+        ]  # type: ignore[arg-type]
     )
     assert note.startswith(
         "library rigid-body: the only one that the logs can determine; lagrangian not tried ("
@@ -207,7 +247,7 @@ def test_checks_find_what_is_no_arm(result: Reconstruction) -> None:
 def test_a_double_feature_set_that_turns_with_the_base_or_pulls_unevenly_is_told(
     result: Reconstruction,
 ) -> None:
-    waves = next(one.attempt for one in result.libraries if one.library == "double-feature-set")
+    waves = next(one.attempt for one in result.libraries if one.name == "double-feature-set")
     assert waves is not None
     made = waves.model()
     assert isinstance(made, ReconstructedModel)

@@ -95,16 +95,19 @@ def test_it_goes_on_where_it_was_ended(
         "8",
         "--json",
     ]
-    assert main([*call, "--out", str(out)]) == 130
+    alone = [*call, "--out", str(out), "--jobs", "1"]
+    assert main(alone) == 130
     assert [path.name for path in out.iterdir()] == [FOLDER]
     capsys.readouterr()
-    assert main([*call, "--out", str(out)]) == 0
+    assert main(alone) == 0
     assert made == [["run2", "run3"], ["run1", "run3"], ["run1", "run3"], ["run1", "run2"]]
     resumed = json.loads(capsys.readouterr().out)
     assert json.loads((out / "crossvalidation.json").read_text())["files"] == resumed["files"]
     assert not (out / FOLDER).exists()
-    assert main(call) == 0  # from the beginning: the same to the bit
-    assert json.loads(capsys.readouterr().out) == resumed and len(made) == 7
+    assert main([*call, "--jobs", "2"]) == 0  # from the beginning, in two processes: the same to the bit
+    assert json.loads(capsys.readouterr().out) == resumed and len(made) == 4
+    assert main([*call, "--jobs", "0"]) == 2
+    assert "--jobs 0: give a number of processes" in capsys.readouterr().err
 
 
 def test_a_fit_that_was_kept_serves_its_own_data_and_settings_alone(

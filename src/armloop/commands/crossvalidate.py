@@ -53,6 +53,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="folder for crossvalidation.json; each fit is kept there until the end, so that the same call goes on where "
         "it was ended",
     )
+    p.add_argument(
+        "--jobs",
+        type=int,
+        default=None,
+        metavar="N",
+        help="processes that make the fits, which are the same for any number (default: one per core)",
+    )
     add_recorded(p, "N*m")
     add_json(p)
 
@@ -79,6 +86,7 @@ def run(options: argparse.Namespace) -> None:
     )
     from armloop.signals import Conditioning
     from armloop.validation import compare_physical, crossvalidate
+    from armloop.workers import Processes
 
     if not 0 < options.block < float("inf"):
         raise InputError(f"--block {options.block}: give a positive number of seconds")
@@ -86,6 +94,8 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
+    if options.jobs is not None and options.jobs < 1:
+        raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
     arm = arm_of(options)
     logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
     folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
@@ -99,6 +109,7 @@ def run(options: argparse.Namespace) -> None:
         "options": Options(max_order=options.max_order, physical=not options.no_physical),
         "progress": progress(options),
         "kept": kept,
+        "workers": Processes(options.jobs),
     }
     if options.compare_physical:
         comparison = compare_physical(logs, arm, **how)

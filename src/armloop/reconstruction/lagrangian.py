@@ -8,9 +8,10 @@ look-alikes are exchanged for what they stood in for, and terms that became supe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,18 @@ from armloop.errors import ExcitationError
 from armloop.library.lagrangian import EnergyTerms, candidates
 from armloop.library.rigid_body import BaseParameters
 from armloop.motion import Motion, Samples
+from armloop.pieces import LogSource
 from armloop.progress import Progress
 from armloop.reconstruction.data import Chunk, Data
 from armloop.reconstruction.design import Design
 from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.library import Find, Library
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
 from armloop.reconstruction.shared import (
     FRICTION,
+    SHARED_CONDITIONING,
     check_moves,
     check_rank,
     fast_rows,
@@ -308,3 +312,23 @@ def _prune(
             return support
         else:
             return support
+
+
+class LagrangianLibrary(Library):
+    """Few terms of the energies."""
+
+    name = "lagrangian"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": lagrangian}
+    conditioning = SHARED_CONDITIONING
+
+    def undetermined(self, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
+        """Why there are too many candidates for the logs.
+
+        Torque below a corner takes four values per period of it, each joint apart
+        (:func:`armloop.signals.independent_rows`). Fewer values than candidates determine none of them, and the search
+        among them takes longest.
+        """
+        read = (source.read() for source in logs)
+        seconds = sum(float(np.ptp(log.time[run])) for log in read for run in log.runs())
+        values, count = int(4 * cutoff_hz * seconds * arm.n), candidates(arm).count
+        return "" if count <= values else f"{count} candidates, but {values} independent values of torque"

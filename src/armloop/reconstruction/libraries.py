@@ -21,24 +21,54 @@ from armloop.arm import Arm
 from armloop.components import Lagrangian, RigidBody, SparseTerms
 from armloop.dynamics.physics import PhysicsChecks, check_physics
 from armloop.errors import InputError
-from armloop.library.lagrangian import candidates as energies
-from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
-from armloop.pieces import LogSource
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.lagrangian import LagrangianLibrary
+from armloop.reconstruction.library import Library
+from armloop.reconstruction.options import Options
+from armloop.reconstruction.rigid_body import RigidBodyLibrary
 from armloop.reconstruction.shared import motion_range
 from armloop.reconstruction.sorter import Sorter
+from armloop.reconstruction.stepwise import DoubleFeatureSetLibrary
 from armloop.reconstruction.tally import SELECTION, Part, Tally
 from armloop.signals import Conditioning
 
 Array = NDArray[np.float64]
 
-LIBRARIES = ("double-feature-set", "rigid-body", "lagrangian")
-#: Joints beyond which the double feature set has more candidates than any log tells apart.
-MOST_JOINTS = 4
+#: By name, the richest first.
+LIBRARIES: dict[str, Library] = {
+    one.name: one for one in (DoubleFeatureSetLibrary(), RigidBodyLibrary(), LagrangianLibrary())
+}
 #: Blocks from which on a difference has a standard error.
 _ENOUGH = 8
+
+
+def named(name: str) -> Library:
+    """The library of a name; raises ``InputError`` where there is none."""
+    if name not in LIBRARIES:
+        raise InputError(f"unknown library {name!r}; there are: {', '.join(LIBRARIES)}")
+    return LIBRARIES[name]
+
+
+def candidates(arm: Arm, options: Options, method: str = "stepwise") -> list[Library]:
+    """Libraries that are compared where the user names none: those asked for by an option, or all that suit the arm."""
+    able = [one for one in LIBRARIES.values() if method in one.methods]
+    asked = [one for one in able if one.asked(options)]
+    if asked:
+        return asked
+    able = [one for one in able if options.friction is None or not one.own_friction] or able
+    return [one for one in able if one.suits(arm)] or able
+
+
+def check_suits(library: Library, method: str, options: Options) -> None:
+    """Raise ``InputError`` where a library knows no such method, or no friction laws that could be chosen."""
+    if method not in library.methods:
+        able = ", ".join(one.name for one in LIBRARIES.values() if method in one.methods)
+        raise InputError(f"method {method!r} works on the library {able}, not on {library.name!r}")
+    if options.friction is not None and library.own_friction:
+        others = " or ".join(one.name for one in LIBRARIES.values() if not one.own_friction)
+        raise InputError(f"{library.own_friction}; laws are chosen with --library {others}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +79,7 @@ class Attempt:
         margin: seconds from a block's ends within which its samples do not judge.
     """
 
-    library: str
+    library: Library
     conditioning: Conditioning
     data: Data
     found: Found
@@ -101,7 +131,6 @@ class Contender:
     """One library in the comparison.
 
     Attributes:
-        library: its name.
         attempt: what it found; None if it could not be tried.
         refused: why not; empty if it was.
         nrmse: per joint, on the blocks that choose the library.
@@ -110,7 +139,7 @@ class Contender:
         chosen: whether it was taken.
     """
 
-    library: str
+    library: Library
     attempt: Attempt | None = None
     refused: str = ""
     nrmse: tuple[float | None, ...] = ()
@@ -118,6 +147,11 @@ class Contender:
     checks: PhysicsChecks | None = None
     blocks: Array | None = None
     chosen: bool = False
+
+    @property
+    def name(self) -> str:
+        """The library's."""
+        return self.library.name
 
     @property
     def error(self) -> float:
@@ -133,9 +167,9 @@ class Contender:
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
         if self.attempt is None:
-            return {"library": self.library, "chosen": False, "refused": self.refused}
+            return {"library": self.name, "chosen": False, "refused": self.refused}
         return {
-            "library": self.library,
+            "library": self.name,
             "chosen": self.chosen,
             "selection_nrmse": list(self.nrmse),
             "coefficients": self.coefficients,
@@ -143,26 +177,7 @@ class Contender:
         }
 
 
-def undetermined(library: str, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
-    """Why a library's candidates cannot be told apart by the logs; empty where they may be.
-
-    Torque below a corner takes four values per period of it, each joint apart (:func:`armloop.signals.independent_rows`).
-    Fewer values than candidates determine none of them, and the search among them takes longest.
-    """
-    if library != "lagrangian":
-        return ""
-    seconds = sum(float(np.ptp(log.time[run])) for log in map(_read, logs) for run in log.runs())
-    values, count = int(4 * cutoff_hz * seconds * arm.n), energies(arm).count
-    if count <= values:
-        return ""
-    return f"{count} candidates, but {values} independent values of torque"
-
-
-def _read(source: LogSource) -> MotionLog:
-    return source.read()
-
-
-def contender(library: str, attempt: Callable[[str], Attempt]) -> Contender:
+def contender(library: Library, attempt: Callable[[Library], Attempt]) -> Contender:
     """Try a library; one that the logs do not carry is refused with the reason.
 
     Args:
@@ -192,7 +207,7 @@ def choose(tried: Sequence[Contender]) -> list[Contender]:
     """
     made = [one for one in tried if one.attempt is not None]
     if not made:
-        raise InputError("; ".join(f"{one.library}: {one.refused}" for one in tried))
+        raise InputError("; ".join(f"{one.name}: {one.refused}" for one in tried))
     eligible = [one for one in made if one.passed] or made
     best = min(eligible, key=lambda one: one.error)
     fewer = [one for one in eligible if one.coefficients < best.coefficients and _no_worse(one, best)]
@@ -216,15 +231,15 @@ def comparison_notes(tried: Sequence[Contender]) -> list[str]:
     (taken,) = [one for one in tried if one.chosen]
     others = [one for one in tried if not one.chosen]
     parts = [
-        f"{one.library} {one.error:.2%}" if one.attempt else f"{one.library} not tried ({one.refused})"
+        f"{one.name} {one.error:.2%}" if one.attempt else f"{one.name} not tried ({one.refused})"
         for one in others
     ]
     if np.isfinite(taken.error):
         reason = f"it leaves {taken.error:.2%} (nRMSE) on the blocks that choose the library"
     else:
         reason = "the only one that the logs can determine"
-    notes = [f"library {taken.library}: {reason}; {', '.join(parts)}"]
+    notes = [f"library {taken.name}: {reason}; {', '.join(parts)}"]
     for one in others:
         if one.checks is not None and not one.passed and one.error < taken.error:
-            notes.append(f"{one.library} leaves less but is no arm: {'; '.join(one.checks.faults())}")
+            notes.append(f"{one.name} leaves less but is no arm: {'; '.join(one.checks.faults())}")
     return notes

@@ -25,35 +25,30 @@ from armloop.reconstruction.bandwidth import Bandwidth, check_nyquist, choose_ba
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_recorded
 from armloop.reconstruction.fitted import uncertainty
-from armloop.reconstruction.found import Found
 from armloop.reconstruction.friction_ladder import check_laws
 from armloop.reconstruction.held_out import held_out_intervals
 from armloop.reconstruction.judged import held_out_parts
-from armloop.reconstruction.lagrangian import lagrangian
 from armloop.reconstruction.libraries import (
-    LIBRARIES,
-    MOST_JOINTS,
     Attempt,
     Contender,
+    candidates,
+    check_suits,
     choose,
     comparison_notes,
     contender,
-    undetermined,
+    named,
 )
+from armloop.reconstruction.library import METHODS, Library
 from armloop.reconstruction.options import Options, StepReport
-from armloop.reconstruction.rigid_body import rigid_body
 from armloop.reconstruction.ripple import find_ripple
 from armloop.reconstruction.ripple import notes as ripple_notes
-from armloop.reconstruction.shared import SHARED_CONDITIONING, motion_range
-from armloop.reconstruction.sindy import sindy
-from armloop.reconstruction.stepwise import stepwise_on
+from armloop.reconstruction.shared import motion_range
 from armloop.reconstruction.tally import Part
 from armloop.reconstruction.torque_checks import check_torques
 from armloop.scoring import Score
 from armloop.signals import Conditioning
 from armloop.workers import Workers, one_thread
 
-METHODS = ("stepwise", "sindy")
 #: Samples as recorded in which ripples are looked for, where the logs are not kept in memory.
 _RIPPLE = 300_000
 
@@ -97,24 +92,14 @@ class Reconstruction:
         }
 
 
-def candidates(arm: Arm, options: Options) -> list[str]:
-    """Libraries that are compared where the user names none.
-
-    The double feature set only up to four joints, beyond which it explodes, and not where friction laws are asked for,
-    which it has of its own.
-    """
-    symbolic = arm.n <= MOST_JOINTS and options.friction is None
-    return [library for library in LIBRARIES if symbolic or library != "double-feature-set"]
-
-
 def default_library(arm: Arm) -> str:
     """The library that a motion is designed for where none is named: the richest that is compared."""
-    return candidates(arm, Options())[0]
+    return candidates(arm, Options())[0].name
 
 
 def default_conditioning(library: str) -> Conditioning:
-    """Filter that suits a library: friction with memory needs every sample, sparse terms do not."""
-    return Conditioning() if library == "double-feature-set" else SHARED_CONDITIONING
+    """Filter that suits a library."""
+    return named(library).conditioning
 
 
 @one_thread
@@ -136,8 +121,8 @@ def reconstruct(
         logs: runs of the same arm, in memory or read when needed (:mod:`armloop.pieces`); which sample serves
             which step is found from the samples.
         method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
-        library: one of :data:`LIBRARIES`; by default the best of them (:mod:`armloop.reconstruction.libraries`), unless
-            an option speaks of the double feature set.
+        library: the name of one of :mod:`armloop.reconstruction.libraries`; by default the best of them, unless an
+            option speaks of one.
         conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
             (:mod:`armloop.reconstruction.bandwidth`).
         recorded: how the logs recorded the torque, kept in the model for later logs.
@@ -152,50 +137,41 @@ def reconstruct(
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
     settings = options or Options()
-    if library is None and (method == "sindy" or settings.of_double_feature_set):
-        library = "double-feature-set"
-    if library is not None and library not in LIBRARIES:
-        raise InputError(f"unknown library {library!r}; there are: {', '.join(LIBRARIES)}")
-    if method == "sindy" and library != "double-feature-set":
-        raise InputError(f"method 'sindy' works on the library double-feature-set, not on {library!r}")
-    if settings.friction is not None and library == "double-feature-set":
-        raise InputError(
-            "the double feature set has friction of its own (Coulomb, Stribeck, terms of the velocities); "
-            "laws are chosen with --library rigid-body or lagrangian"
-        )
+    wanted = candidates(arm, settings, method) if library is None else [named(library)]
+    for one in wanted:
+        check_suits(one, method, settings)
     check_laws(settings.friction)
     for log in logs:
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     large = sum(log.samples for log in logs) > in_memory
-    kept = [] if large and method == "stepwise" else [log.read() for log in logs]
+    streamed = large and METHODS[method].streams
+    kept = [] if streamed else [log.read() for log in logs]
     require_different(kept)
-    time_series = conditioning is None or conditioning.cutoff_hz > 0
-    if library is None and not time_series:
-        library = candidates(arm, settings)[0]
     if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
-    wanted = candidates(arm, settings) if library is None else [library]
-    usual = [conditioning or default_conditioning(one) for one in wanted]
+        # samples that are no time series show the first library alone what it needs
+        wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
+    usual = [conditioning or one.conditioning for one in wanted]
     bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
     settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
-    refused = {one: undetermined(one, arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
+    refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
     refused = {} if library is not None else {one: why for one, why in refused.items() if why}
     left = [one for one in wanted if one not in refused]
     few = len(left) > 1 and _are_few(kept, bandwidth.suited(usual[0]), settings)
 
-    def attempt(library: str, nested: bool = False) -> Attempt:
-        how = conditioning or bandwidth.suited(default_conditioning(library))
-        progress(f"{library}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
-        if large and method == "stepwise":
+    def attempt(library: Library, nested: bool = False) -> Attempt:
+        how = conditioning or bandwidth.suited(library.conditioning)
+        progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        if streamed:
             data = Data.streamed(logs, how, settings, workers, progress)
         else:
-            data = Data.kept(kept or [log.read() for log in logs], how, settings)
+            data = Data.kept(kept, how, settings)
             data = data.nested() if nested else data
         check_recorded(arm, data.reference.samples)
-        found = _found(arm, data, method, library, settings, progress)
+        found = library.methods[method](arm, data, settings, progress)
         if bandwidth.trials:
             found.history["bandwidth"] = bandwidth.to_dict()
         found.notes += bandwidth.notes()
@@ -261,16 +237,6 @@ def held_apart(
     return bandwidth, apart.within(seconds)
 
 
-def _found(arm: Arm, data: Data, method: str, library: str, options: Options, progress: Progress) -> Found:
-    if library == "rigid-body":
-        return rigid_body(arm, data, options, progress)
-    if library == "lagrangian":
-        return lagrangian(arm, data, options, progress)
-    if method == "sindy":
-        return sindy(arm, data.reference.samples, data.reference.held_out, options, progress)
-    return stepwise_on(arm, data, options, progress)
-
-
 def _finished(
     libraries: list[Contender],
     part: Part,
@@ -286,7 +252,7 @@ def _finished(
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if method == "stepwise":
+    if not METHODS[method].baseline:
         bare = ReconstructedModel(
             arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
         )
@@ -313,7 +279,7 @@ def _finished(
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
             "method": method,
-            "library": tried.library,
+            "library": tried.library.name,
             "logs": list(dict.fromkeys(log.name for log in logs)),
             "steps": [report.to_dict() for report in found.reports],
             "range": motion_range(data.reference.samples.motion),
@@ -342,8 +308,7 @@ def _finished(
     model = replace(model, history=history)
     if options.standard_errors:
         progress("standard errors of the coefficients")
-        shared = tried.library in ("rigid-body", "lagrangian")
-        model = replace(model, uncertainty=uncertainty(model, data, found, shared))
+        model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
 
 

@@ -7,8 +7,10 @@ What scarce data leave open is filled in from the URDF, as firmly as the data th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +26,17 @@ from armloop.reconstruction.data import Data
 from armloop.reconstruction.design import Design
 from armloop.reconstruction.fitting import Fitting
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.library import Find, Library
 from armloop.reconstruction.options import Options, StepReport
 from armloop.reconstruction.physical import Body, physical_solution, physics_notes, postures
 from armloop.reconstruction.pooled import Prior
-from armloop.reconstruction.shared import check_moves, found_friction, motion_range, undetermined_notes
+from armloop.reconstruction.shared import (
+    SHARED_CONDITIONING,
+    check_moves,
+    found_friction,
+    motion_range,
+    undetermined_notes,
+)
 from armloop.reconstruction.training import Training
 
 Array = NDArray[np.float64]
@@ -135,3 +144,11 @@ def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit, np.array([0]))
     columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
     return columns.transpose(0, 2, 1, 3)
+
+
+class RigidBodyLibrary(Library):
+    """Base parameters of the URDF's chain."""
+
+    name = "rigid-body"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": rigid_body}
+    conditioning = SHARED_CONDITIONING

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,15 +17,20 @@ from armloop.progress import Progress
 from armloop.reconstruction.data import Data
 from armloop.reconstruction.excitation import check_excitation
 from armloop.reconstruction.found import Found
+from armloop.reconstruction.library import Find, Library
 from armloop.reconstruction.options import Options
 from armloop.reconstruction.refit import REFITTED, refit
 from armloop.reconstruction.revision import revised
+from armloop.reconstruction.sindy import sindy
 from armloop.reconstruction.sorter import Sorter
 from armloop.reconstruction.step import PARTS, Part, StepPlan, regress_step
 from armloop.reconstruction.sums import Choice
+from armloop.signals import Conditioning
 
 # A condition counts as met if what should be absent in it is this much weaker than where it is present.
 _PURITY = 0.1
+# Joints up to which the double feature set is compared with other libraries.
+_MOST_JOINTS = 4
 
 
 def stepwise(
@@ -138,3 +146,27 @@ def _impure(motion: Motion, clusters: Clusters) -> str:
         joint = int(np.argmin(spread)) + 1
         return f"static data cover {spread.min():.0%} of the range of q{joint}, so all three steps are regressed together"
     return ""
+
+
+def _one_shot(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
+    return sindy(arm, data.reference.samples, data.reference.held_out, options, progress)
+
+
+class DoubleFeatureSetLibrary(Library):
+    """The paper's: every joint's torque by itself, without geometry."""
+
+    name = "double-feature-set"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": stepwise_on, "sindy": _one_shot}
+    conditioning = Conditioning()
+    shared = False
+    own_friction = (
+        "the double feature set has friction of its own (Coulomb, Stribeck, terms of the velocities)"
+    )
+
+    def suits(self, arm: Arm) -> bool:
+        """Up to four joints, beyond which it has more candidates than any log tells apart."""
+        return arm.n <= _MOST_JOINTS
+
+    def asked(self, options: Options) -> bool:
+        """Whether the estimator, the orders or the noise are said."""
+        return options.of_double_feature_set

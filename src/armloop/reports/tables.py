@@ -133,7 +133,7 @@ def libraries_table(libraries: Sequence[Contender], title: str | None = "Librari
     """Error on the blocks that choose the library, number of coefficients, and the checks of physics of each library."""
     rows: list[list[object]] = []
     for one in libraries:
-        name = f"{one.library} (taken)" if one.chosen else one.library
+        name = f"{one.name} (taken)" if one.chosen else one.name
         if one.checks is None:
             rows.append([name, *[MISSING] * 6])
             continue

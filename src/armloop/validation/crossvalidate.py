@@ -20,6 +20,7 @@ from armloop.reconstruction import Options, reconstruct
 from armloop.scoring import Score, residual, score_errors
 from armloop.signals import Conditioning, condition
 from armloop.validation.splits import Split, by_blocks, by_file, judging_rows
+from armloop.workers import Serial, Workers
 
 LEAVE_OUT = ("file", "blocks")
 
@@ -96,6 +97,7 @@ def crossvalidate(
     options: Options | None = None,
     progress: Progress = silent,
     kept: Kept | None = None,
+    workers: Workers | None = None,
 ) -> CrossValidation:
     """Reconstruct several times, each time without some of the data, and score those.
 
@@ -105,6 +107,7 @@ def crossvalidate(
         method, library, conditioning, options: as of :func:`armloop.reconstruction.reconstruct`.
         kept: where finished fits are kept, and taken from: the same data and settings, and what was left out, give
             the same fit.
+        workers: who makes the fits; by default this process. They are the same whoever does.
 
     Raises:
         InputError: too little data to leave any out, or to reconstruct from the rest.
@@ -120,11 +123,11 @@ def crossvalidate(
     settings = [leave_out, block_seconds, method, library, repr(conditioning), repr(options)]
     signals = [(log.name, log.time, log.q, log.v, log.tau, log.vdot) for log in logs]
     data = [arm.to_dict(), [[name, digest(*(x for x in xs if x is not None))] for name, *xs in signals]]
-    results = []
-    for number, split in enumerate(splits, 1):
-        progress(f"{number} of {len(splits)}: {split.name} left out")
 
-        def fitted(split: Split = split) -> dict[str, Any]:
+    def fitted(numbered: tuple[int, Split]) -> dict[str, Any]:
+        number, split = numbered
+
+        def fit() -> dict[str, Any]:
             found = reconstruct(
                 split.training,
                 arm,
@@ -135,8 +138,16 @@ def crossvalidate(
             )
             return {"model": found.model.to_dict(), "notes": list(found.notes)}
 
+        answer: dict[str, Any] = kept.once([number, split.name, settings, data], fit)
+        return answer
+
+    results = []
+    progress(f"1 of {len(splits)}: {splits[0].name} left out")
+    fits = (workers or Serial()).map(fitted, list(enumerate(splits, 1)))
+    for number, (split, found) in enumerate(zip(splits, fits, strict=True), 1):
+        if number < len(splits):
+            progress(f"{number + 1} of {len(splits)}: {splits[number].name} left out")
         # Judged is what was kept, just made or not, so that both give the same figures.
-        found = kept.once([number, split.name, settings, data], fitted)
         fit = Fit(model_of(found["model"], f"the model without {split.name}"), found["notes"])
         results.append((split.name, fit))
         for k, judged in _judge(split, logs, fit.model):
