@@ -2,6 +2,7 @@
 # make loop    the main job, start to end, in out/loop; `armloop loop --measured` is that on measured data
 # make test    style, types and tests
 # make docs    the documentation, tutorials executed, in out/site
+# make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel
 # make bench   the benchmarks' ratios
 # make blind   how often the verdict on an undeclared effect is right
 # make mutants how many changes of the numerics the quick tests see
@@ -14,9 +15,11 @@ PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
 TESTING := $(VENV)/.testing
 WRITING := $(VENV)/.writing
+# The wheel and the environment that it is installed in; a folder outside the checkout will do as well.
+WHEEL ?= out/wheel
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: setup loop test long docs bench blind mutants clean
+.PHONY: setup loop test long docs wheel bench blind mutants clean
 
 setup: $(INSTALLED)
 
@@ -47,7 +50,8 @@ $(TESTING): requirements-test.lock $(INSTALLED)
 loop: setup
 	$(BIN)/armloop loop --out out/loop
 
-test: setup $(TESTING)
+# With the packages of the documentation, whose site a test builds.
+test: setup $(WRITING)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -63,10 +67,17 @@ $(WRITING): requirements-docs.lock $(TESTING)
 
 # Strict: a link that leads nowhere, an object without a docstring, or a tutorial's error ends it. Nothing is fetched.
 docs: setup $(WRITING)
-	@rm -rf .cache docs/tutorials/out # executed afresh: a cached tutorial would show another armloop's answers
-	$(BIN)/python docs/make_gallery.py
-	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/mkdocs build --strict --quiet
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python docs/build.py
 	@echo "open out/site/index.html"
+
+# Built, installed as a user would, and asked for from outside the checkout. The versions are the lock's.
+wheel: setup
+	@rm -rf $(WHEEL) && mkdir -p $(WHEEL)
+	$(BIN)/python -m build --wheel --no-isolation --outdir $(WHEEL) . >/dev/null
+	$(PYTHON) -m venv $(WHEEL)/environment
+	$(WHEEL)/environment/bin/pip install -qq --no-compile -c requirements.lock $(WHEEL)/armloop-*.whl
+	$(WHEEL)/environment/bin/pip check
+	cd / && $(abspath $(WHEEL))/environment/bin/armloop --version
 
 bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done

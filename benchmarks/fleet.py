@@ -33,13 +33,14 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.log import read_log, write_log  # noqa: E402
 
 MOTIONS, WORN, FROM = 25, 5, 30
-#: Runs the command and prints the peak memory of the process and of its workers, MB.
+#: Runs the command and prints the peak memory of the process and of its workers, MB, and their processor time, s.
 CHILD = """
 import resource, sys
 from armloop.cli import main
 status = main(sys.argv[1:])
-peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-print("peak", peak / 1024, file=sys.stderr)
+used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+print("peak", max(one.ru_maxrss for one in used) / 1024, file=sys.stderr)
+print("processor", sum(one.ru_utime + one.ru_stime for one in used), file=sys.stderr)
 sys.exit(status)
 """
 
@@ -70,8 +71,8 @@ def simulate(root: Path, arms: int, logs: int, seconds: float) -> float:
     return arms * logs * seconds / 3600
 
 
-def watch(root: Path, store: str, jobs: int, logs: list[str]) -> tuple[float, float, dict]:
-    """Run the command; return seconds, peak memory in MB, and its answer."""
+def watch(root: Path, store: str, jobs: int, logs: list[str]) -> tuple[float, float, float, dict]:
+    """Run the command; return seconds, peak memory in MB, seconds of processor time, and its answer."""
     words = [
         "watch",
         "--models",
@@ -93,8 +94,11 @@ def watch(root: Path, store: str, jobs: int, logs: list[str]) -> tuple[float, fl
     took = time.perf_counter() - began
     if done.returncode not in (0, 3):
         raise SystemExit(done.stderr)
-    peak = float(next(line.split()[1] for line in done.stderr.splitlines() if line.startswith("peak")))
-    return took, peak, json.loads(done.stdout)
+    peak, processor = (
+        float(next(line.split()[1] for line in done.stderr.splitlines() if line.startswith(word)))
+        for word in ("peak", "processor")
+    )
+    return took, peak, processor, json.loads(done.stdout)
 
 
 def size(folder: Path) -> int:
@@ -124,9 +128,9 @@ def run() -> None:
             (few / path.name).symlink_to(path)
         names = sorted(path.name for path in few.iterdir())
         part = len(names) * options.logs
-        one, small, _ = watch(root, "one", 1, [str(few)])
-        two, large, answer = watch(root, "two", 2, [str(root / "logs")])
-        again, _, same = watch(root, "two", 2, [str(root / "logs")])
+        one, small, busy, _ = watch(root, "one", 1, [str(few)])
+        two, large, busier, answer = watch(root, "two", 2, [str(root / "logs")])
+        again, _, _, same = watch(root, "two", 2, [str(root / "logs")])
         raw = sorted((root / "logs" / names[0]).iterdir())
         began = time.perf_counter()
         for path in raw[:20]:
@@ -138,6 +142,7 @@ def run() -> None:
         rows = {
             "one worker": f"{part / one:8.1f} logs/s   {part} logs in {one:.0f} s, tests included; peak {small:.0f} MB",
             "two workers": f"{count / two:8.1f} logs/s   {count} logs in {two:.0f} s; peak {large:.0f} MB per process",
+            "processor": f"{1e3 * busy / part:8.0f} ms of it per log by one worker, {1e3 * busier / count:.0f} ms by two",
             "nothing new": f"{count / again:8.1f} logs/s   looked at, hashed, known: {same['logs']['known']}",
             "reading raw": f"{1 / reading:8.1f} logs/s   only to have them in memory",
             "kept": f"{kept / hours / 1e6:8.2f} MB per hour of operation; the raw logs have {given / hours / 1e6:.2f}",
@@ -150,11 +155,11 @@ def run() -> None:
             effect = alarm["effects"][0] if alarm["effects"] else {"effect": "not named", "joint": None}
             what = f"{effect['effect']} joint {effect['joint']}, {alarm['course']['form']}"
             print(f"  {alarm['arm']}: {what}, since {alarm['since_log']}, alarm {alarm['log']}")
-        day, rate = 10_000 * 86400 / options.seconds, count / two / 2
+        day, rate = 10_000 * 86400 / options.seconds, count / busier
         print(
             f"on paper, 10,000 arms day and night in logs of {options.seconds:g} s: {day:.3g} logs and "
-            f"{24e4 * kept / hours / 1e12:.2f} TB kept a day, {day / rate / 86400:.0f} workers at {rate:.1f} logs/s each;\n"
-            f"one such log an hour from each: {2.4e5 / rate / 3600:.1f} worker hours and "
+            f"{24e4 * kept / hours / 1e12:.2f} TB kept a day,\n{day / rate / 86400:.0f} workers with a processor each, "
+            f"{rate:.1f} logs/s; one such log an hour from each: {2.4e5 / rate / 3600:.1f} worker hours and "
             f"{2.4e5 * kept / count / 1e9:.1f} GB a day"
         )
 

@@ -150,13 +150,6 @@ def in_order(name: str, units: Units, joints: int, label: str) -> None:
         print(f"    unit {alarm.unit}: {stream.name} at joint {stream.joint}", flush=True)
 
 
-def programmes(blocks: Blocks, counts: Array, numbers: list[int]) -> Units:
-    """Units with the programmes of their logs."""
-    units = blocks.units(counts, 600.0)
-    own = np.array([int(blocks.log[np.flatnonzero(row)[0]]) for row in counts])
-    return replace(units, programme=np.array(numbers, dtype=np.intp)[own], log=own)
-
-
 def run() -> None:
     """Parse and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -190,10 +183,10 @@ def run() -> None:
                     continue
                 logs.append(log)
                 numbers.append(number)
-        blocks = Blocks.of(sums)
+        blocks = Blocks.of(sums, numbers)
         known[name] = model, logs, blocks
-        in_order(name, programmes(blocks, blocks.whole(), numbers), arm.n, "a log")
-        short = programmes(blocks, np.eye(len(blocks.log)), numbers)
+        in_order(name, blocks.units(blocks.whole(), 600.0), arm.n, "a log")
+        short = blocks.units(np.eye(len(blocks.log)), 600.0)
         in_order(name, short, arm.n, f"a block of {about.block:g} s")
     print()
     false_alarms_header()
@@ -204,50 +197,59 @@ def run() -> None:
     )
     delays_header(10)
     for name, (model, logs, blocks) in known.items():
-        for what, law, level, sizes in changes(model.arm.n, options.joints):
-            at = [
-                blocks,
-                *(
-                    Blocks.of(
-                        [
-                            log_sums(model, with_torque(model, log, law, w), block_seconds=ARMS[name].block)
-                            for log in logs
-                        ]
-                    )
-                    for w in (1.0, 2.0)
-                ),
-            ]
-            changing = Changing(*at)
-            rng = np.random.default_rng(options.seed)
-            counts = blocks.drawn(rng, HEALTHY + len(level), UNIT_SECONDS)
-            levels = np.concatenate([np.zeros(HEALTHY), level])
-
-            def normal(
-                index: Sequence[int], c: Changing = changing, counts: Array = counts, w: Array = levels
-            ) -> Normal:
-                return c.normal(counts[list(index)], w[list(index)])
-
-            label = f"{name}: {what}"
-            # what there is a day after the alarm, not a year after, tells how the change came
-            if not any(
-                delay(
-                    label, model, changing.units(counts[:end], levels[:end], EVERY_S), HEALTHY, sizes, normal
-                )
-                for end in range(HEALTHY + 20, HEALTHY + len(level) + 1, 20)
-            ):
-                print(f"{label:38s} not found in {len(level)} units", flush=True)
+        for law, histories in changes(model.arm.n, options.joints):
+            changing = with_levels(model, logs, blocks, law, ARMS[name].block)
+            for what, level, sizes in histories:
+                found_after(f"{name}: {what}", model, changing, level, sizes, options.seed)
 
 
-def changes(joints: int, which: str) -> list[tuple[str, Law, Array, list[str]]]:
-    """What is added to the measured torque: name, law at level 1, level of each unit, and its size in words."""
+def with_levels(
+    model: ReconstructedModel, logs: Sequence[MotionLog], blocks: Blocks, law: Law, block: float
+) -> Changing:
+    """The blocks at level 0, 1 and 2 of a change."""
+    sums = [[log_sums(model, with_torque(model, log, law, w), None, block) for log in logs] for w in (1, 2)]
+    return Changing(blocks, *(Blocks.of(parts) for parts in sums))
+
+
+def found_after(
+    label: str, model: ReconstructedModel, changing: Changing, level: Array, sizes: list[str], seed: int
+) -> None:
+    """Print how soon a change that comes after healthy units is found, or how it compares with what is no change."""
+    counts = changing.zero.drawn(np.random.default_rng(seed), HEALTHY + len(level), UNIT_SECONDS)
+    levels = np.concatenate([np.zeros(HEALTHY), level])
+
+    def normal(index: Sequence[int]) -> Normal:
+        return changing.normal(counts[list(index)], levels[list(index)])
+
+    # in portions, so that how the change came is judged with what there is a few days after the alarm
+    for end in range(HEALTHY + 20, HEALTHY + len(level) + 1, 20):
+        units = changing.units(counts[:end], levels[:end], EVERY_S)
+        if delay(label, model, units, HEALTHY, sizes, normal):
+            return
+    values, tolerance = scores(changing.units(counts, 0.0 * levels, EVERY_S))
+    later, _ = scores(changing.units(counts, levels, EVERY_S))
+    moved = np.abs(later[-1] - values[-1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        parts = np.nanmax(np.where(tolerance > 0, moved / tolerance, np.nan))
+        spread = np.nanmax(moved / np.std(values, axis=0))
+    print(
+        f"{label:38s} not found in {len(level)} units; at most {parts:.1f} of the tolerance and {spread:.1f} of the "
+        "healthy units' spread",
+        flush=True,
+    )
+
+
+def changes(joints: int, which: str) -> list[tuple[Law, list[tuple[str, Array, list[str]]]]]:
+    """What is added to the measured torque: a law at level 1; the level of each unit, with its name and sizes in words."""
     chosen = range(joints) if which == "all" else [int(j) - 1 for j in which.split(",") if int(j) <= joints]
-    found: list[tuple[str, Law, Array, list[str]]] = [
-        (f"friction of joint {j + 1} +5 %", friction_of(j), np.full(60, 0.05), ["5 %"] * 60) for j in chosen
-    ]
-    found.append(("load of 0.3 kg", payload, np.full(60, 0.3), ["0.3 kg"] * 60))
     drift = 0.001 * np.arange(1, 301)
     sizes = [f"{100 * w:.1f} %" for w in drift]
-    found += [(f"friction of joint {j + 1} +1 % a day", friction_of(j), drift, sizes) for j in chosen]
+    found: list[tuple[Law, list[tuple[str, Array, list[str]]]]] = [
+        (payload, [("load of 0.3 kg", np.full(60, 0.3), ["0.3 kg"] * 60)])
+    ]
+    for j in chosen:
+        step = (f"friction of joint {j + 1} +5 %", np.full(60, 0.05), ["5 %"] * 60)
+        found.append((friction_of(j), [step, (f"friction of joint {j + 1} +1 % a day", drift, sizes)]))
     return found
 
 

@@ -23,12 +23,14 @@ Array = NDArray[np.float64]
 class Blocks:
     """The B blocks of some logs, with p columns, of an arm of n joints.
 
-    columns : what the p columns are; log : (B,) number of the log each block is of; seconds : (B,)
+    columns : what the p columns are; log, programme : (B,) number of the log and of the programme each block is of;
+    seconds : (B,)
     moment, size : (B, p); gram : (B, p, p); rows, energy, torque : (B, n), all as in `LogSums`
     """
 
     columns: tuple[Column, ...]
     log: NDArray[np.intp]
+    programme: NDArray[np.intp]
     seconds: Array
     moment: Array
     size: Array
@@ -38,12 +40,14 @@ class Blocks:
     torque: Array
 
     @staticmethod
-    def of(logs: Sequence[LogSums]) -> Blocks:
-        """The blocks of logs."""
+    def of(logs: Sequence[LogSums], programmes: Sequence[int] | None = None) -> Blocks:
+        """The blocks of logs, which all ran one programme or each the one given."""
         gram = np.concatenate([log.gram for log in logs])
+        blocks = [log.blocks for log in logs]
         return Blocks(
             columns=logs[0].columns,
-            log=np.repeat(np.arange(len(logs)), [log.blocks for log in logs]),
+            log=np.repeat(np.arange(len(logs)), blocks),
+            programme=np.repeat(programmes or [0] * len(logs), blocks),
             size=np.einsum("bpp->bp", gram),
             gram=gram,
             **{
@@ -84,7 +88,8 @@ class Blocks:
         return Units(
             columns=self.columns,
             when=every_s * np.arange(U),
-            programme=np.zeros(U, dtype=np.intp),
+            # a unit's blocks are all of one
+            programme=self.programme[np.argmax(counts > 0, axis=1)],
             log=np.arange(U),
             size=counts @ self.size,
             temperature=np.repeat((nothing if temperature is None else temperature)[:, None], n, axis=1),

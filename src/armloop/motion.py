@@ -71,6 +71,14 @@ class Motion:
         return [slice(int(first), int(last)) for first, last in zip(self.starts, ends, strict=True)]
 
 
+def filter_reach(cutoff_hz: float) -> float:
+    """Seconds to either side over which a low-pass of this corner smears a step: half a period of it; 0 without one.
+
+    It is the correlation time of what has passed the filter, too.
+    """
+    return 0.5 / cutoff_hz if cutoff_hz > 0 else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
     """A motion with its measured generalized forces.
@@ -99,3 +107,8 @@ class Samples:
                 f"tau and moving must have the shape of q, {self.motion.q.shape}; "
                 f"they are {self.tau.shape}, {self.moving.shape}"
             )
+
+    @property
+    def reach(self) -> float:
+        """Seconds to either side over which the samples' low-pass smears a step."""
+        return filter_reach(self.cutoff_hz)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from armloop.errors import LogError
 from armloop.log import FEWEST_SAMPLES, MotionLog
-from armloop.motion import Motion, Samples
+from armloop.motion import Motion, Samples, filter_reach
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,11 @@ class Conditioning:
         if self.oversampling == 0:
             raise ValueError("oversampling must be positive")
 
+    @property
+    def reach(self) -> float:
+        """Seconds to either side over which the low-pass smears a step."""
+        return filter_reach(self.cutoff_hz)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
         return asdict(self)
@@ -68,22 +73,43 @@ class LowPass:
 
     def __call__(self, x: Array) -> Array:
         """Filter (N, ...) along the first axis; runs shorter than the padding get a shorter padding."""
-        if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period:
+        if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period or len(x) == 0:
             return x
-        sos = _sections(self.cutoff_hz, self.period)
-        pad = min(len(x) - 1, at_least(1.5 / (self.cutoff_hz * self.period)))
         # Here, for scipy's signals take longer to import than a fault of the input to be told.
-        from scipy.signal import sosfiltfilt
+        from scipy.signal import sosfilt
 
-        return sosfiltfilt(sos, x, axis=0, padlen=pad)
+        # As scipy's sosfiltfilt does it, to the bit, but for the initial state: that takes longer than a short run.
+        sos, state = _sections(self.cutoff_hz, self.period)
+        state = state.reshape(*state.shape, *[1] * (x.ndim - 1))
+        pad = min(len(x) - 1, at_least(1.5 / (self.cutoff_hz * self.period)))
+        before, after = 2 * x[:1] - x[pad:0:-1], 2 * x[-1:] - x[-2 : -(pad + 2) : -1]
+        y = np.concatenate([before, x, after])
+        for _ in range(2):
+            y = sosfilt(sos, y, axis=0, zi=state * y[:1])[0][::-1]
+        return np.asarray(y[pad : pad + len(x)])
+
+    def each(self, x: Array, runs: Sequence[slice]) -> Array:
+        """Filter runs of x (N, ...) one by one, those of equal length at a time; the rest of x stays as it is."""
+        if self.cutoff_hz <= 0:
+            return x
+        equal: dict[int, list[slice]] = {}
+        for run in runs:
+            equal.setdefault(run.stop - run.start, []).append(run)
+        filtered = np.array(x, dtype=float)
+        for some in equal.values():
+            together = self(np.stack([x[run] for run in some], axis=1))
+            for k, run in enumerate(some):
+                filtered[run] = together[:, k]
+        return filtered
 
 
 @lru_cache(maxsize=16)
-def _sections(cutoff_hz: float, period: float) -> Array:
-    """The filter's second-order sections: their design takes longer than filtering a short run."""
-    from scipy.signal import butter
+def _sections(cutoff_hz: float, period: float) -> tuple[Array, Array]:
+    """The filter's second-order sections (2, 6), and their state (2, 2) after a step that was always there."""
+    from scipy.signal import butter, sosfilt_zi
 
-    return np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
+    sos = np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
+    return sos, np.asarray(sosfilt_zi(sos))
 
 
 def uniform_period(time: Array) -> float:
@@ -180,10 +206,7 @@ def smooth(samples: Samples, x: Array) -> Array:
     What has steps in it (friction, and every prediction that contains it) must be smeared like the
     measured torque before the two are compared; smooth columns are hardly changed.
     """
-    low_pass = LowPass(samples.cutoff_hz, samples.period)
-    if samples.cutoff_hz <= 0:
-        return x
-    return np.concatenate([low_pass(x[run]) for run in samples.motion.runs()])
+    return LowPass(samples.cutoff_hz, samples.period).each(x, samples.motion.runs())
 
 
 def independent_rows(samples: Samples) -> NDArray[np.bool_]:
@@ -212,7 +235,7 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
         return x if even else CubicSpline(elapsed, x)(grid)
 
     low_pass = LowPass(how.cutoff_hz, period)
-    q, v, tau = (low_pass(on_grid(x)) for x in (log.q, log.v, log.tau))
+    q, v, tau = np.split(low_pass(on_grid(np.hstack([log.q, log.v, log.tau]))), 3, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(v) <= dead_zone
     reach = at_least(how.smear / (how.cutoff_hz * period))
@@ -225,7 +248,7 @@ def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:
     if len(time) < FEWEST_SAMPLES:
         return None, slice(0)
     period = uniform_period(time)
-    trim = at_least(0.5 / (how.cutoff_hz * period))
+    trim = at_least(how.reach / period)
     if len(time) < 6 * trim:
         return None, slice(0)
     # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.

@@ -90,6 +90,7 @@ def test_a_model_scores_plots_and_shows_itself(model, tmp_path):
     score = model.score(test)
     assert max(score.nrmse) < 0.1 and repr(score).count("\n") == 0 and "nRMSE" in str(score)
     assert len(model.plot(test).axes) == 6
+    assert model.plot(test)._repr_png_().startswith(b"\x89PNG")  # what a notebook asks for
     assert repr(model).startswith("<armloop.Model of") and "\n" not in repr(model)
     assert "tau1 =" in str(model)
     assert "<img" in model._repr_html_() and "<pre" in score._repr_html_()

@@ -306,6 +306,15 @@ BAD_MAPS = {
     "count": ("time: {column: t}\nq: {columns: [a, c]}\ntau: {columns: [b]}", "1 columns, but q has 2"),
     "sign": ("time: {column: t}\nq: {columns: [a], sign: 2}\ntau: {columns: [b]}", "sign must be"),
     "both times": ("time: {column: t, rate: 3}\nq: {columns: [a]}\ntau: {columns: [b]}", "either column"),
+    "rate": ("time: {rate: -3}\nq: {columns: [a]}\ntau: {columns: [b]}", "time.rate is -3"),
+    "infinite": (
+        "time: {column: t}\nq: {columns: [a], offset: .inf}\ntau: {columns: [b]}",
+        "must be a finite number",
+    ),
+    "range": ("time: {column: t}\nq: {columns: 'q{1..999999999}'}\ntau: {columns: [b]}", "1 to 24 joints"),
+    "no range": ("time: {column: t}\nq: {columns: 'q{3..1}'}\ntau: {columns: [b]}", "1 to 24 joints"),
+    "twice": ("time: {column: t}\nq: {columns: [a]}\nq: {columns: [b]}\ntau: {columns: [b]}", "stands twice"),
+    "a list": ("- a\n- b", "mapping of fields"),
     "no yaml": ("time: {column: [", "map.yaml"),
     "no column": (
         "time: {column: t, unit: s}\nq: {columns: [zz], unit: rad}\ntau: {columns: [u], unit: N*m}",

@@ -12,14 +12,7 @@ from page_commands import ROOT, armloop, blocks, commands, run
 from armloop.drake_systems.scenario_schema import FILES
 from armloop.schemas.checking import checked
 
-# the command with the package of a wheel before that of the checkout
-FROM_WHEEL = """
-import sys
-sys.path.insert(0, sys.argv.pop(1))
-import armloop.cli
-assert armloop.__file__.startswith(sys.path[0]), armloop.__file__
-sys.exit(armloop.cli.main())
-"""
+BIN = os.path.dirname(sys.executable)
 
 
 def test_every_line_of_shell_is_make_or_armloop():
@@ -43,22 +36,67 @@ def test_pictures_and_paths_of_the_text_exist():
         assert (ROOT / path).exists(), path
 
 
-@pytest.mark.slow
-def test_every_command_and_the_python_run(tmp_path, unpacked):
-    assert "make loop" in commands("make")
-    page = tmp_path / "out" / "loop" / "report.html"
-    # What `make loop` calls, without setting up an environment of its own, and from the wheel.
-    out = run([sys.executable, "-c", FROM_WHEEL, str(unpacked), "loop", "--out", "out/loop"], tmp_path)
+@pytest.fixture(scope="module")
+def done(installed, tmp_path_factory):
+    """The folder in which everything was run, in turn, in an environment that has the wheel and what it asks for."""
+    place = tmp_path_factory.mktemp("readme")
+    # what `make loop` calls, without setting up an environment of its own
+    out = armloop("armloop loop --out out/loop", place, installed)
     assert "the verdict was right" in out
-    assert page.is_file() and (page.parent / "replay.html").is_file()
-    checked(json.loads((page.parent / "loop.json").read_text(encoding="utf-8")), FILES["loop"])
     for line in commands("armloop"):
         if "$UR10E" not in line:
-            assert armloop(line, tmp_path).strip(), line
-    whole_loop, diagram = blocks("python")
-    for example, lines in ((whole_loop, 15), (diagram, 10)):
+            assert armloop(line, place, installed).strip(), line
+    for example in blocks("python"):
+        (place / "example.py").write_text(example, encoding="utf-8")
+        run([str(installed), "example.py"], place)
+    return place
+
+
+@pytest.mark.slow
+def test_every_command_and_the_python_run(done):
+    page = done / "out" / "loop" / "report.html"
+    assert page.is_file() and (page.parent / "replay.html").is_file()
+    checked(json.loads((page.parent / "loop.json").read_text(encoding="utf-8")), FILES["loop"])
+    for example, lines in zip(blocks("python"), (15, 10), strict=True):
         assert len([line for line in example.splitlines() if line.strip()]) <= lines
-        (tmp_path / "example.py").write_text(example, encoding="utf-8")
-        run([sys.executable, "example.py"], tmp_path)
-    assert (tmp_path / "out" / "augmented.json").is_file() and (tmp_path / "out" / "arm.c").is_file()
-    assert os.path.isfile(tmp_path / "out" / "track" / "tracking.json")
+    assert (done / "out" / "augmented.json").is_file() and (done / "out" / "arm.c").is_file()
+    assert os.path.isfile(done / "out" / "track" / "tracking.json")
+
+
+# Commands of the gallery that the README does not have, at a size that suits a test.
+SHORTER = {
+    "armloop excite three_axis --library rigid-body --out out/reference.csv --report out/reference.html": "armloop excite "
+    "three_axis --library rigid-body --duration 6 --starts 1 --random 4 --out out/r.csv --report out/reference.html",
+    "armloop tune three_axis_tracking --out out/tune": "armloop tune short.yaml --out out/tune",
+}
+SHORT = "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\nscore: [1.0, 5.0]\n"
+
+
+@pytest.mark.slow
+def test_the_site_is_built_strictly_with_its_tutorials_executed(done, installed, tmp_path):
+    if shutil.which("mkdocs", path=BIN) is None:
+        pytest.skip("the packages of requirements-docs.lock are not installed (`make docs` installs them)")
+    here = {"armloop loop --out out/loop", *map(one_blank, commands("armloop"))}
+    (done / "short.yaml").write_text(SHORT, encoding="utf-8")
+    for line in map(one_blank, commands("armloop", "docs/gallery.md")):
+        if line not in here:
+            armloop(SHORTER[line], done, installed)
+    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("reports", "out"))
+    shutil.copy(ROOT / "mkdocs.yml", tmp_path)
+    (tmp_path / "src").symlink_to(ROOT / "src")
+    path = f"{BIN}{os.pathsep}{os.environ['PATH']}"
+    # as from a shell, where nobody has chosen a backend
+    command = [sys.executable, "docs/build.py", "--reports", str(done / "out")]
+    run(command, tmp_path, PATH=path, MPLBACKEND="")
+    site = tmp_path / "out" / "site"
+    for tutorial in (ROOT / "docs" / "tutorials").glob("*.py"):
+        text = (site / "tutorials" / f"{tutorial.stem}.html").read_text(encoding="utf-8")
+        assert "jp-OutputArea-output" in text, tutorial
+    pushes = (site / "tutorials" / "3_pushes.html").read_text(encoding="utf-8")
+    assert "image/png" in pushes and "Figure size" not in pushes
+    for page in ("loop/report.html", "tune/report.html"):
+        assert (site / "reports" / page).read_bytes() == (done / "out" / page).read_bytes()
+
+
+def one_blank(line):
+    return " ".join(line.split())

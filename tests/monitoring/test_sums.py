@@ -75,6 +75,10 @@ def test_a_change_is_named_from_sums_alone(
     assert first.place[:2] == (effect, joint)
     if effect == "payload":
         assert float(first.parameters["mass"].value) == pytest.approx(0.3, rel=0.05)
+        # 0.3 m from the joint, where the mass and its own lever make the inertia; in the frame of the tool, 0.35 m out
+        com = first.parameters["com"]
+        off = np.abs(np.array(com.value) - [-0.05, 0.0, 0.0])
+        assert (off < 4.0 * np.array(com.std_error)).all() and (off < 0.04).all()
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from armloop.api.model import Model
 from armloop.api.reading import as_logs
 from armloop.api.score import logs_for
-from armloop.api.shown import page
+from armloop.api.shown import displayed, page
 from armloop.diagnosis import Diagnosis as Found
 from armloop.diagnosis import close
 from armloop.diagnosis import diagnose as run
@@ -70,7 +70,7 @@ class Diagnosis:
         """The residual of the strongest joint over time, before and after, a matplotlib figure."""
         from armloop.reports.plots import residual_time_figure
 
-        return residual_time_figure(self._found)
+        return displayed(residual_time_figure(self._found))
 
     def __repr__(self) -> str:
         found = ", ".join(added.effect.label() for added in self.effects)

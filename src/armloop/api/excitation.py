@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armloop.api.reading import as_arm
-from armloop.api.shown import page
+from armloop.api.shown import displayed, page
 from armloop.arm import Arm, load_arm
 from armloop.design import Excitation, Settings, baseline_noise
 from armloop.design import excite as run
@@ -45,7 +45,7 @@ class Reference:
         """Positions, velocities and accelerations over a period, a matplotlib figure."""
         from armloop.reports.plots.excitation import reference_figure
 
-        return reference_figure(self.result)
+        return displayed(reference_figure(self.result))
 
     def report(self, path: str | Path) -> Path:
         """Write the page of ``armloop excite --report``, without a network."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from armloop.api.reading import as_arm, as_logs
 from armloop.api.score import Score, evaluate, samples_for
-from armloop.api.shown import page
+from armloop.api.shown import displayed, page
 from armloop.arm import Arm
 from armloop.errors import InputError
 from armloop.export import Exported, states_of
@@ -67,7 +67,7 @@ class Model(ReconstructedModel):
             raise InputError(
                 "plot: give a log; a model read from its file does not know those it was made of"
             )
-        return torque_figure(self, samples_for(self, chosen), seconds)
+        return displayed(torque_figure(self, samples_for(self, chosen), seconds))
 
     def report(self, path: str | Path) -> Path:
         """Write the page of ``armloop reconstruct --report``, without a network.

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armloop.api.shown import page
+from armloop.api.shown import displayed, page
 from armloop.arm import Arm
 from armloop.errors import InputError
 from armloop.model import ReconstructedModel
@@ -44,7 +44,7 @@ class Tracking:
         """Reference, positions and errors of each joint, a matplotlib figure."""
         from armloop.reports.plots import tracking_figure
 
-        return tracking_figure(self.results)
+        return displayed(tracking_figure(self.results))
 
     def report(self, path: str | Path) -> Path:
         """Write the figure and the tables as a page of its own, without a network."""

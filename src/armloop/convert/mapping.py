@@ -18,12 +18,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
 
 from armloop.convert.units import FACTORS, canonical
 from armloop.errors import InputError
+from armloop.reading import read_yaml
+from armloop.schemas.checking import Misfit, checked
+from armloop.schemas.types import MOST_JOINTS, Finite
 
 SCHEMA = "armloop/map/1"
 UNSAID = "?"
@@ -37,7 +40,7 @@ class TimeMap(msgspec.Struct, forbid_unknown_fields=True):
 
     column: str | None = None
     unit: str | None = None
-    rate: float | None = None
+    rate: Annotated[float, msgspec.Meta(gt=0, lt=1e6, description="Hz")] | None = None
 
 
 class QuantityMap(msgspec.Struct, forbid_unknown_fields=True):
@@ -45,18 +48,19 @@ class QuantityMap(msgspec.Struct, forbid_unknown_fields=True):
 
     columns: list[str] | str
     unit: str | list[str] | None = None
-    sign: float | list[float] = 1.0
-    offset: float | list[float] = 0.0
-    gains: float | list[float] | None = None
+    sign: Finite | list[Finite] = 1.0
+    offset: Finite | list[Finite] = 0.0
+    gains: Finite | list[Finite] | None = None
 
     def names(self) -> list[str]:
-        """The columns' names, with a range written out."""
+        """The columns' names, with a range written out, to one more than any arm has."""
         if not isinstance(self.columns, str):
             return self.columns
         found = _RANGE.search(self.columns)
         if found is None:
             return [self.columns]
-        first, last = int(found[1]), int(found[2])
+        first = int(found[1])
+        last = min(int(found[2]), first + MOST_JOINTS)
         before, after = self.columns[: found.start()], self.columns[found.end() :]
         return [f"{before}{k}{after}" for k in range(first, last + 1)]
 
@@ -90,22 +94,12 @@ def read_map(path: str | Path) -> Mapping:
     Raises:
         InputError: the file is missing or no map: one line that names the field.
     """
-    path = Path(path)
     try:
-        text = path.read_bytes()
-    except OSError as error:
+        mapping = checked(read_yaml(path, InputError, "a map, a YAML file"), Mapping)
+    except Misfit as misfit:
         raise InputError(
-            f"{path}: cannot be read ({error.strerror}); --map takes the path of a YAML file"
-        ) from error
-    # The standard YAML reader is loaded by msgspec when it is asked.
-    import msgspec.yaml
-
-    try:
-        mapping = msgspec.yaml.decode(text, type=Mapping)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path}: no map: {error}; `armloop convert SOURCE --suggest` writes one to start from"
-        ) from error
+            f"{path}: no map: {misfit}; `armloop convert SOURCE --suggest` writes one to start from"
+        ) from None
     check_map(mapping, str(path))
     return mapping
 
@@ -116,10 +110,10 @@ def check_map(mapping: Mapping, where: str) -> None:
         raise InputError(f"{where}: schema is {mapping.schema!r}; it must be {SCHEMA}")
     if (mapping.time.column is None) == (mapping.time.rate is None):
         raise InputError(f"{where}: time: give either column (with its unit) or rate in Hz")
-    if mapping.time.rate is not None and not 0 < mapping.time.rate < 1e6:
-        raise InputError(f"{where}: time: rate is {mapping.time.rate:g}; it must be a positive number of Hz")
     _check_unit(mapping.time.unit, "time", where)
     n = mapping.n
+    if not 1 <= n <= MOST_JOINTS:
+        raise InputError(f"{where}: q: give the columns of 1 to {MOST_JOINTS} joints")
     if mapping.joints is not None and len(mapping.joints) != n:
         raise InputError(
             f"{where}: joints: {len(mapping.joints)} names for {n} columns of q; give one per column"

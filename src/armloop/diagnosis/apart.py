@@ -66,7 +66,7 @@ class Stage:
         q, v, vdot = reference.evaluate(t)
         motion = Motion(t, q, v, vdot, np.array([0]))
         still = np.abs(v) <= _SLOW * np.abs(v).max(axis=0)
-        reach = 0 if samples.cutoff_hz <= 0 else int(np.ceil(0.5 / (samples.cutoff_hz * period)))
+        reach = int(np.ceil(samples.reach / period))
         moving = ~binary_dilation(still, np.ones((2 * reach + 1, 1)))
         made = Samples(motion, np.zeros_like(q), moving, period, samples.cutoff_hz)
         rows = moving & independent_rows(made)[:, None]

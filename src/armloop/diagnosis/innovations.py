@@ -83,7 +83,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     ]
     if evidence.samples.cutoff_hz > 0:
         # An average holds so many independent values.
-        own = np.maximum(own, np.array(noise) / np.sqrt(max(2 * evidence.samples.cutoff_hz * WINDOW, 1.0)))
+        own = np.maximum(own, np.array(noise) / np.sqrt(max(WINDOW / evidence.samples.reach, 1.0)))
     tau = smooth(evidence.samples, model.predict(motion) if predicted is None else predicted)
     rate = np.zeros_like(tau)
     for run in motion.runs():

@@ -20,8 +20,8 @@ Mask = NDArray[np.bool_]
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
-#: The filter has smeared this much of an event's edges, s; interval and size are found in turn so many times.
-_SMEARED, _REFINEMENTS = 0.05, 3
+#: Interval and size are found in turn so many times.
+_REFINEMENTS = 3
 #: What was there must explain this part of the event's energy …
 _EXPLAINED = 0.5
 #: … and a torque on one joint, or a force on the tool, is it if nothing with more freedom explains so much more.
@@ -131,7 +131,7 @@ def _trial(evidence: Evidence, residual: Array, weight: Array, burst: slice, kin
         return None
     size = _size(columns, y)
     error = _size_error(columns, size, y - columns @ size, pieces)
-    edge = max(evidence.samples.period, 0.075)
+    edge = max(evidence.samples.period, 1.5 * evidence.samples.reach)
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
     parameters = interval(float(part.time[0]), float(part.time[-1]), edge, part.q[0], unit)
@@ -165,7 +165,8 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
     length = float(motion.time[burst.stop - 1] - motion.time[burst.start])
     rate = (burst.stop - burst.start) / max(length, 1e-9)
-    inner, margin = round(min(_SMEARED, 0.2 * length) * rate), round(PAUSE * rate)
+    # The filter has smeared an event's edges.
+    inner, margin = round(min(evidence.samples.reach, 0.2 * length) * rate), round(PAUSE * rate)
     middle = slice(burst.start + inner, burst.stop - inner)
     if middle.stop - middle.start < 4:
         return burst

@@ -78,10 +78,10 @@ def independent_blocks(
         covered += samples.motion.samples * samples.period
         parts.append(_middle(samples, _SAMPLES // len(some)))
     if not parts:
-        return Apart(seconds, 0.5 / how.cutoff_hz, 0.0)
+        return Apart(seconds, how.reach, 0.0)
     covered *= len(logs) / len(some)
     correlation = _correlation(arm, parts)
-    margin = max(0.5 / how.cutoff_hz, correlation)
+    margin = max(how.reach, correlation)
     longest = max(covered / (folds * FEWEST_BLOCKS), _SHORTEST / how.cutoff_hz)
     length = min(max(seconds, _LENGTH * margin), longest)
     return Apart(length, min(margin, length / _LENGTH), correlation)

@@ -88,7 +88,7 @@ def _inside(motion: Motion, numbers: Index, samples: Samples) -> Mask:
     """(N,) samples further than half a period of the filter from the borders of blocks within their run."""
     inside = np.ones(motion.samples, dtype=bool)
     if samples.cutoff_hz > 0:
-        reach = at_least(0.5 / (samples.cutoff_hz * samples.period))
+        reach = at_least(samples.reach / samples.period)
         border = np.setdiff1d(np.flatnonzero(np.diff(numbers)) + 1, motion.starts)
         near = (border[:, None] + np.arange(-reach, reach)).ravel()
         inside[near[(near >= 0) & (near < motion.samples)]] = False

@@ -81,12 +81,9 @@ class Usable:
         """(M, c) values at the usable samples of x (N, c), filtered like the torque; runs without any are left out."""
         if self.whole.cutoff_hz <= 0:
             return x[self.places]
-        low_pass, parts = LowPass(self.whole.cutoff_hz, self.whole.period), [x[:0]]
-        for run in self.whole.motion.runs():
-            own = self.places[slice(*np.searchsorted(self.places, (run.start, run.stop)))]
-            if len(own):
-                parts.append(low_pass(x[run])[own - run.start])
-        return np.concatenate(parts)
+        runs = self.whole.motion.runs()
+        used = [run for run in runs if np.diff(np.searchsorted(self.places, (run.start, run.stop)))[0]]
+        return LowPass(self.whole.cutoff_hz, self.whole.period).each(x, used)[self.places]
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,8 +116,7 @@ class Training:
     @property
     def repeats(self) -> float:
         """Neighbouring samples that tell no more than one does."""
-        samples = self.reference
-        return max(1.0, 0.5 / (samples.cutoff_hz * samples.period)) if samples.cutoff_hz > 0 else 1.0
+        return max(1.0, self.reference.reach / self.reference.period)
 
     def slowest(self, part: float) -> Array:
         """(n,) quantile of the speeds that are fitted."""

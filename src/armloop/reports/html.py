@@ -151,7 +151,7 @@ def svg(figure: Figure | str) -> str:
         body = body.replace(color, variable)
     # the page decides the width; the view box keeps the proportions
     body = re.sub(r' (?:width|height)="[\d.]+pt"', "", body, count=2)
-    width = f"max-width:{_REM_PER_INCH * figure.get_figwidth():.1f}rem"
+    width = f"--width:{_REM_PER_INCH * figure.get_figwidth():.1f}rem"
     return body.replace("<svg ", f'<svg style="{width}" role="img" ', 1)
 
 

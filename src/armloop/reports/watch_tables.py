@@ -31,8 +31,11 @@ def course_words(alarm: dict[str, Any]) -> str:
     words = {"step": "a step", "drift": "a drift", "cannot_tell": "step or drift: cannot tell yet"}[
         how["form"]
     ]
-    rate = "" if how["per_day"] is None else f" of {how['per_day']:.3g} per day"
-    return words + rate
+    if how["per_day"] is None:
+        return words
+    parameters = list(alarm["effects"][0]["parameters"].values()) if alarm["effects"] else []
+    unit = f" {parameters[0]['unit']}" if len(parameters) == 1 else ""
+    return f"{words} of {how['per_day']:.3g}{unit} per day"
 
 
 def delay_words(alarm: dict[str, Any]) -> str:
@@ -57,11 +60,11 @@ def alarms_table(alarms: list[dict[str, Any]], title: str | None = None) -> Tabl
             moment(alarm["when"]),
             named(alarm),
             course_words(alarm),
-            delay_words(alarm),
+            f"{alarm['delay']['units']} ({60 * alarm['delay']['operation_hours']:.3g} min)",
         ]
         for alarm in alarms
     ]
-    headers = ["arm", "since", "alarm", "what", "how", "found after"]
+    headers = ["arm", "since", "alarm", "what", "how", "logs until found"]
     return make_table(headers, rows, title, left=(0, 1, 2, 3, 4, 5))
 
 

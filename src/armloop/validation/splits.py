@@ -91,7 +91,7 @@ def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np
     Args:
         time: (N,) of the samples in the time of the log.
     """
-    margin = 0.5 / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
+    margin = samples.reach
     rows = np.zeros(len(time), dtype=bool)
     for start, end in blocks:
         # a sample on the edge is inside, however its stamp is rounded

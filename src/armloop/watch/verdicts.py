@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 #: Healthy units before a change whose normal equations say what was there before, and seconds of logs that are diagnosed.
 _BEFORE, _DIAGNOSED = 40, 150.0
 #: Friction falls by a fifth as joints warm (published for UR3 and UR5); a change within this part may be that.
-_WARM_UP = "friction falls by up to a fifth as a joint warms up; record `temperature` or `since_start` to tell the two apart"
+_WARM_UP = "friction falls by up to a fifth as a joint warms up; columns temperature or since_start would tell the two apart"
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,8 @@ def _equations(tested: Tested, index: Sequence[int], healthy: int) -> Normal:
 
 def _label(stream: Stream) -> str:
     places = [str(j) for j in (stream.joint, stream.other_joint) if j is not None]
-    return f"{stream.name} at joint {' and '.join(places)}" if places else stream.name
+    name = stream.name.replace("_", " ")
+    return f"{name} at joint {' and '.join(places)}" if places else name
 
 
 def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm) -> int:

@@ -39,7 +39,7 @@ def heat_figure(
     part = np.clip(np.nan_to_num(evidence, nan=0.0) / limit[:, None], 0.0, 1.0)
     image = axes.imshow(part, cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest")
     for a, e in np.argwhere(alarmed):
-        axes.plot(e, a, "o", color=INK, markersize=5)
+        axes.plot(e, a, "o", color="white", markeredgecolor=INK, markersize=6)
     polish(axes, grid="both")
     axes.grid(False)
     axes.set_yticks(range(len(arms)), list(arms))

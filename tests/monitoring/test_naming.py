@@ -1,0 +1,57 @@
+"""What is named from sums must be more than rounding errors, and must not be how warm the arm is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from operation import healthy_model
+
+from armloop.monitoring.catalogue import Column, stays_nonlinear, watched
+from armloop.monitoring.naming import Normal, name_change
+from armloop.monitoring.warmth import without_warmth
+
+
+def test_only_a_body_needs_all_of_its_columns() -> None:
+    model = healthy_model()
+    coefficients = {"payload": 10, "gravity_tilt": 8}
+    curved = {e.name for e, _ in watched(model) if stays_nonlinear(e, coefficients.get(e.name, 2))}
+    assert curved == {"payload"}
+
+
+def test_a_column_of_rounding_errors_explains_nothing() -> None:
+    # what an encoder's offset at a vertical first axis does to the weight is zero but for rounding
+    columns = (Column("encoder_offset", 1, None, 0), Column("coulomb_friction", 2, None, 0))
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((8, 100, 2)) * [1e-13, 1.0]
+    u = 0.5 * X[:, :, 1] + 0.2 * rng.standard_normal((8, 100)) + 3e12 * X[:, :, 0]
+    normal = Normal(
+        np.einsum("unp,unq->upq", X, X), np.einsum("unp,un->up", X, u), np.einsum("un,un->u", u, u)
+    )
+    named = name_change(healthy_model().arm, columns, None, normal)
+    assert [one.place[0] for one in named] == ["coulomb_friction"]
+
+
+def test_what_warmth_makes_of_friction_is_taken_out_of_the_sums() -> None:
+    rng = np.random.default_rng(0)
+    columns = (
+        Column("viscous_friction", 1, None, 0),
+        Column("coulomb_friction", 1, None, 0),
+        Column("joint_spring", 1, None, 0),
+    )
+    warmth = rng.uniform(-1, 1, (24, 1))
+    level, slope = np.array([1.0, 0.5, 2.0]), np.array([-0.3, -0.1, 0.0])
+    X = rng.standard_normal((24, 200, 3))
+    u = np.einsum("unp,up->un", X, level + slope * warmth)
+    whole = Normal(
+        np.einsum("unp,unq->upq", X, X), np.einsum("unp,un->up", X, u), np.einsum("un,un->u", u, u)
+    )
+    healthy = replace(whole, gram=whole.gram[:12], moment=whole.moment[:12], energy=whole.energy[:12])
+    later = replace(whole, gram=whole.gram[12:], moment=whole.moment[12:], energy=whole.energy[12:])
+    cleared = without_warmth(columns, healthy, warmth[:12], later, warmth[12:])
+    # without the dependence every unit has the same coefficients; the ridge leaves a thousandth of it
+    for gram, moment, energy in zip(cleared.gram, cleared.moment, cleared.energy, strict=True):
+        found = np.linalg.solve(gram, moment)
+        assert found == pytest.approx(level, abs=2e-3)
+        assert energy == pytest.approx(found @ gram @ found, rel=1e-3)
+    same = without_warmth(columns, healthy, 0 * warmth[:12], later, warmth[12:])
+    assert same is later
