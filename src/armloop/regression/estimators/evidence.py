@@ -31,6 +31,8 @@ Move = tuple[float, Index]
 _SCREENED = 120
 #: Terms of which two or three are exchanged: those that cost least to drop.
 _EXCHANGED = 12
+#: So many exchanges are weighed at a time.
+_AT_ONCE = 4
 #: Area that two unit columns span, squared, below which what they would gain together is round-off.
 _NEARLY_ONE = 1e-7
 _RIDGE = 1e-12
@@ -68,20 +70,30 @@ class _Fit:
         """(s,) by how much dropping each term alone would raise the squared error."""
         return np.asarray(self.beta**2 / np.diag(self.P))
 
-    def without(self, some: Index) -> tuple[float, Array, Array, Array]:
-        """Squared error without some terms (d,); of each column the size outside the rest, the product with the
-        residual that is then left, and (d, p) what turns it into the part of other columns outside the rest."""
-        back = np.linalg.inv(self.P[np.ix_(some, some)])
-        onto, beta = self.onto[:, some], self.beta[some]
-        spread = back @ onto.T
-        own = self.own + np.einsum("pd,dp->p", onto, spread)
-        return self.rss + float(beta @ back @ beta), own, self.left + beta @ spread, spread
+    def without(self, some: Index) -> tuple[Array, Array, Array, Array]:
+        """Least squares without some terms, for K choices of d of them (K, d).
+
+        Returns:
+            (K,) squared error; (K, p) of each column the size outside the rest, and the product with the residual that
+            is then left; (K, d, p) what turns it into the part of other columns outside the rest.
+        """
+        back = np.linalg.inv(self.P[some[:, :, None], some[:, None, :]])
+        onto, beta = self.onto.T[some], self.beta[some]
+        spread = back @ onto
+        rss = self.rss + np.einsum("kd,kde,ke->k", beta, back, beta)
+        return (
+            rss,
+            self.own + np.einsum("kdp,kdp->kp", onto, spread),
+            self.left + np.einsum("kd,kdp->kp", beta, spread),
+            spread,
+        )
 
     def between(self, some: Index, spread: Array, columns: Index) -> Array:
-        """(c, c) products of columns outside the support without some of its terms."""
-        G = self.moments.G[np.ix_(columns, columns)]
-        G = G - self.onto[columns] @ self.moments.G[np.ix_(self.support, columns)]
-        return np.asarray(G + self.onto[np.ix_(columns, some)] @ spread[:, columns])
+        """(K, c, c) products of columns (K, c) outside the support without some of its terms."""
+        G = self.moments.G[columns[:, :, None], columns[:, None, :]]
+        G = G - self.onto[columns] @ self.moments.G[self.support[None, :, None], columns[:, None, :]]
+        part = np.take_along_axis(spread, columns[:, None, :], axis=2)
+        return np.asarray(G + self.onto[columns[:, :, None], some[:, None, :]] @ part)
 
 
 def _gains(own: Array, left: Array) -> Array:
@@ -90,15 +102,27 @@ def _gains(own: Array, left: Array) -> Array:
 
 
 def _pair_gains(G: Array, left: Array) -> Array:
-    """(c, c) by how much two columns together would lower the squared error."""
-    spanned = np.diag(G) < DEPENDENT
-    own, left = np.where(spanned, 0.0, np.diag(G)), np.where(spanned, 0.0, left)
-    square = np.outer(own, own)
-    area = square - G**2
-    gains = np.outer(left**2, own) + np.outer(own, left**2) - 2 * np.outer(left, left) * G
-    gains = np.where(area > _NEARLY_ONE * square, gains / np.maximum(area, 1e-300), 0.0)
-    np.fill_diagonal(gains, 0.0)
-    return gains
+    """(K, c, c) by how much two columns together would lower the squared error, from (K, c, c) and (K, c).
+
+    With the columns' correlation r and what each would explain alone, z²: (z_i² + z_j² - 2 r z_i z_j) / (1 - r²).
+    """
+    size = np.einsum("kcc->kc", G)
+    spanned = size < DEPENDENT
+    scale = np.where(spanned, 0.0, 1 / np.sqrt(np.maximum(size, DEPENDENT)))
+    z = left * scale
+    r = G * scale[:, :, None]
+    r *= scale[:, None, :]
+    area = 1.0 - r * r
+    area[spanned] = 0.0
+    area.transpose(0, 2, 1)[spanned] = 0.0
+    area[:, np.arange(G.shape[1]), np.arange(G.shape[1])] = 0.0
+    r *= -2 * z[:, :, None]
+    r *= z[:, None, :]
+    r += (z * z)[:, :, None]
+    r += (z * z)[:, None, :]
+    r[area <= _NEARLY_ONE] = 0.0
+    r /= np.maximum(area, _NEARLY_ONE)
+    return r
 
 
 class _Search:
@@ -168,29 +192,42 @@ class _Search:
 
     def _exchange(self, fit: _Fit, removed: int, added: int) -> Move:
         """The best exchange of so many terms for one or two others."""
-        best: Move = (np.inf, fit.support)
         weakest = np.argsort(fit.losses())[: None if removed == 1 else _EXCHANGED]
-        for some in combinations(weakest, removed):
-            places = np.array(some, dtype=np.intp)
-            rss, own, left, spread = fit.without(places)
-            gains = _gains(own, left)
-            rest = np.delete(fit.support, places)
-            gains[rest] = 0.0
-            if added == 1:
-                gains[fit.support[places]] = 0.0
-                chosen = np.array([np.argmax(gains)])
-                gain = float(gains[chosen[0]])
-            else:
-                screened = np.argsort(gains)[-_SCREENED:]
-                pairs = _pair_gains(fit.between(places, spread, screened), left[screened])
-                chosen = screened[list(np.unravel_index(int(np.argmax(pairs)), pairs.shape))]
-                gain = float(pairs.max())
-            if gain <= 0:
-                continue
-            score = float(self.problem.criterion(max(rss - gain, 0.0), len(rest) + added))
-            if score < best[0]:
-                best = (score, np.concatenate([rest, chosen]))
-        return best
+        if len(weakest) < removed:
+            return np.inf, fit.support
+        some = np.array(list(combinations(weakest, removed)), dtype=np.intp)
+        parts = [self._best(fit, some[k : k + _AT_ONCE], added) for k in range(0, len(some), _AT_ONCE)]
+        return min(parts, key=_score)
+
+    def _best(self, fit: _Fit, some: Index, added: int) -> Move:
+        """The best exchange among K choices (K, d) of terms that go."""
+        rss, own, left, spread = fit.without(some)
+        gains = _gains(own, left)
+        if added == 1:
+            gains[:, fit.support] = 0.0
+            chosen = np.argmax(gains, axis=1)[:, None]
+            gain = np.take_along_axis(gains, chosen, axis=1)[:, 0]
+        else:
+            taken = fit.support[some]
+            again = np.take_along_axis(gains, taken, axis=1)
+            gains[:, fit.support] = 0.0
+            np.put_along_axis(gains, taken, again, axis=1)
+            screened = np.argsort(gains, axis=1)[:, -_SCREENED:]
+            pairs = _pair_gains(
+                fit.between(some, spread, screened), np.take_along_axis(left, screened, axis=1)
+            )
+            flat = pairs.reshape(len(some), -1)
+            best = np.argmax(flat, axis=1)
+            gain = np.take_along_axis(flat, best[:, None], axis=1)[:, 0]
+            both = np.column_stack(np.divmod(best, pairs.shape[2]))
+            chosen = np.take_along_axis(screened, both, axis=1)
+        if not (gain > 0).any():
+            return np.inf, fit.support
+        # All have as many terms: the least error is the best.
+        k = int(np.argmin(np.where(gain > 0, rss - gain, np.inf)))
+        rest = np.delete(fit.support, some[k])
+        score = self.problem.criterion(max(float(rss[k] - gain[k]), 0.0), len(rest) + added)
+        return float(score), np.concatenate([rest, chosen[k]])
 
 
 def _score(move: Move) -> float:
