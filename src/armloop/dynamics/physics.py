@@ -86,9 +86,10 @@ class PhysicsChecks:
         """What does not hold, where, and by how much: a line each."""
         lines = []
         if not self.definite:
+            share = f" at {self.negative:.1%} of the postures" if self.negative else " everywhere"
             lines.append(
-                f"M(q) is not positive definite at {self.negative:.1%} of the postures within the joint limits: its "
-                f"smallest eigenvalue is {self.least:.3g} at q = {_posture(self.least_at)}"
+                f"M(q) is not positive definite{share} within the joint limits: its smallest eigenvalue is "
+                f"{self.least:.3g} at q = {_posture(self.least_at)}"
             )
         if not self.symmetric:
             lines.append(
