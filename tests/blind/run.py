@@ -8,6 +8,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --arms 20 --cases 16
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
     python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
+    python tests/blind/run.py --measured ../shared/data   effects added to measured logs of three arms
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
 
@@ -26,6 +27,7 @@ from typing import Any
 
 from generate import generate
 from judge import print_verdicts
+from measured_generate import SOURCES, generate_measured
 from threadpoolctl import threadpool_limits
 
 from armloop.drake_systems.scenarios import load_plan
@@ -35,10 +37,13 @@ from armloop.keeping import Kept
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path, outside: bool = False) -> str:
+def make(seed: int, cases: int, place: Path, outside: bool = False, measured: Path | None = None) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
+        if measured is not None:
+            generate_measured(seed, cases, measured, place / "logs", place / "answers")
+            return ""
         if outside:
             sys.path.insert(0, str(Path(__file__).parents[1]))
             from outside_generate import generate_outside
@@ -75,6 +80,13 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=16, help="runs per arm")
     parser.add_argument("--first", type=int, default=1, help="seed of the first arm")
     parser.add_argument("--outside", action="store_true", help="arms simulated by MuJoCo instead of our own")
+    parser.add_argument(
+        "--measured",
+        default=None,
+        metavar="DATA",
+        type=Path,
+        help="folder of measured logs to add effects to",
+    )
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--keep", default=None, metavar="DIR", help="keep logs, models and answers here")
     parser.add_argument("--again", default=None, metavar="DIR", help="judge the kept logs of DIR once more")
@@ -91,9 +103,11 @@ def main() -> int:
         kept = Kept(Path(options.keep) if options.keep and not options.again else None, scripts)
         if not options.again:
             seeds = range(options.first, options.first + options.arms)
+            if options.measured is not None:
+                seeds = range(1, min(options.arms, len(SOURCES)) + 1)
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
-                s: workers.submit(make, s, options.cases, place, options.outside)
+                s: workers.submit(make, s, options.cases, place, options.outside, options.measured)
                 for s in seeds
                 if reasons[s] is None
             }
@@ -103,7 +117,7 @@ def main() -> int:
                     kept.put(["made", seed, options.cases], reasons[seed])
                 if reasons[seed]:
                     _say(f"arm {seed} cannot be used: {reasons[seed]}")
-            _say(f"{options.cases} runs of each of {len(seeds)} arms are simulated")
+            _say(f"{options.cases} runs of each of {len(seeds)} arms are made")
         folders = sorted((place / "logs").iterdir())
         folders = [folder for folder in folders if list(folder.glob("run_*.csv"))]
         found = {folder.name: kept.get(["judged", folder.name, options.cases]) for folder in folders}
