@@ -73,9 +73,9 @@ def test_an_inherited_mistake_is_mended(data: Data, steps: Found) -> None:
     assert [report.step for report in good.reports] == [1, 2, 3]
     assert {component.step for component in good.components} == {1, 2, 3}
     # standard errors have to know that every sample told something of every term
-    (fit,) = fitted_rows(data, good, shared=False)
+    (fit,) = fitted_rows(data.reference, good, shared=False)
     assert fit.steps == (1, 2, 3)
-    assert len(fitted_rows(data, bad, shared=False)) == 3
+    assert len(fitted_rows(data.reference, bad, shared=False)) == 3
 
 
 def test_other_estimators_and_unfiltered_samples_are_left_alone(data: Data, steps: Found) -> None:
