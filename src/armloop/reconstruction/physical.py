@@ -27,9 +27,8 @@ Array = NDArray[np.float64]
 
 #: Postures of the motion, and more within the joint limits, at which M(q) is kept positive definite from the start.
 POSTURES, _BEYOND = 60, 240
-#: How often postures that violate it nevertheless are added, and how many of the worst; of so many searches, each from
-#: so many postures, none must find one.
-_SEARCHES, _ADDED, _CLEAN, _TRIED = 12, 20, 3, 1000
+#: Searches for a posture that violates it nevertheless, postures each begins with, and the worst that are added.
+_SEARCHES, _TRIED, _ADDED = 8, 400, 20
 #: Part of the joints' mean inertias by which M(q) stays clear of a singular matrix; how negative counts as violated.
 _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
@@ -155,12 +154,18 @@ def _kept_positive(
             return found
 
         theta, _ = constrained_least_squares(solution.G, solution.b, start, recorded, most)
-        violated = None if rng is None else _violated(body, theta[:r], rng)
-        if violated is None:
+        if rng is None:
             break
-        mass = np.concatenate([mass, body.mass(violated)])
+        q = rng.uniform(body.low, body.high, (_TRIED, len(body.low)))
+        own = body.mass(q)
+        least = np.asarray(np.linalg.eigvalsh(own @ theta[:r])[:, 0], dtype=float)
+        value, at = lowest(partial(_mass, body, theta[:r]), body.low, body.high, q, least, rng)
+        if value > 0:
+            break
+        worst = np.argsort(least)[:_ADDED]
+        mass = np.concatenate([mass, own[worst], body.mass(at[None])])
     else:
-        raise ArithmeticError(f"M(q) is still negative somewhere after {_SEARCHES} searches")
+        raise ArithmeticError(f"M(q) is still negative at q = {at} after {_SEARCHES} searches")
     A = np.array(rows).reshape(-1, len(theta))
     sizes = np.maximum(np.abs(A * theta).sum(axis=1, keepdims=True), 1e-300)
     tight = (A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300))[
@@ -169,18 +174,6 @@ def _kept_positive(
     # A coefficient held at zero is a condition, too, though no row of several.
     held = np.count_nonzero(np.abs(theta[:r][body.positive]) <= _SLACK)
     return theta, (int(np.linalg.matrix_rank(tight, tol=1e-3)) if len(tight) else 0) + int(held)
-
-
-def _violated(body: Body, coefficients: Array, rng: np.random.Generator) -> Array | None:
-    """(P, n) the postures at which M is most negative, the worst first; None where no search finds any."""
-    for _ in range(_CLEAN):
-        q = rng.uniform(body.low, body.high, (_TRIED, len(body.low)))
-        mass = partial(_mass, body, coefficients)
-        least = np.asarray(np.linalg.eigvalsh(mass(q))[:, 0], dtype=float)
-        value, at = lowest(mass, body.low, body.high, q, least, rng)
-        if value <= 0:
-            return np.concatenate([at[None], q[np.argsort(least)[:_ADDED]]])
-    return None
 
 
 def _mass(body: Body, coefficients: Array, q: Array) -> Array:
