@@ -56,7 +56,7 @@ def run(arm: str, seed: int, clean: bool) -> Case:
         effects = [] if hidden is None else [hidden]
         write_log(log_file, measure_run(plant.arm, plant.config, seed + 500, effects=effects))
         diagnosis = diagnose(load_model(model_file), [read_log(log_file)])
-    found = [(f.effect.name, f.effect.joint) for f in diagnosis.outcome.found]
+    found = diagnosis.named
     truth = [] if hidden is None else [(hidden.name, hidden.joint)]
     errors = diagnosis.errors()
     ratio = [np.array(errors[key]) / np.array(errors["noise_floor"]) for key in ("before", "after")]

@@ -233,7 +233,7 @@ def _difference(urdf: Path, run: Smooth, mass: float = 0.0, tilt: float = 0.0) -
     joints = [plant.get_joint(i) for i in plant.GetJointIndices(arm)]
     moving = [joint for joint in joints if joint.num_velocities() == 1]
     where = [joint.velocity_start() for joint in moving]
-    last = moving[-1].child_body()
+    last, world = moving[-1].child_body(), plant.world_frame()
     out = np.zeros_like(run.q)
     for i in range(len(run.time)):
         q, v = np.zeros(plant.num_positions()), np.zeros(plant.num_velocities())
@@ -243,22 +243,9 @@ def _difference(urdf: Path, run: Smooth, mass: float = 0.0, tilt: float = 0.0) -
         if tilt:
             out[i] = -_weight(plant, context, turned)[where]
             continue
-        J = plant.CalcJacobianTranslationalVelocity(
-            context,
-            JacobianWrtVariable.kV,
-            last.body_frame(),
-            point,
-            plant.world_frame(),
-            plant.world_frame(),
-        )
-        bias = plant.CalcBiasTranslationalAcceleration(
-            context,
-            JacobianWrtVariable.kV,
-            last.body_frame(),
-            point,
-            plant.world_frame(),
-            plant.world_frame(),
-        )
+        at = (context, JacobianWrtVariable.kV, last.body_frame(), point, world, world)
+        J = plant.CalcJacobianTranslationalVelocity(*at)
+        bias = plant.CalcBiasTranslationalAcceleration(*at)
         a = J[:, where] @ run.vdot[i] + bias[:, 0]
         out[i] = mass * (J[:, where].T @ (a - g))
     return out

@@ -1,10 +1,14 @@
 """The effect of the demonstration: random in kind, place and size, the same for the same seed."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from armloop.arm import load_arm
+from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.effects import EFFECTS as LISTED
+from armloop.loop.run import _is_right
 from armloop.loop.undeclared import EFFECTS, draw
 
 
@@ -34,3 +38,18 @@ def test_sizes_vary_fourfold():
     effects = [draw(arm, seed) for seed in range(400)]
     levels = [e.parameters["level"] for e in effects if e.name == "coulomb_friction" and e.joint == 2]
     assert 2.5 < np.max(levels) / np.min(levels) <= 4.0
+
+
+@pytest.mark.parametrize(
+    ("named", "unlisted", "right"),
+    [
+        ([("coulomb_friction", 2)], None, True),
+        ([("coulomb_friction", 3)], None, False),
+        ([("coulomb_friction", 2), ("external_torque", 2)], None, False),  # an event that nobody caused
+        ([("coulomb_friction", 2)], "a law", False),
+        ([], None, False),
+    ],
+)
+def test_a_verdict_is_right_with_the_effect_and_nothing_beside_it(named, unlisted, right):
+    hidden = UndeclaredEffect("coulomb_friction", 2, {"level": 0.5})
+    assert _is_right(SimpleNamespace(named=named, unlisted=unlisted), hidden) is right

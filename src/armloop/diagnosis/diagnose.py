@@ -63,6 +63,13 @@ class Diagnosis:
         return self.standing.reasons
 
     @property
+    def named(self) -> list[tuple[str, int | None]]:
+        """Name and joint of everything found, events last."""
+        effects = [found.effect for found in self.outcome.found]
+        effects += [contact.added.effect for contact in self.contacts]
+        return [(effect.name, effect.joint) for effect in effects]
+
+    @property
     def samples(self) -> Samples:
         """The run, conditioned."""
         return self.evidence.samples

@@ -55,7 +55,7 @@ class LoopResult:
         tracking: PID, PID + Step I, PID + Step III on the arm as it was collected.
         diagnosis: of the second measured run.
         undeclared: the effect that was put into the plant, as revealed after the verdict.
-        right: the verdict names exactly that effect at its joint.
+        right: the verdict names exactly that effect at its joint, and no event beside it.
         tracking_before, tracking_after: PID + Step III on the arm with the effect, with the model as
             collected and with the augmented one.
         seconds: wall time per stage.
@@ -199,8 +199,7 @@ def _diagnose(folder: Path, progress: Progress) -> Diagnosis:
 
 
 def _is_right(diagnosis: Diagnosis, undeclared: UndeclaredEffect) -> bool:
-    found = [(f.effect.name, f.effect.joint) for f in diagnosis.outcome.found]
-    return found == [(undeclared.name, undeclared.joint)] and diagnosis.unlisted is None
+    return diagnosis.named == [(undeclared.name, undeclared.joint)] and diagnosis.unlisted is None
 
 
 def _revealed(undeclared: UndeclaredEffect) -> dict[str, Any]:
