@@ -9,10 +9,10 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.components import RigidBody, SparseTerms
-from armloop.diagnosis import diagnose
+from armloop.diagnosis import contacts, diagnose
 from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.innovations import contradiction
+from armloop.diagnosis.innovations import contradiction, deviations
 from armloop.diagnosis.pushes import Contact
 from armloop.effects import Estimate, effect
 from armloop.kinematics import nominal_parameters
@@ -170,3 +170,50 @@ def test_a_model_is_unsure_where_its_mass_matrix_is_not_symmetric(model: Reconst
     unsure = contradiction(replace(model, components=(*model.components, lopsided)), motion)
     assert unsure[:, 0] == pytest.approx(0.15 * motion.vdot[:, 1], abs=1e-12)
     assert unsure[:, 1] == pytest.approx(-0.15 * motion.vdot[:, 0], abs=1e-12)
+
+
+def test_a_model_that_contradicts_itself_is_unsure_by_as_much(model: ReconstructedModel) -> None:
+    factors = Factors(3)
+    index = np.array([[0, factors.names.index("vdot2")]], dtype=np.intp)
+    terms = SparseTerms(3, index, np.array([[2.0, 0.0, 0.0]]))
+    lopsided = replace(model, components=(*model.components, terms))
+    evidence = Evidence.of(lopsided, condition([run(17, 10.0)], model.conditioning), [])
+    unsure = np.abs(contradiction(lopsided, evidence.samples.motion))
+    assert unsure.max() > 20 * evidence.scale.max()
+    assert (deviations(evidence, evidence.residual([])) >= unsure - 1e-12).all()
+
+
+@pytest.mark.parametrize(("rest", "found"), [(1.0, 1), (4.1, 0)])
+def test_what_hardly_exceeds_the_rest_of_the_run_is_no_event(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch, rest: float, found: int
+) -> None:
+    def seen(evidence: Evidence, *_: object) -> tuple[np.ndarray, np.ndarray]:
+        time = evidence.samples.motion.time
+        level = np.full((len(time), 3), 0.5)
+        level[(time > 12.0) & (time < 13.0), 1] = 6.0
+        level[(time > 20.0) & (time < 20.5), 1] = rest  # below what makes an event
+        return np.arange(len(time)), level
+
+    monkeypatch.setattr("armloop.diagnosis.contacts.novelty", seen)
+    assert len(events(model, run(18, 30.0, event=(2, 12.0, 13.0, 2.0)))) == found
+
+
+@pytest.mark.parametrize(("joint", "found"), [(3, 0), (2, 1)])
+def test_a_joint_held_by_its_friction_makes_no_event_of_its_own(
+    model: ReconstructedModel, joint: int, found: int
+) -> None:
+    motion = fourier_motion(30.0, 125.0, 19)
+    for x, there in ((motion.q, 0.4), (motion.v, 0.0), (motion.vdot, 0.0)):
+        x[:, 2] = there  # joint 3 rests, and what sticks there may let go at any time
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
+    tau = tau + motion.v * VISCOUS + np.tanh(motion.v / 1e-3) * COULOMB
+    tau[(motion.time > 12.0) & (motion.time < 13.0), joint - 1] += 1.0
+    assert len(events(model, measured(motion, tau, 19, 0.01))) == found
+
+
+def test_an_event_that_is_seen_twice_is_one(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together = contacts._together
+    monkeypatch.setattr(contacts, "_together", lambda bursts: [b for b in together(bursts) for _ in range(2)])
+    assert len(events(model, run(20, 30.0, event=(2, 12.0, 13.0, 2.0)))) == 1
