@@ -95,7 +95,8 @@ def generate_measured(source: int, cases: int, data: Path, logs: Path, answers: 
     runs = [_in_torques(read_log(place / f"{name}.csv"), one) for name in one.judged]
     rng = np.random.default_rng([source, 0x3EA5])
     for case in range(cases):
-        log = runs[case % len(runs)]
+        # each kind meets each of the runs in turn
+        log = runs[(case + case // len(KINDS)) % len(runs)]
         kind, size = KINDS[case % len(KINDS)], SIZES[int(rng.integers(len(SIZES)))]
         effects, tau, law = _drawn(log, Smooth.of(log), urdf, kind, size, rng)
         run = MotionLog(log.time, log.q, log.v, tau, None, name=f"run_{case}")
@@ -183,8 +184,8 @@ def _stribeck(run: Smooth, j: int, rng: np.random.Generator) -> tuple[Array, str
 
 def _drift(run: Smooth, j: int, rng: np.random.Generator) -> tuple[Array, str, dict[str, float]]:
     seconds = float(run.time[-1] - run.time[0]) * float(rng.uniform(0.2, 0.4))
-    grown = 1 - np.exp(-(run.time - run.time[0]) / seconds)
-    return grown * _sign(run.v[:, j]), "level", {"time_constant": seconds}
+    fading = np.exp(-(run.time - run.time[0]) / seconds)
+    return fading * _sign(run.v[:, j]), "level", {"time_constant": seconds}
 
 
 def _spring(run: Smooth, j: int, rng: np.random.Generator) -> tuple[Array, str, dict[str, float]]:

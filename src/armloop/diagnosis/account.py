@@ -25,12 +25,14 @@ class Account:
     """What happened in a run.
 
     Attributes:
+        whole: the run.
         contacts: events, kept out of the search.
         evidence: the run without them.
         outcome: effects found.
         unlisted: a real residual that they leave, if there is one.
     """
 
+    whole: Evidence
     contacts: list[Contact]
     evidence: Evidence
     outcome: Outcome
@@ -42,13 +44,26 @@ class Account:
         evidence = without(whole, contacts)
         outcome = search(evidence, progress)
         unlisted, outcome = find_law(evidence, outcome, progress)
-        return Account(contacts, evidence, outcome, unlisted)
+        return Account(whole, contacts, evidence, outcome, unlisted)
+
+    def left(self, residual: Array) -> float:
+        """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples."""
+        evidence, total = self.evidence, float((self._held_out() ** 2).sum())
+        weighted = (residual / evidence.scale) ** 2
+        for contact in self.contacts:
+            total += (1 - contact.share) * float(weighted[self.whole.rows & contact.rows[:, None]].sum())
+        return total
+
+    def _held_out(self) -> Array:
+        """(R,) what effects and law leave of every row, weighted."""
+        held_out = self.outcome.after.held_out.copy()
+        if self.unlisted is not None:
+            held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
+        return held_out
 
     def explains(self, contacts: list[Contact], residual: Array) -> float:
         """The part of a residual (N, n), N·m (N), in the bursts of contacts that is not left by effects and law."""
-        evidence, held_out = self.evidence, self.outcome.after.held_out.copy()
-        if self.unlisted is not None:
-            held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
+        evidence, held_out = self.evidence, self._held_out()
         bursts = np.logical_or.reduce([contact.rows for contact in contacts])
         before = (residual / evidence.scale)[evidence.rows & bursts[:, None]]
         after = held_out[bursts[evidence.row_samples]]
@@ -75,7 +90,8 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
         plain = Account.of(whole, [], progress)
     enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
     same = account.unlisted and plain.unlisted and account.unlisted.joint == plain.unlisted.joint
-    if same or plain.explains(account.contacts, residual) >= enough:
+    explained = plain.explains(account.contacts, residual) >= enough
+    if same or explained or plain.left(residual) <= account.left(residual):
         progress("what looked like contacts is explained without them")
         return plain
     return account

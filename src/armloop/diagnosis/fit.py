@@ -68,6 +68,10 @@ class Fit:
         """(B,) held-out squared error of each block."""
         return block_sums(self.held_out**2, self.stacked.block)
 
+    def block_rows(self) -> Array:
+        """(B,) rows of each block."""
+        return block_sums(np.ones(len(self.stacked.block)), self.stacked.block)
+
 
 def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
     """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""

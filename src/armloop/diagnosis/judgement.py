@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
 
@@ -13,8 +12,8 @@ Array = NDArray[np.float64]
 
 #: An effect must lower the held-out error by this many standard errors (over blocks) …
 SIGNIFICANCE = 3.0
-#: … and, on some joint, by this part of the energy the model leaves on the worst tenth of its own baseline: a run may
-#: be all of such motion, and a law that fits a model's shortcomings is easily found.
+#: … and, over its joints together, by this part of the energy the model leaves on the worst tenth of its own baseline: a
+#: run may be all of such motion, and a law that fits a model's shortcomings is easily found.
 BASELINE_SHARE = 1.0
 #: A simpler effect is as good as the best if it is behind by no more than this many standard errors …
 CHANCE = 2.0
@@ -34,8 +33,13 @@ def is_worth(evidence: Evidence, current: Fit, trial: Fit) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
-    enough = BASELINE_SHARE * evidence.variation * rows_per_joint(current)
-    return bool((by_joint(current, trial) > enough).any())
+    # What a load or a delay changes shows a little on every joint: the joints' parts add up.
+    return float((by_joint(current, trial) / enough(evidence, current)).sum()) > 1.0
+
+
+def enough(evidence: Evidence, fit: Fit) -> Array:
+    """(n,) squared error, weighted, of each joint that is more than the model's own shortcomings."""
+    return np.asarray(BASELINE_SHARE * evidence.variation * np.maximum(rows_per_joint(fit), 1))
 
 
 def simplest_of_equals(current: Fit, trials: list[Fit]) -> Fit:
@@ -57,16 +61,36 @@ def is_behind(current: Fit, trial: Fit, best: Fit) -> bool:
 
 
 def lead(worse: Fit, better: Fit) -> float:
-    """By how many standard errors, over blocks, one fit leaves more held-out error than another.
+    """By how many standard errors, over blocks, one fit leaves more held-out error than another."""
+    return max(
+        lead_of(worse.block_errors(), better.block_errors(), worse.block_rows()),
+        _likelier(worse, better),
+    )
+
+
+def lead_of(worse: Array, better: Array, rows: Array) -> float:
+    """By how many standard errors one set of blocks' (B,) squared errors exceeds another.
 
     Of the sum over blocks, or of the sum of each block's part of its own error, whichever is more: where all the
     difference lies in few blocks (friction that fades, a law that bites at speed) its spread over blocks says
     nothing of chance, but how many blocks agree does.
     """
-    a, b = worse.block_errors(), better.block_errors()
-    rows = block_sums(np.ones(len(worse.stacked.block)), worse.stacked.block)
-    parts = (a - b) / (a + b + rows)
-    return max(_standard_errors(a - b), _standard_errors(parts))
+    difference = worse - better
+    return max(_standard_errors(difference), _standard_errors(difference / (worse + better + rows)))
+
+
+def _likelier(worse: Fit, better: Fit) -> float:
+    """Likelihood ratio of two fits' held-out errors as standard errors: sqrt(2 log L), each block one observation.
+
+    Errors are normal with a variance of each joint's own, and count on top of the baseline's. A law that bites in few
+    blocks, hard, is no chance, though neither the sum's spread nor the number of blocks that agree says so.
+    """
+    joints = worse.stacked.joints
+    seen = np.unique(np.column_stack([worse.stacked.joint, worse.stacked.block]), axis=0)[:, 0]
+    rows = np.maximum(rows_per_joint(worse), 1)
+    ratio = np.log((energy_by_joint(worse) + rows) / (energy_by_joint(better) + rows))
+    log_likelihood = 0.5 * float((np.bincount(seen, minlength=joints) * ratio).sum())
+    return float(np.sign(log_likelihood) * np.sqrt(2 * abs(log_likelihood)))
 
 
 def _standard_errors(differences: Array) -> float:

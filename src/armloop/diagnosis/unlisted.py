@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from armloop.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.library.angle_sums import AngleSums
 from armloop.motion import Motion
@@ -24,8 +25,9 @@ from armloop.regression.sparse import Sparse
 
 Array = NDArray[np.float64]
 
-#: A residual is real if it is this many times what the model leaves on the worst tenth of its baseline, even without
-#: the blocks that show most of it: one or two are an event of the run, no law.
+#: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
+#: it is this many times what the model leaves on the worst tenth of its baseline, even without the blocks that show most
+#: of it: one or two are an event of the run, no law.
 EXCESS, EVENTS = 2.0, 2
 #: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
 #: exactly, and no further effect.
@@ -108,9 +110,22 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
         # Noise has energy, too, but no memory: only what lasts can be a law.
         error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
         sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
-        if np.sort(sums)[:-EVENTS].sum() > 0:
+        if np.sort(sums)[:-EVENTS].sum() > 0 or _follows_a_law(evidence, after, j):
             ratios[j] = np.sqrt((after.held_out[mine] ** 2).mean())
     return int(np.argmax(ratios)) if ratios.any() else None
+
+
+def _follows_a_law(evidence: Evidence, after: Fit, j: int) -> bool:
+    """Whether a law explains of a joint's held-out residual what an effect has to: significantly, and enough."""
+    mine, least = after.stacked.joint == j, float(enough(evidence, after)[j])
+    if _energy(after, j) <= least:
+        return False  # even all of it would not be
+    before, left = after.held_out[mine] ** 2, _law(evidence, after, j).left ** 2
+    if float((before - left).sum()) <= least:
+        return False
+    blocks = after.stacked.block[mine]
+    sums = (block_sums(x, blocks) for x in (before, left, np.ones(len(left))))
+    return lead_of(*sums) > SIGNIFICANCE
 
 
 def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
@@ -134,7 +149,10 @@ def _energy(fit: Fit, j: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Law:
-    """Terms with coefficients (weighted), none if none is stable, and what they leave held out (R,), weighted."""
+    """Terms with coefficients (weighted), none if none is stable, and what is left (R,), weighted.
+
+    Left of each half of the run is what terms and coefficients leave there that were chosen and fitted on the other.
+    """
 
     terms: list[tuple[float, str]]
     left: Array
@@ -169,16 +187,14 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
     sparse = Sparse(max_terms=_MOST_TERMS, correlation=20.0)
-    supports = [set(sparse.support(whole - part, none).tolist()) for part in parts]
-    stable = sorted(set.intersection(*supports))
-    if not stable:
-        return _Law([], y)
-    support = np.array(stable, dtype=np.intp)
+    supports = [sparse.support(whole - part, none) for part in parts]
     error = np.array(y)
-    for k, part in enumerate(parts):
-        rest = whole - part
-        error[fold == k] -= X[np.ix_(fold == k, support)] @ rest.solve(support)
-    if (error**2).sum() > 0.5 * (y**2).sum():
+    for k, (part, support) in enumerate(zip(parts, supports, strict=True)):
+        error[fold == k] -= X[np.ix_(fold == k, support)] @ (whole - part).solve(support)
+    stable = np.array(
+        sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
+    )
+    if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
         return _Law([], y)
-    beta = whole.solve(support)
-    return _Law([(float(b), names[t]) for b, t in zip(beta, support, strict=True)], error)
+    beta = whole.solve(stable)
+    return _Law([(float(b), names[t]) for b, t in zip(beta, stable, strict=True)], error)
