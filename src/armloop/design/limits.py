@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.components import RigidBody
 from armloop.errors import InputError
 from armloop.excitation import FourierReference, MotionRanges, static_poses
-from armloop.kinematics import nominal_parameters, regressor
+from armloop.kinematics import nominal_parameters
 from armloop.motion import Motion
 
 Array = NDArray[np.float64]
@@ -117,8 +118,8 @@ def _motion(reference: FourierReference, step: float) -> Motion:
 
 def nominal_torque(arm: Arm) -> TorqueLaw:
     """Inverse dynamics with the inertias that the URDF states; no friction."""
-    parameters = nominal_parameters(arm)
-    return lambda motion: regressor(arm, motion.q, motion.v, motion.vdot) @ parameters
+    links = RigidBody(nominal_parameters(arm), (), np.zeros(0))
+    return lambda motion: links.torque(arm, motion, 3)
 
 
 def check_rest(arm: Arm, limits: Limits) -> None:
