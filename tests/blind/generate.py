@@ -12,7 +12,8 @@ from arms import random_arm
 from hidden import Run, draw
 
 from armloop.arm import load_arm
-from armloop.drake_systems.collection import CollectionPlan, PlantConfig, collect, measure_run
+from armloop.drake_systems.collection import CollectionPlan, collect, measure_run
+from armloop.drake_systems.config import PlantConfig
 from armloop.drake_systems.friction import JointFriction
 from armloop.excitation import MotionRanges, fourier_reference
 from armloop.log import write_log

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 from armloop.design import Limits, Series, nominal_torque
 from armloop.drake_systems.collection import collect, measure_run
+from armloop.drake_systems.config import Instruments
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.scenarios import load_plan, load_plant, plant_for
-from armloop.drake_systems.speed_mode import Instruments
 from armloop.kinematics import nominal_parameters, regressor
 from armloop.log import read_log, write_log
 

@@ -6,10 +6,11 @@ from numpy.testing import assert_allclose
 from pydrake.multibody.plant import MultibodyPlant
 
 from armloop.arm import load_arm
+from armloop.drake_systems.config import Instruments
 from armloop.drake_systems.effects import EFFECTS, UndeclaredEffect, realise
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.plant import add_links
-from armloop.drake_systems.speed_mode import Instruments, SpeedModeArm
+from armloop.drake_systems.speed_mode import SpeedModeArm
 from armloop.effects import EFFECTS as LISTED
 from armloop.errors import ScenarioError
 from armloop.excitation import FourierReference

@@ -9,8 +9,9 @@ from exact_parts import model_of
 from pydrake.systems.analysis import Simulator
 from synthetic import fourier_motion, three_axis
 
+from armloop.drake_systems.config import Instruments
 from armloop.drake_systems.effects import UndeclaredEffect, realise
-from armloop.drake_systems.speed_mode import Instruments, SpeedModeArm
+from armloop.drake_systems.speed_mode import SpeedModeArm
 from armloop.dynamics import Dynamics, effect_law
 from armloop.effects import (
     INERTIA,

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.arm import Arm
+from armloop.drake_systems.config import Instruments, PlantConfig
 from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.joint_loads import Law
-from armloop.drake_systems.speed_mode import Instruments, Recording, SpeedModeArm
+from armloop.drake_systems.speed_mode import Recording, SpeedModeArm
 from armloop.excitation import (
-    MotionRanges,
     Reference,
     constant_velocity_segments,
     fourier_reference,
@@ -36,19 +35,6 @@ Progress = Callable[[str, float], None]
 
 def silent(what: str, done: float) -> None:
     """Report nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlantConfig:
-    """A simulated arm's friction, instruments and the ranges its data are collected in.
-
-    friction : one per joint; ranges : Tables 1 and 3; time_step : s
-    """
-
-    friction: tuple[JointFriction, ...]
-    ranges: MotionRanges
-    instruments: Instruments = field(default_factory=Instruments)
-    time_step: float = 1e-3
 
 
 @dataclass(frozen=True)

@@ -4,20 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from armloop.arm import Arm
 from armloop.drake_systems.scene import add_actors, local_meshcat
-from armloop.drake_systems.tracking import TrackingResult
 from armloop.files import write_text
 
 
+class Recorded(Protocol):
+    """Samples of a run: time (N,) in s, positions and the reference's positions (N, n)."""
+
+    @property
+    def time(self) -> NDArray[np.float64]: ...
+    @property
+    def q(self) -> NDArray[np.float64]: ...
+    @property
+    def q_ref(self) -> NDArray[np.float64]: ...
+
+
 def write_replay(
-    path: str | Path, arm: Arm, results: Mapping[str, TrackingResult], *, frames_per_second: float = 25.0
+    path: str | Path, arm: Arm, results: Mapping[str, Recorded], *, frames_per_second: float = 25.0
 ) -> None:
     """Write a replay of tracking runs: the arms side by side, a colour per controller, each in a grey ghost.
 

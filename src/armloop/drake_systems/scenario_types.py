@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armloop.arm import Arm
-from armloop.drake_systems.collection import PlantConfig
+from armloop.drake_systems.config import PlantConfig
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.pid import PidGains
 from armloop.drake_systems.scenario_data import PAPER

@@ -13,7 +13,8 @@ import numpy as np
 from msgspec.structs import asdict, replace
 
 from armloop.arm import Arm, load_arm
-from armloop.drake_systems.collection import CollectionPlan, PlantConfig
+from armloop.drake_systems.collection import CollectionPlan
+from armloop.drake_systems.config import Instruments, PlantConfig
 from armloop.drake_systems.controllers import LISTED, REGISTRY
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
@@ -29,7 +30,6 @@ from armloop.drake_systems.scenario_data import (
 from armloop.drake_systems.scenario_files import beside, entry, per_joint, read, scenario_entry
 from armloop.drake_systems.scenario_references import reference_of
 from armloop.drake_systems.scenario_types import Pickup, Plant, TrackingScenario, Wear
-from armloop.drake_systems.speed_mode import Instruments
 from armloop.errors import ArmError, ScenarioError
 from armloop.excitation import MotionRanges, Reference
 from armloop.resources import scenario_path, urdf_names

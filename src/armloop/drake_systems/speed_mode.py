@@ -15,6 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.arm import Arm
+from armloop.drake_systems.config import Instruments
 from armloop.drake_systems.effects import UndeclaredEffect
 from armloop.drake_systems.friction import JointFriction
 from armloop.drake_systems.joint_loads import Law, ServoGains
@@ -26,32 +27,6 @@ Array = NDArray[np.float64]
 
 STIFF = ServoGains(p=1e6, d=1e4)
 """A stiff drive: 10 N*m move it by 1e-5 rad, and it settles in d/p = 10 ms."""
-
-
-@dataclass(frozen=True)
-class Instruments:
-    """What the arm is measured with.
-
-    encoder_counts : per revolution, and per `prismatic_lead` metres of a sliding joint (its screw); 0 for
-        ideal ones
-    torque_noise : standard deviation of white noise on the torque, as a part of each joint's RMS in the log
-    velocity_half_window : s; v is the central difference of the recorded q over this time to both sides
-    """
-
-    encoder_counts: int = 2**19
-    prismatic_lead: float = 0.02
-    torque_noise: float = 0.01
-    velocity_half_window: float = 0.006
-
-    def resolution(self, arm: Arm) -> Array:
-        """Return (n,) rad (m) per count, 0 for ideal encoders."""
-        travel = np.where(arm.revolute, 2 * np.pi, self.prismatic_lead)
-        return travel / self.encoder_counts if self.encoder_counts else 0.0 * travel
-
-    def encode(self, arm: Arm, q: Array) -> Array:
-        """Return positions (N, n) as the encoders read them."""
-        step = self.resolution(arm)
-        return np.round(q / step) * step if self.encoder_counts else q
 
 
 @dataclass(frozen=True, eq=False)
