@@ -30,18 +30,18 @@ sys.path.insert(0, str(ROOT / "tests"))
 from resampled import Blocks, Changing  # noqa: E402
 from watch_promise import EVERY_S, UNIT_SECONDS, delay, delays_header, false_alarms, false_alarms_header  # noqa: E402
 
-from armloop.arm import load_arm  # noqa: E402
-from armloop.errors import InputError  # noqa: E402
-from armloop.kinematics import regressor  # noqa: E402
-from armloop.log import MotionLog, read_log  # noqa: E402
+from armloop.data.log import MotionLog, read_log  # noqa: E402
+from armloop.data.motion import Motion  # noqa: E402
+from armloop.data.signals import condition  # noqa: E402
+from armloop.identification.reconstruction import reconstruct  # noqa: E402
 from armloop.model import ReconstructedModel  # noqa: E402
 from armloop.monitoring.alarms import find_alarms  # noqa: E402
 from armloop.monitoring.naming import Normal  # noqa: E402
 from armloop.monitoring.sums import log_sums  # noqa: E402
 from armloop.monitoring.units import Units, scores, streams  # noqa: E402
-from armloop.motion import Motion  # noqa: E402
-from armloop.reconstruction import reconstruct  # noqa: E402
-from armloop.signals import condition  # noqa: E402
+from armloop.robot.arm import load_arm  # noqa: E402
+from armloop.robot.kinematics import regressor  # noqa: E402
+from armloop.util.errors import InputError  # noqa: E402
 
 Array = NDArray[np.float64]
 

@@ -28,8 +28,8 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError
 from armloop.monitoring.sums import LogSums
+from armloop.util.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -188,7 +188,7 @@ def placing(path: Path) -> Iterator[Path]:
     """A draft that takes its place when the block ends well.
 
     All below a store is the store's own, and its bytes must not depend on the order of writing: the marks and records
-    by which :mod:`armloop.outputs` knows a command's outputs have no place here.
+    by which :mod:`armloop.util.outputs` knows a command's outputs have no place here.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
