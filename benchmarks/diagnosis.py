@@ -26,20 +26,20 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from armloop.arm import Arm, load_arm
-from armloop.blocks import block_numbers
-from armloop.components import RigidBody
+from armloop.data.blocks import block_numbers
+from armloop.data.log import MotionLog
+from armloop.data.signals import condition, smooth
 from armloop.diagnosis import Diagnosis, diagnose
-from armloop.effects import hypotheses
-from armloop.functions import NUMPY
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog
+from armloop.identification.scoring import score
+from armloop.laws.effects import hypotheses
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.newton_euler import inverse_dynamics
+from armloop.model.components import RigidBody
 from armloop.reports.tables import table
-from armloop.scoring import score
-from armloop.signals import condition, smooth
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.functions import NUMPY
 
 Array = NDArray[np.float64]
 

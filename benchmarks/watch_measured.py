@@ -30,18 +30,18 @@ sys.path.insert(0, str(ROOT / "tests"))
 from resampled import Blocks, Changing  # noqa: E402
 from watch_promise import EVERY_S, UNIT_SECONDS, delay, delays_header, false_alarms, false_alarms_header  # noqa: E402
 
-from armloop.arm import load_arm  # noqa: E402
-from armloop.errors import InputError  # noqa: E402
-from armloop.kinematics import regressor  # noqa: E402
-from armloop.log import MotionLog, read_log  # noqa: E402
+from armloop.data.log import MotionLog, read_log  # noqa: E402
+from armloop.data.motion import Motion  # noqa: E402
+from armloop.data.signals import condition  # noqa: E402
+from armloop.identification.reconstruction import reconstruct  # noqa: E402
 from armloop.model import ReconstructedModel  # noqa: E402
 from armloop.monitoring.alarms import find_alarms  # noqa: E402
 from armloop.monitoring.naming import Normal  # noqa: E402
 from armloop.monitoring.sums import log_sums  # noqa: E402
 from armloop.monitoring.units import Units, scores, streams  # noqa: E402
-from armloop.motion import Motion  # noqa: E402
-from armloop.reconstruction import reconstruct  # noqa: E402
-from armloop.signals import condition  # noqa: E402
+from armloop.robot.arm import load_arm  # noqa: E402
+from armloop.robot.kinematics import regressor  # noqa: E402
+from armloop.util.errors import InputError  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def in_order(name: str, units: Units, joints: int, label: str) -> None:
     mean_units = 1000.0 / (units.hours / units.count)
     found = find_alarms(values, units.programme, tolerance, listed, mean_units)
     most = float(found.evidence.max(initial=-np.inf))
-    share = f"{max(most, 0.0) / found.limit:5.2f}"
+    share = f"{max(most, 0.0) / float(found.limits[-1]):5.2f}"
     print(
         f"{name:16s} {label:22s} {units.hours:7.3f} {units.count:6d} {len(found.alarms):7d} {share:>18s}",
         flush=True,
@@ -230,7 +230,7 @@ def found_after(
     later, _ = scores(changing.units(counts, levels, EVERY_S))
     moved = np.abs(later[-1] - values[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
-        parts = np.nanmax(np.where(tolerance > 0, moved / tolerance, np.nan))
+        parts = np.nanmax(np.where(tolerance[-1] > 0, moved / tolerance[-1], np.nan))
         spread = np.nanmax(moved / np.std(values, axis=0))
     print(
         f"{label:38s} not found in {len(level)} units; at most {parts:.1f} of the tolerance and {spread:.1f} of the "

@@ -71,7 +71,7 @@ def false_alarms(name: str, blocks: Blocks, hours: float, days: float, seed: int
             values = values + days * np.std(values, axis=0) * shift[:, None]
         S = values.shape[1]
         active = np.isfinite(values).any(axis=0)
-        found = scan(values[:, active], units.programme, tolerance[active])
+        found = scan(values[:, active], units.programme, tolerance[:, active])
         first.append(found.log_evidence.max(axis=(1, 2)))
         long.append(units.hours / HISTORY)
     for mean in PROMISED:

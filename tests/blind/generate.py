@@ -11,11 +11,12 @@ from typing import Any
 from arms import random_arm
 from hidden import Run, draw
 
-from armloop.arm import load_arm
-from armloop.drake_systems.collection import CollectionPlan, PlantConfig, collect, measure_run
-from armloop.drake_systems.friction import JointFriction
-from armloop.excitation import MotionRanges, fourier_reference
-from armloop.log import write_log
+from armloop.data.log import write_log
+from armloop.drake.experiments.collection import CollectionPlan, collect, measure_run
+from armloop.drake.plant.config import PlantConfig
+from armloop.drake.plant.friction import JointFriction
+from armloop.experiment.excitation import MotionRanges, fourier_reference
+from armloop.robot.arm import load_arm
 
 DURATION = 50.0
 

@@ -20,7 +20,7 @@ from generate import generate  # noqa: E402
 from judge import LARGE, Case, is_right  # noqa: E402
 from run import judge  # noqa: E402
 
-from armloop.drake_systems.scenarios import load_plan  # noqa: E402
+from armloop.drake.experiments.scenarios import load_plan  # noqa: E402
 
 
 @pytest.fixture(
@@ -87,4 +87,4 @@ def test_the_judging_process_imports_nothing_of_the_generator() -> None:
     names |= {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
     own = {path.stem for path in HERE.glob("*.py")}
     assert not {str(name).split(".")[0] for name in names} & own
-    assert not any("drake_systems" in str(name) for name in names)
+    assert not any("armloop.drake" in str(name) for name in names)

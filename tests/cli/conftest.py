@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog, write_log
+from armloop.data.log import MotionLog, write_log
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
 
 
 def good_log(seconds: float = 12.0) -> MotionLog:
@@ -52,7 +52,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def scara_model(inputs: Path) -> Path:
-    from armloop.arm import load_arm
+    from armloop.robot.arm import load_arm
 
     arm = load_arm("scara")
     body = RigidBody(nominal_parameters(arm), ("m1",), np.ones(1))

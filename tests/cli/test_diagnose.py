@@ -10,14 +10,14 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.cli import main
-from armloop.components import RigidBody
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog, write_log
+from armloop.data.log import MotionLog, write_log
+from armloop.data.motion import Motion
+from armloop.data.signals import condition
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
 
 
 def log(seed: int, change: Callable[[Motion, np.ndarray], np.ndarray] | None = None) -> MotionLog:

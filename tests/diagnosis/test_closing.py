@@ -14,15 +14,15 @@ from synthetic import (
     three_axis,
 )
 
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.signals import condition
 from armloop.diagnosis import close, diagnose
-from armloop.effects import Estimate, effect
-from armloop.errors import InputError
-from armloop.kinematics import regressor, tool_jacobian
-from armloop.log import MotionLog
+from armloop.identification.scoring import score
+from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.robot.kinematics import regressor, tool_jacobian
+from armloop.util.errors import InputError
 
 Law = Callable[[Motion], np.ndarray]
 

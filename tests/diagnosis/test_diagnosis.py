@@ -15,12 +15,12 @@ from synthetic import (
     three_axis,
 )
 
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.diagnosis import diagnose
-from armloop.kinematics import nominal_parameters, regressor, tool_jacobian
-from armloop.log import MotionLog
+from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.reconstruction import reconstruct
+from armloop.robot.kinematics import nominal_parameters, regressor, tool_jacobian
 
 Law = Callable[[Motion], np.ndarray]
 

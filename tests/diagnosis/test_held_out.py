@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque
 
-from armloop.arm import load_arm
-from armloop.components import RigidBody
+from armloop.data.signals import condition
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Shape, fit
 from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Known
-from armloop.effects import effect, hypotheses
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.laws.effects import effect, hypotheses
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.progress import silent
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.progress import silent
 
 
 def exact(name: str) -> ReconstructedModel:

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.arm import Arm
 from armloop.cli import main
-from armloop.components import RigidBody
+from armloop.data.log import MotionLog, write_log
+from armloop.data.motion import Motion
+from armloop.data.signals import condition
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis.next_run import Wish, next_run, training_ranges
-from armloop.errors import InputError
-from armloop.excitation import MotionRanges, Reference, read_reference
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog, write_log
+from armloop.experiment.excitation import MotionRanges, Reference, read_reference
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 Law = Callable[[Motion], np.ndarray]
 COULOMB, VISCOUS = 0.5, 1.5

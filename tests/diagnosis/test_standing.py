@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody, SparseTerms
+from armloop.data.log import MotionLog
+from armloop.data.signals import condition
 from armloop.diagnosis import contacts, diagnose
 from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import contradiction, deviations
 from armloop.diagnosis.pushes import Contact
-from armloop.effects import Estimate, effect
-from armloop.kinematics import nominal_parameters
-from armloop.library.double_feature_set import Factors
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog
+from armloop.features.double_feature_set import Factors
+from armloop.identification.scoring import score
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody, SparseTerms
+from armloop.robot.kinematics import nominal_parameters
 
 VISCOUS, COULOMB = (0.8, 1.0, 0.5), (0.3, 0.4, 0.2)
 

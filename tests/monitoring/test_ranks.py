@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from armloop.monitoring.alarms import find_alarms
+from armloop.monitoring.alarms import LONGEST, Reached, find_alarms
 from armloop.monitoring.ranks import FEWEST, scan, threshold
 from armloop.monitoring.units import Stream
 
@@ -81,3 +81,30 @@ def test_what_says_nothing_changes_nothing() -> None:
     thin = scan(sparse, np.zeros(80, dtype=int), np.zeros(2)).log_evidence[40::2]
     # the horizon counts units that say nothing, too
     np.testing.assert_allclose(thin[:8], dense[:8], atol=1e-9)
+
+
+def test_units_that_come_one_by_one_tell_the_same_as_units_that_come_at_once() -> None:
+    rng = np.random.default_rng(5)
+    n = LONGEST + 300
+    values, programme = rng.normal(size=(n, 4)), rng.integers(0, 2, n)
+    values[rng.random(values.shape) < 0.1] = np.nan
+    values[200:, 1] += 3.0
+    values[620:, 2] -= 3.0
+    tolerance, mean = 0.1 * rng.random((n, 4)), 1e3 + np.arange(float(n))
+    listed = [Stream("viscous_friction", j + 1, None, j) for j in range(4)]
+    whole = find_alarms(values, programme, tolerance, listed, mean)
+    assert len(whole.alarms) == 2
+    reached, alarms, parts, done = Reached(), [], [], 0
+    while done < n:
+        until = min(n, done + int(rng.integers(1, 60)))
+        kept = max(0, reached.begin - 10)  # what lies before is never asked for again
+        rows = slice(kept, until)
+        part = find_alarms(
+            values[rows], programme[rows], tolerance[rows], listed, mean[rows], reached.moved(-kept)
+        )
+        reached = part.reached.moved(kept)
+        alarms += [alarm.moved(kept) for alarm in part.alarms]
+        parts.append(part.evidence[done - kept :])
+        done = until
+    assert alarms == whole.alarms and reached == whole.reached
+    np.testing.assert_array_equal(np.concatenate(parts), whole.evidence)

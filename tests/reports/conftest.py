@@ -14,13 +14,13 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.conditions import sort_samples
+from armloop.data.log import MotionLog
+from armloop.data.regimes import sort_samples
+from armloop.data.signals import condition
 from armloop.diagnosis import diagnose
-from armloop.drake_systems.tracking import TrackingResult
-from armloop.log import MotionLog
-from armloop.reconstruction import Reconstruction, StepReport
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.drake.experiments.tracking import TrackingResult
+from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.scoring import score
 
 SPRING = {"stiffness": 1.5, "rest": 0.3}
 

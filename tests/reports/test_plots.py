@@ -10,15 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from synthetic import friction
 
+from armloop.data.motion import Motion
+from armloop.data.signals import smooth
 from armloop.diagnosis import Diagnosis, close
-from armloop.files import write_figure
-from armloop.motion import Motion
 from armloop.reports import plots
 from armloop.reports.html import svg
 from armloop.reports.plots import style
 from armloop.reports.plots.style import thin, with_gaps
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
-from armloop.signals import smooth
+from armloop.util.files import write_figure
 
 
 def drawn(figure: Figure) -> Figure:

@@ -26,10 +26,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Sort the samples of logs by condition."""
     from armloop.commands.shared import TORQUE, print_json, read_logs
-    from armloop.conditions import sort_samples
-    from armloop.errors import InputError
+    from armloop.data.regimes import sort_samples
+    from armloop.data.signals import Conditioning, condition
     from armloop.reports.tables import table
-    from armloop.signals import Conditioning, condition
+    from armloop.util.errors import InputError
 
     logs = read_logs(options.logs, None, TORQUE)
     widths = {log.joints for log in logs}

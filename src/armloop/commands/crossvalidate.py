@@ -75,18 +75,18 @@ def run(options: argparse.Namespace) -> None:
         read_logs,
         recorded_as,
     )
-    from armloop.errors import InputError
-    from armloop.files import write_json
-    from armloop.keeping import Kept
-    from armloop.reconstruction import Options
+    from armloop.data.signals import Conditioning
+    from armloop.identification.reconstruction import Options
+    from armloop.identification.validation import compare_physical, crossvalidate
     from armloop.reports.crossvalidation import (
         crossvalidation_tables,
         ladder_table,
         physical_table,
     )
-    from armloop.signals import Conditioning
-    from armloop.validation import compare_physical, crossvalidate
-    from armloop.workers import Processes
+    from armloop.util.checkpoints import Kept
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_json
+    from armloop.util.workers import Processes
 
     if not 0 < options.block < float("inf"):
         raise InputError(f"--block {options.block}: give a positive number of seconds")

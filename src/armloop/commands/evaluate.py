@@ -25,9 +25,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Score a model on logs."""
     from armloop.commands.shared import model_and_logs, print_json
+    from armloop.data.signals import condition
+    from armloop.identification.scoring import score
     from armloop.reports.tables import score_table
-    from armloop.scoring import score
-    from armloop.signals import condition
 
     model, logs = model_and_logs(options)
     result = score(model, condition(logs, model.conditioning))

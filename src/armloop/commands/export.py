@@ -38,11 +38,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Export."""
-    from armloop.arm import load_arm
     from armloop.commands.shared import out_file, out_folder, print_json, read_logs
+    from armloop.data.signals import condition
     from armloop.export import export, states_of
     from armloop.model import load_model
-    from armloop.signals import condition
+    from armloop.robot.arm import load_arm
 
     if options.to == "drake":
         out_folder(options.out)

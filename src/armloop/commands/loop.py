@@ -29,7 +29,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the whole loop."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.loop import LOOP_FILES, run_loop
+    from armloop.workflows import LOOP_FILES, run_loop
 
     if options.measured:
         _measured(options)
@@ -41,8 +41,8 @@ def run(options: argparse.Namespace) -> None:
 def _measured(options: argparse.Namespace) -> None:
     """Run the measured loop and print what it found."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.loop.measured import MEASURED_FILES, run_measured
     from armloop.reports.measured_report import measured_words
+    from armloop.workflows.measured import MEASURED_FILES, run_measured
 
     folder = out_folder(options.out, MEASURED_FILES)
     print(measured_words(run_measured(folder, progress(options))))

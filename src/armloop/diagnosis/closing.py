@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import condition
+from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
-from armloop.scoring import Score, score
-from armloop.signals import condition
+from armloop.util.errors import InputError
 
 Array = NDArray[np.float64]
 

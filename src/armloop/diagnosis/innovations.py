@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
 from armloop.dynamics import Dynamics
-from armloop.errors import ModelError
-from armloop.library.friction import FrictionLaw
+from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
-from armloop.signals import smooth
+from armloop.util.errors import ModelError
 
 Array = NDArray[np.float64]
 

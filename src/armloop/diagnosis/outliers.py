@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import CREEP, dry_level
-from armloop.motion import Motion
 
 Array = NDArray[np.float64]
 

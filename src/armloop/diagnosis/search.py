@@ -24,9 +24,9 @@ from armloop.diagnosis.judgement import (
     simplest_of_equals,
 )
 from armloop.diagnosis.trials import Known
-from armloop.effects import Effect, hypotheses
+from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
-from armloop.progress import Progress, paced
+from armloop.util.progress import Progress, paced
 
 Array = NDArray[np.float64]
 

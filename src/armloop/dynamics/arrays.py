@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armloop.dynamics.model import ModelEquations
-from armloop.errors import ModelError
-from armloop.functions import MATH, NUMPY
 from armloop.model import ReconstructedModel
+from armloop.util.errors import ModelError
+from armloop.util.functions import MATH, NUMPY
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """The equations of motion of a model's parts, in plain arithmetic for any kind of number.
 
 Every part's torque is tau = M(q) vdot + rest(q, v). The numbers may be floats, arrays of samples, AutoDiffXd or
-symbolic Expressions (see :mod:`armloop.functions`): vectors are sequences of n numbers, matrices lists of n rows.
+symbolic Expressions (see :mod:`armloop.util.functions`): vectors are sequences of n numbers, matrices lists of n rows.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm
-from armloop.components import Lagrangian
-from armloop.functions import Functions
-from armloop.newton_euler import inverse_dynamics, mass_matrix
+from armloop.model.components import Lagrangian
+from armloop.robot.arm import Arm
+from armloop.robot.newton_euler import inverse_dynamics, mass_matrix
+from armloop.util.functions import Functions
 
 Array = NDArray[np.float64]
 Numbers = Sequence[Any]

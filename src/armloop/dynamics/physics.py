@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm
-from armloop.library.lagrangian import gravity_sees_first_joint
+from armloop.data.motion import Motion
+from armloop.features.lagrangian import gravity_sees_first_joint
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
+from armloop.robot.arm import Arm
 
 Array = NDArray[np.float64]
 

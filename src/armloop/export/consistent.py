@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
-from armloop.arm import Arm
-from armloop.kinematics import LINK_PARAMETERS, nominal_parameters
-from armloop.library.rigid_body import full_columns
-from armloop.motion import Motion
+from armloop.data.motion import Motion
+from armloop.features.rigid_body import full_columns
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import LINK_PARAMETERS, nominal_parameters
 
 Array = NDArray[np.float64]
 

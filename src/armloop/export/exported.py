@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop import __version__
-from armloop.export.said import Said, body_of
+from armloop.export.expressible import Said, body_of
 
 Array = NDArray[np.float64]
 

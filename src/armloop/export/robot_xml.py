@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop import __version__
-from armloop.arm import Joint
-from armloop.export.said import Said, body_of
+from armloop.export.expressible import Said, body_of
+from armloop.robot.arm import Joint
 
 Array = NDArray[np.float64]
 

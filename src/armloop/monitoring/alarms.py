@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,31 @@ class Alarm:
     log_evidence: float
     from_unit: int
 
+    def moved(self, units: int) -> Alarm:
+        """The same, units counted from another one."""
+        return replace(
+            self, unit=self.unit + units, since=self.since + units, from_unit=self.from_unit + units
+        )
+
+
+@dataclass(frozen=True)
+class Reached:
+    """How far a history has been tested.
+
+    Attributes:
+        begin: the first unit of the stretch that is looked at.
+        fresh: the first unit since the last alarm.
+        first: the first unit that was not tested yet.
+    """
+
+    begin: int = 0
+    fresh: int = 0
+    first: int = 0
+
+    def moved(self, units: int) -> Reached:
+        """The same, units counted from another one."""
+        return Reached(self.begin + units, self.fresh + units, self.first + units)
+
 
 @dataclass(frozen=True, eq=False)
 class Watched:
@@ -44,12 +69,14 @@ class Watched:
     Attributes:
         alarms: in order.
         evidence: (U, S) log evidence of each stream after each unit, the larger of both directions.
-        limit: the threshold.
+        limits: (U,) the threshold at each unit.
+        reached: from where to go on.
     """
 
     alarms: list[Alarm]
     evidence: Array
-    limit: float
+    limits: Array
+    reached: Reached
 
 
 def find_alarms(
@@ -57,26 +84,30 @@ def find_alarms(
     programme: NDArray[np.intp],
     tolerance: Array,
     listed: Sequence[Stream],
-    mean_units: float,
+    mean_units: float | Array,
+    reached: Reached | None = None,
 ) -> Watched:
     """Test a history in its order; after an alarm the units that follow are compared among each other.
 
     Args:
-        values: (U, S) scores; programme: (U,); tolerance: (S,) see :func:`armloop.monitoring.ranks.scan`.
-        mean_units: mean number of healthy units between two false alarms that is promised.
+        values: (U, S) scores; programme: (U,); tolerance: (U, S) or (S,) see :func:`armloop.monitoring.ranks.scan`.
+        mean_units: mean number of healthy units between two false alarms that is promised; (U,) as known at each unit.
+        reached: what was tested before; what comes to light is the same whether units come at once or one by one.
     """
     U, S = values.shape
     active = np.flatnonzero(np.isfinite(values).any(axis=0))
     evidence = np.full((U, S), -np.inf)
-    limit = threshold(mean_units, 2 * len(listed))
+    limits = np.broadcast_to(threshold(mean_units, 2 * len(listed)), U)
+    allowed = np.broadcast_to(tolerance, values.shape)
     alarms: list[Alarm] = []
-    begin = fresh = first = 0
+    reached = reached or Reached()
+    begin, fresh, first = reached.begin, reached.fresh, reached.first
     while first < U and len(active):
         last = min(U, begin + LONGEST)
         part = slice(begin, last)
-        found = scan(values[part][:, active], programme[part], tolerance[active])
+        found = scan(values[part][:, active], programme[part], allowed[part][:, active], first - begin)
         most = found.log_evidence.max(axis=1)
-        over = np.flatnonzero((most > limit).any(axis=1) & (np.arange(begin, last) >= first))
+        over = np.flatnonzero((most > limits[part, None]).any(axis=1))
         end = int(over[0]) + 1 if len(over) else last - begin
         rows = slice(first - begin, end)
         evidence[first : begin + end, active] = most[rows]
@@ -96,5 +127,6 @@ def find_alarms(
             begin = fresh = first = begin + at + 1
         else:
             first = last
-            begin = max(begin, last - LONGEST // 2)
-    return Watched(alarms, evidence, limit)
+            if last == begin + LONGEST:
+                begin = last - LONGEST // 2
+    return Watched(alarms, evidence, limits, Reached(begin, fresh, first if len(active) else U))

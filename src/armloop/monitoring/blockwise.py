@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion, Samples
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
 from armloop.monitoring.naming import Normal, name_change
 from armloop.monitoring.sums import joint_sums, residual_scale
-from armloop.motion import Motion, Samples
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.effects import Effect, effect, hypotheses
+from armloop.data.motion import Motion, Samples
+from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
 
 Array = NDArray[np.float64]
 

@@ -45,31 +45,43 @@ class Scan:
     since: NDArray[np.intp]
 
 
-def scan(values: Array, programme: NDArray[np.intp], tolerance: Array) -> Scan:
+def scan(values: Array, programme: NDArray[np.intp], tolerance: Array, first: int = 0) -> Scan:
     """Run the e-detectors over units in their order.
 
     Args:
         values: (n, S) score of each unit and stream; NaN where the unit says nothing.
         programme: (n,) which units are exchangeable with each other.
-        tolerance: (S,) a shift of the scores that is no change.
+        tolerance: (n, S) or (S,) a shift of the scores that is no change.
+        first: the unit from which on evidence is asked for; that of the units before it is left out (-inf). What a unit
+            comes to depends on the units up to it alone, so that a history can be continued where it was left.
     """
     n, S = values.shape
     evidence, since = np.full((n, 2, S), -np.inf), np.full((n, 2, S), -1, dtype=np.intp)
+    allowed = np.broadcast_to(tolerance, values.shape)
     for side, sign in enumerate((1.0, -1.0)):
-        evidence[:, side], since[:, side] = _one_side(sign * values, programme, tolerance)
+        found = _one_side(sign * values, programme, allowed, first)
+        evidence[first:, side], since[first:, side] = found[0][first:], found[1][first:]
     return Scan(evidence, since)
 
 
-def _one_side(y: Array, programme: NDArray[np.intp], tolerance: Array) -> tuple[Array, NDArray[np.intp]]:
+def _one_side(
+    y: Array, programme: NDArray[np.intp], tolerance: Array, first: int
+) -> tuple[Array, NDArray[np.intp]]:
     n, S = y.shape
     y = np.ascontiguousarray(y.T)
     there = np.isfinite(y)
-    shifted = np.where(there, y, np.nan) - tolerance[:, None]
+    shifted = np.where(there, y, np.nan) - tolerance.T
     below, size = np.zeros((S, n), dtype=np.int32), np.zeros((S, n), dtype=np.int32)
+    # changes that began earlier explain nothing of what is asked for, but their units are references
+    earliest = max(0, first - HORIZON + 1)
+    for i in range(earliest, n) if earliest else ():
+        same = (programme[: earliest - 1] == programme[i]) & there[:, : earliest - 1]
+        size[:, i] = same.sum(axis=1)
+        below[:, i] = (same & (shifted[:, i : i + 1] > y[:, : earliest - 1])).sum(axis=1)
     total, best = np.zeros((S, n)), np.zeros((S, n))
     since = np.full((S, n), -1, dtype=np.intp)
     likelihood = _Likelihood(n)
-    for j in range(n):
+    for j in range(earliest, n):
         if j:
             # units before j are the reference of those from j on
             same = (programme[j:] == programme[j - 1]) & there[:, j - 1 : j]
@@ -142,10 +154,10 @@ def _earlier_equals(codes: NDArray[np.intp], largest: int) -> NDArray[np.intp]:
     return counts
 
 
-def threshold(mean_units: float, streams: int) -> float:
+def threshold(mean_units: float | Array, streams: int) -> Array:
     """Log evidence that one of ``streams`` (both directions counted) must reach for a mean time of ``mean_units`` units.
 
     The probability of any alarm within t units is then at most t / (2 mean_units), so that the mean time to a false
     alarm is at least ``mean_units``.
     """
-    return float(np.log(2.0 * mean_units * streams))
+    return np.log(2.0 * np.asarray(mean_units, dtype=float) * streams)

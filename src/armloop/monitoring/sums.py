@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers
-from armloop.errors import LogError
-from armloop.log import MotionLog
+from armloop.data.blocks import block_numbers
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import condition, independent_rows, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
-from armloop.motion import Samples
-from armloop.signals import condition, independent_rows, smooth
+from armloop.util.errors import LogError
 
 Array = NDArray[np.float64]
 

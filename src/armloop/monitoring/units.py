@@ -10,9 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from armloop.monitoring.catalogue import Column
+from armloop.monitoring.ranks import HORIZON
 from armloop.monitoring.sums import FEWEST_ROWS
 
 Array = NDArray[np.float64]
@@ -121,14 +123,18 @@ def streams(columns: Sequence[Column], joints: int) -> list[Stream]:
     return listed + [Stream(ENERGY, j + 1, None, None) for j in range(joints)]
 
 
-def scores(units: Units) -> tuple[Array, Array]:
+def scores(units: Units, first: int = 0) -> tuple[Array, Array]:
     """Scores and tolerances of all streams.
 
     A column's score is the coefficient that it alone would be given, Σ x u / Σ x²; the energy's is the log of the mean
     square of the residual.
 
+    Args:
+        first: tolerances are wanted from this unit on; zero before.
+
     Returns:
-        values (U, S), NaN where the joint concerned did not slide, and tolerances (S,) in the same units.
+        values (U, S), NaN where the joint concerned did not slide, and tolerances (U, S) in the same units: the median
+        over the units up to each, as many as a change is looked for in.
     """
     n = units.rows.shape[1]
     slid = units.rows >= FEWEST_ROWS
@@ -143,9 +149,28 @@ def scores(units: Units) -> tuple[Array, Array]:
         raised = np.where(slid, np.log1p(TOLERANCE**2 * units.rows / units.energy), np.nan)
     values = np.concatenate([coefficient, energy], axis=1)
     limits = np.concatenate([allowed, raised], axis=1)
-    return np.where(np.isfinite(values), values, np.nan), _median(limits)
+    return np.where(np.isfinite(values), values, np.nan), _running_median(limits, first)
 
 
-def _median(x: Array) -> Array:
-    """(S,) median over the units that say something; zero where none does."""
-    return np.array([np.median(c[np.isfinite(c)]) if np.isfinite(c).any() else 0.0 for c in x.T])
+def _running_median(x: Array, first: int) -> Array:
+    """(U, S) median over the last `HORIZON` units that say something; zero where none does, and before ``first``."""
+    U, S = x.shape
+    out = np.zeros((U, S))
+    if first >= U:
+        return out
+    low = max(0, first - HORIZON + 1)
+    missing = max(0, HORIZON - 1 - first)
+    padded = np.concatenate([np.full((missing, S), np.nan), np.where(np.isfinite(x[low:]), x[low:], np.nan)])
+    # in portions, so that the windows of a long history do not lie side by side in memory
+    windows = sliding_window_view(padded, HORIZON, axis=0)
+    for begin in range(0, len(windows), HORIZON):
+        ordered = np.sort(windows[begin : begin + HORIZON], axis=2)
+        count = np.isfinite(ordered).sum(axis=2)
+        pair = [
+            np.take_along_axis(ordered, np.maximum(k, 0)[:, :, None], 2)[:, :, 0]
+            for k in ((count - 1) // 2, count // 2)
+        ]
+        middle = 0.5 * (pair[0] + np.where(count % 2 == 1, pair[0], pair[1]))
+        rows = slice(first + begin, first + begin + len(ordered))
+        out[rows] = np.where(count > 0, middle, 0.0)
+    return out

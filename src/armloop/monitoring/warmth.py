@@ -63,9 +63,9 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
     S = values.shape[1]
     learned, out = np.zeros(S, dtype=bool), values.copy()
     warmth = np.zeros((units.count, units.rows.shape[1]))
-    if np.isfinite(units.temperature).any():
+    if np.isfinite(units.temperature[:healthy]).any():
         known = "temperature"
-    elif np.isfinite(units.since_start).any():
+    elif np.isfinite(units.since_start[:healthy]).any():
         known = "since_start"
     else:
         return Adjusted(out, None, learned, warmth)

@@ -18,7 +18,7 @@ _NOTHING = 1e-20
 
 
 class Embedding(Protocol):
-    """Coefficients that are functions of free parameters; every effect is one (:class:`armloop.effects.Effect`)."""
+    """Coefficients that are functions of free parameters; every effect is one (:class:`armloop.laws.effects.Effect`)."""
 
     def start(self, beta: Array) -> Array:
         """Free parameters (k,) nearest to unconstrained coefficients (p,)."""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from armloop.arm import Arm
-from armloop.conditions import Clusters
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.regimes import Clusters
+from armloop.data.signals import condition, smooth
 from armloop.diagnosis import Diagnosis
-from armloop.log import MotionLog
-from armloop.motion import Samples
-from armloop.reconstruction import Reconstruction
+from armloop.identification.reconstruction import Reconstruction
 from armloop.reports import paper as published
 from armloop.reports.diagnosis_report import diagnosis_sections, strongest_joint
 from armloop.reports.findings import headline
@@ -47,10 +47,10 @@ from armloop.reports.words import (
     vector,
     with_error,
 )
-from armloop.signals import condition, smooth
+from armloop.robot.arm import Arm
 
 if TYPE_CHECKING:  # the class lives among Drake's systems, which a report need not load
-    from armloop.drake_systems.tracking import TrackingResult
+    from armloop.drake.experiments.tracking import TrackingResult
 
 _SPARK_SECONDS = 12.0
 

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from armloop.diagnosis import Diagnosis
+from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.reports.findings import findings, reasons
@@ -15,7 +16,6 @@ from armloop.reports.html import Picture, Section
 from armloop.reports.plots import residual_time_figure
 from armloop.reports.tables import Table, make_table, score_table
 from armloop.reports.words import counted, number, percent
-from armloop.scoring import Score
 
 _TITLE = "The same on measured data"
 

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.conditions import Clusters, sort_samples
-from armloop.log import MotionLog
-from armloop.motion import Motion, Samples
-from armloop.reconstruction import Reconstruction, StepReport
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion, Samples
+from armloop.data.regimes import Clusters, sort_samples
+from armloop.data.signals import condition
+from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import clusters_figure, friction_figure, has_trials, orders_figure, torque_figure
@@ -24,8 +26,6 @@ from armloop.reports.tables import (
     steps_table,
 )
 from armloop.reports.words import counted, number, percent
-from armloop.scoring import Score
-from armloop.signals import condition
 
 _ORDERS = (
     "Each candidate library was fitted with some blocks of data set aside; the smallest one whose error "

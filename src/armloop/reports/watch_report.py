@@ -24,7 +24,7 @@ from armloop.reports.words import counted, number
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
-from armloop.watch.verdicts import Tested, examine
+from armloop.watch.verdicts import Tested, examine, whole_history
 
 _HEAT = (
     "Each row is an arm, each column an effect. Colour: the most evidence there ever was for it, as a part of what raises "
@@ -55,7 +55,7 @@ def watch_report(
         one = _chosen(outcome, arm)
         path = model_for(find_models(models), one["arm"])
         if path is not None:
-            history = Store(store).history(one["arm"], one["model"])
+            history = whole_history(Store(store), one["arm"], one["model"])
             if model_and_digest(path)[1] == one["model"]:
                 sections.append(_trends(outcome, one["arm"], examine(history, how.hours, how.healthy)))
     sections += [_alarm(alarm, alarm["id"] in outcome.new) for alarm in reversed(outcome.alarms)]
@@ -158,7 +158,7 @@ def _trends(outcome: Outcome, arm: str, tested: Tested) -> Section:
     shown = [
         (place(_item(tested, s)), tested.adjusted.values[:, s], tested.watched.evidence[:, s]) for s in chosen
     ]
-    made = trend_figure(tested.history.units.when, shown, tested.watched.limit, alarms)
+    made = trend_figure(tested.history.units.when, shown, float(tested.watched.limits[-1]), alarms)
     return Section(f"Trends of {arm}", [], [Picture(made, _TREND)], [], [], list(tested.notes))
 
 

@@ -3,6 +3,7 @@
     STORE/store.json                         what this folder is
     STORE/sums/arm=A/day=D/LOG-MODEL.parquet  sums of one log against one model, one row per block
     STORE/aside/LOG-MODEL.json               a log that could not be used, and why
+    STORE/running/arm=A.parquet              what the tests need of the past, so that they go on where they were
     STORE/tested/arm=A.json                  what the tests have come to
     STORE/alarms/arm=A/ID.json               what was found
     STORE/announced.json                     which of these have been told
@@ -27,17 +28,14 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError
-from armloop.monitoring.catalogue import Column
-from armloop.monitoring.naming import Normal
 from armloop.monitoring.sums import LogSums
-from armloop.monitoring.units import Units, unit_edges
+from armloop.util.errors import InputError
 
 Array = NDArray[np.float64]
 
 SCHEMA = "armloop/watch/1"
-_PER_JOINT = ("rows", "mean", "energy", "lagged", "torque", "speed", "load", "temperature")
-_PER_BLOCK = ("start", "seconds", "since_start")
+PER_JOINT = ("rows", "mean", "energy", "lagged", "torque", "speed", "load", "temperature")
+PER_BLOCK = ("start", "seconds", "since_start")
 #: A draft older than this belongs to nobody, s.
 _STALE = 900.0
 
@@ -91,11 +89,11 @@ class Store:
 
     def known(self) -> set[tuple[str, str]]:
         """(log, model) digests of all logs that are stored."""
-        return {_digests(path) for path in self.folder.glob("sums/*/*/*.parquet")}
+        return {digests(path) for path in self.folder.glob("sums/*/*/*.parquet")}
 
     def known_aside(self) -> set[tuple[str, str]]:
         """(log, model) digests of all logs that are set aside."""
-        return {_digests(path) for path in self.folder.glob("aside/*.json")}
+        return {digests(path) for path in self.folder.glob("aside/*.json")}
 
     def add(self, arm: str, day: str, log: str, model: str, sums: LogSums, about: dict[str, Any]) -> None:
         """Append the sums of one log.
@@ -109,16 +107,15 @@ class Store:
 
         p = len(sums.columns)
         upper = np.triu_indices(p)
-        table: dict[str, Any] = {name: pyarrow.array(getattr(sums, name)) for name in _PER_BLOCK}
-        for name in _PER_JOINT:
-            table[name] = _lists(getattr(sums, name))
-        table["moment"] = _lists(sums.moment)
-        table["size"] = _lists(np.einsum("bpp->bp", sums.gram))
-        table["gram"] = _lists(sums.gram[:, upper[0], upper[1]])
+        table: dict[str, Any] = {name: pyarrow.array(getattr(sums, name)) for name in PER_BLOCK}
+        for name in PER_JOINT:
+            table[name] = lists(getattr(sums, name))
+        table["moment"] = lists(sums.moment)
+        table["size"] = lists(np.einsum("bpp->bp", sums.gram))
+        table["gram"] = lists(sums.gram[:, upper[0], upper[1]])
         about = {**about, "columns": [column.key for column in sums.columns]}
         written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
-        path = self.folder / "sums" / _partition(arm) / f"day={day}" / f"{log}-{model}.parquet"
-        with _placing(path) as draft:
+        with placing(self.file(arm, day, log, model)) as draft:
             pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
         for aside in self.folder.glob(f"aside/{log}-*.json"):
             aside.unlink(missing_ok=True)
@@ -138,13 +135,17 @@ class Store:
         """The arms that have logs, sorted."""
         return sorted(unquote(path.name.removeprefix("arm=")) for path in self.folder.glob("sums/arm=*"))
 
-    def history(self, arm: str, model: str) -> History:
-        """All that is stored of an arm against one model."""
-        return History.read(self.files(arm, model))
+    def running(self, arm: str) -> Path:
+        """Where the running state of an arm's tests lies."""
+        return self.folder / "running" / f"{_partition(arm)}.parquet"
 
     def files(self, arm: str, model: str) -> list[Path]:
         """The files of an arm's logs against one model."""
         return sorted((self.folder / "sums" / _partition(arm)).glob(f"day=*/*-{model}.parquet"))
+
+    def file(self, arm: str, day: str, log: str, model: str) -> Path:
+        """The file of one log against one model."""
+        return self.folder / "sums" / _partition(arm) / f"day={day}" / f"{log}-{model}.parquet"
 
     def tested(self, arm: str) -> dict[str, Any] | None:
         """What the tests of an arm came to when they were last made."""
@@ -182,90 +183,12 @@ class Store:
         _write(self.folder / "announced.json", json.dumps({"alarms": every}) + "\n")
 
 
-class History:
-    """The logs of one arm against one model, in the order in which they were recorded.
-
-    Attributes:
-        files: of the store.
-        logs: digests; names, programmes: per log.
-        units: their sums without the normal equations' off-diagonal entries.
-    """
-
-    def __init__(
-        self, files: list[Path], about: list[dict[str, Any]], units: Units, pieces: list[tuple[int, slice]]
-    ) -> None:
-        self.files, self.units, self._pieces = files, units, pieces
-        self.logs = [_digests(path)[0] for path in files]
-        self.names = [item["name"] for item in about]
-        self.programmes = [item["programme"] for item in about]
-
-    @staticmethod
-    def read(files: Sequence[Path]) -> History:
-        """Read what the tests need of these files (at least one)."""
-        import pyarrow.parquet
-
-        names = [*_PER_BLOCK, *_PER_JOINT, "moment", "size"]
-        tables = []
-        for path in files:
-            table = pyarrow.parquet.read_table(path, columns=names, use_threads=False, partitioning=None)
-            tables.append((json.loads(table.schema.metadata[b"armloop"]), table, path))
-        tables.sort(key=lambda item: (item[0]["when"], item[0]["name"], item[2].name))
-        about = [item[0] for item in tables]
-        number = {name: k for k, name in enumerate(sorted({item["programme"] for item in about}))}
-        rows: dict[str, list[Any]] = {}
-        pieces: list[tuple[int, slice]] = []
-        for index, (item, table, _) in enumerate(tables):
-            seconds = table["seconds"].to_numpy()
-            start = table["start"].to_numpy()
-            values = {name: _matrix(table[name]) for name in (*_PER_JOINT, "moment", "size")}
-            since = table["since_start"].to_numpy()
-            for piece in unit_edges(seconds):
-                pieces.append((index, piece))
-                unit = {
-                    "when": item["when"] + float(start[piece][0] - start[0]),
-                    "seconds": float(seconds[piece].sum()),
-                    "programme": number[item["programme"]],
-                    "log": index,
-                    "temperature": values["temperature"][piece].mean(axis=0),
-                    "since_start": float(since[piece].mean()),
-                }
-                for name in ("moment", "size", "rows", "energy", "torque"):
-                    unit[name] = values[name][piece].sum(axis=0)
-                for name, value in unit.items():
-                    rows.setdefault(name, []).append(value)
-        columns = tuple(Column.of(key) for key in about[0]["columns"])
-        integers = {"programme", "log"}
-        arrays = {
-            name: np.array(value, dtype=np.intp if name in integers else float)
-            for name, value in rows.items()
-        }
-        return History([item[2] for item in tables], about, Units(columns=columns, **arrays), pieces)
-
-    def normal(self, index: Sequence[int]) -> Normal:
-        """The normal equations of some units, read from their files."""
-        import pyarrow.parquet
-
-        p = len(self.units.columns)
-        upper = np.triu_indices(p)
-        gram = np.zeros((len(index), p, p))
-        for k, unit in enumerate(index):
-            log, piece = self._pieces[unit]
-            table = pyarrow.parquet.read_table(
-                self.files[log], columns=["gram"], use_threads=False, partitioning=None
-            )
-            packed = _matrix(table["gram"])[piece].sum(axis=0)
-            gram[k][upper] = packed
-            gram[k].T[upper] = packed
-        units = np.asarray(index, dtype=np.intp)
-        return Normal(gram, self.units.moment[units], self.units.energy[units].sum(axis=1))
-
-
 @contextmanager
-def _placing(path: Path) -> Iterator[Path]:
+def placing(path: Path) -> Iterator[Path]:
     """A draft that takes its place when the block ends well.
 
     All below a store is the store's own, and its bytes must not depend on the order of writing: the marks and records
-    by which :mod:`armloop.outputs` knows a command's outputs have no place here.
+    by which :mod:`armloop.util.outputs` knows a command's outputs have no place here.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
@@ -277,7 +200,7 @@ def _placing(path: Path) -> Iterator[Path]:
 
 
 def _write(path: Path, text: str) -> None:
-    with _placing(path) as draft:
+    with placing(path) as draft:
         draft.write_text(text, encoding="utf-8")
 
 
@@ -285,19 +208,22 @@ def _partition(arm: str) -> str:
     return f"arm={quote(arm, safe=' ')}"
 
 
-def _digests(path: Path) -> tuple[str, str]:
+def digests(path: Path) -> tuple[str, str]:
+    """Digests of the log and of the model that a file's sums are of."""
     log, _, model = path.stem.partition("-")
     return log, model
 
 
-def _lists(values: Array) -> Any:
+def lists(values: Array) -> Any:
+    """(N, k) as a column of lists of k."""
     import pyarrow
 
     flat = pyarrow.array(np.ascontiguousarray(values, dtype=float).ravel())
     return pyarrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
 
 
-def _matrix(column: Any) -> Array:
+def matrix(column: Any) -> Array:
+    """(N, k) of a column of lists of k."""
     whole = column.combine_chunks()
     width = whole.type.list_size
     return np.asarray(whole.flatten().to_numpy(zero_copy_only=False), dtype=float).reshape(-1, width)

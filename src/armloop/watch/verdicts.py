@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,23 +12,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
-from armloop.errors import InputError
-from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
+from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
+from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import FRICTION, Adjusted, adjust, without_warmth
+from armloop.util.errors import InputError
 from armloop.watch.fleet import model_and_digest
+from armloop.watch.history import Head, History
+from armloop.watch.running import Last, Running, stored
 from armloop.watch.sources import LogFile, read_recording
-from armloop.watch.store import History, Store
+from armloop.watch.store import Store
 
 Array = NDArray[np.float64]
 
 #: Healthy units before a change whose normal equations say what was there before, and seconds of logs that are diagnosed.
 _BEFORE, _DIAGNOSED = 40, 150.0
+#: Units after an alarm with which step and drift are told apart, and logs that are read at once.
+_AFTER, _AT_ONCE = 64, 256
 #: Friction falls by a fifth as joints warm (published for UR3 and UR5); a change within this part may be that.
 _WARM_UP = "friction falls by up to a fifth as a joint warms up; columns temperature or since_start would tell the two apart"
 
@@ -55,93 +61,206 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """An arm's history with all that was computed of it."""
+    """Units of an arm's history with all that was computed of them.
+
+    Attributes:
+        before: units of the arm that come before the first of ``watched``.
+        tail: the first of the history's units that ``watched`` is about; those before are the arm's first ones.
+        watched: of the units from ``tail`` on.
+    """
 
     history: History
     listed: list[Stream]
     adjusted: Adjusted
-    tolerance: Array
     watched: Watched
-    notes: list[str]
+    before: int
+    tail: int
+    notes: tuple[str, ...]
+
+    def at(self, number: int) -> int:
+        """Index in the history of a unit that is counted from the arm's first; it must be in the tail."""
+        return number - self.before + self.tail
 
 
-def examine(history: History, hours: float, healthy: int) -> Tested:
-    """Test a history against the promise of ``hours``."""
+def examine(history: History, hours: float, healthy: int, past: Running | None = None) -> Tested:
+    """Test the units of a history against the promise of ``hours``, going on from what was tested before.
+
+    Args:
+        history: units that were kept and new ones; those of ``past.numbers`` come first.
+    """
     units = history.units
-    values, tolerance = scores(units)
+    past = past or Running("")
+    numbers, reached = past.numbers, past.reached
+    gaps = np.flatnonzero(np.diff(numbers) > 1)
+    tail = int(gaps[0]) + 1 if len(gaps) else 0
+    before = int(numbers[tail]) if len(numbers) else 0
     listed = streams(units.columns, units.rows.shape[1])
+    own = units.take(slice(tail, None))
+    values, tolerance = scores(own, max(0, reached.first - before - HORIZON))
+    first = units.take(slice(0, tail))
+    if tail:
+        values = np.concatenate([scores(first, tail)[0], values])
     adjusted = adjust(units, values, listed, healthy)
-    mean_units = hours / (units.hours / units.count)
-    watched = find_alarms(adjusted.values, units.programme, tolerance, listed, mean_units)
-    return Tested(history, listed, adjusted, tolerance, watched, _notes(adjusted.values[:healthy]))
+    # operation up to each unit, added in its order: the same sum whether units come at once or one by one
+    whole = past.count == len(numbers)
+    since = 0 if whole else len(numbers)
+    elapsed = np.cumsum([0.0 if whole else past.seconds, *units.seconds[since:].tolist()])[1:]
+    seen = since - len(numbers) + past.count + np.arange(1, len(elapsed) + 1)
+    promised = np.full(own.count, hours * 3600.0)
+    promised[own.count - len(elapsed) :] = hours * 3600.0 * seen / elapsed
+    if adjusted.known is not None and units.count < healthy:
+        # what warmth does is not learned yet
+        allowed = np.broadcast_to(threshold(promised, 2 * len(listed)), own.count)
+        nothing = np.full((own.count, len(listed)), -np.inf)
+        watched = Watched([], nothing, allowed, reached.moved(-before))
+    else:
+        watched = find_alarms(
+            adjusted.values[tail:], own.programme, tolerance, listed, promised, reached.moved(-before)
+        )
+    return Tested(history, listed, adjusted, watched, before, tail, _notes(adjusted.values[:healthy]))
 
 
-def _notes(values: Array) -> list[str]:
+def _notes(values: Array) -> tuple[str, ...]:
     """What a reader must know of the promise's premise: whether healthy units follow each other like strangers."""
     if len(values) < 12:
-        return []
+        return ()
     ranks = np.argsort(np.argsort(values, axis=0), axis=0).astype(float)
     ranks -= ranks.mean(axis=0)
     lagged = (ranks[1:] * ranks[:-1]).sum(axis=0) / (ranks**2).sum(axis=0)
     typical = float(np.median(lagged[np.isfinite(values).all(axis=0)])) if len(lagged) else 0.0
     if typical < 2.0 / np.sqrt(len(values)):
-        return []
-    return [
+        return ()
+    return (
         f"successive healthy logs resemble each other (rank correlation {typical:.2f}): the promise on false alarms takes "
-        "them as interchangeable; sort them by programme (ARM/PROGRAMME/log) or make each log longer"
-    ]
+        "them as interchangeable; sort them by programme (ARM/PROGRAMME/log) or make each log longer",
+    )
 
 
 def test_arm(task: Task) -> dict[str, Any]:
-    """Test one arm, name what each new alarm is, and keep both in the store; what was tested before is not again."""
+    """Test an arm's new logs, name what each new alarm is, and keep both; what was tested before is not again."""
     store = Store(task.store)
     model, digest = model_and_digest(task.model)
-    logs = sorted(path.stem for path in store.files(task.arm, digest))
-    asked = json.dumps([logs, task.hours, task.healthy, task.full])
-    mark = hashlib.sha256(asked.encode()).hexdigest()[:16]
-    before = store.tested(task.arm)
-    if before is not None and before["mark"] == mark:
-        return before
-    history = store.history(task.arm, digest)
-    tested = examine(history, task.hours, task.healthy)
-    names = []
-    for index, alarm in enumerate(tested.watched.alarms):
-        name = _identifier(task.arm, history, alarm)
-        names.append(name)
-        if store.alarm(task.arm, name) is None:
-            earlier = store.alarm(task.arm, names[index - 1]) if index else None
-            store.add_alarm(task.arm, name, _explain(task, model, tested, alarm, name, earlier))
-    units = history.units
+    asked = json.dumps([digest, task.hours, task.healthy, task.full])
+    files = stored(store, task.arm, digest)
+    mark = hashlib.sha256(json.dumps([asked, sorted(files)]).encode()).hexdigest()[:16]
+    answer = store.tested(task.arm)
+    if answer is not None and answer["mark"] == mark:
+        return answer
+    past = Running.load(store, task.arm, digest)
+    if past is None or past.asked != asked or not past.seen <= files.keys():
+        past = Running(asked)
+    heads, columns = _heads(path for log, path in files.items() if log not in past.seen)
+    if past.history is not None and heads and heads[0] < past.history.logs[-1]:
+        # a log that came late: the order is another one
+        past = Running(asked)
+        heads, columns = _heads(files.values())
+    for begin in range(0, len(heads), _AT_ONCE):
+        new = History.read(heads[begin : begin + _AT_ONCE], columns)
+        past = _advance(task, store, model, past, new)
+    assert past.history is not None and past.most is not None
+    listed = streams(past.history.units.columns, past.history.units.rows.shape[1])
     answer = {
         "mark": mark,
         "arm": task.arm,
         "model": digest,
-        "logs": len(history.logs),
-        "units": units.count,
-        "hours": units.hours,
-        "last": float(units.when[-1]),
-        "limit": tested.watched.limit,
-        "warmth": tested.adjusted.known,
-        "evidence": _by_place(tested),
-        "alarms": names,
-        "notes": tested.notes,
+        "logs": len(past.seen),
+        "units": past.count,
+        "hours": past.seconds / 3600.0,
+        "last": float(past.history.units.when[-1]),
+        "limit": past.limit,
+        "warmth": past.known,
+        "evidence": _by_place(listed, past.most),
+        "alarms": list(past.alarms),
+        "notes": list(past.notes),
     }
+    if heads:
+        past.save(store, task.arm)
     store.set_tested(task.arm, answer)
     return answer
 
 
-def _identifier(arm: str, history: History, alarm: Alarm) -> str:
-    unit = history.units.log[alarm.unit]
-    piece = int((history.units.log[: alarm.unit] == unit).sum())
-    text = f"{arm} {history.logs[unit]} {piece}"
+def whole_history(store: Store, arm: str, model: str) -> History:
+    """All that is stored of an arm against one model."""
+    heads, columns = _heads(store.files(arm, model))
+    return History.read(heads, columns)
+
+
+def _heads(paths: Iterable[Path]) -> tuple[list[Head], tuple[Column, ...]]:
+    read = [Head.read(path) for path in paths]
+    return sorted(head for head, _ in read), read[0][1] if read else ()
+
+
+def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running, new: History) -> Running:
+    """Take in further logs: test them, explain the alarms, and let go of what no test will ask for again."""
+    history = new if past.history is None else past.history.then(new)
+    count = past.count + new.units.count
+    tested = examine(history, task.hours, task.healthy, past)
+    watched = tested.watched
+    names, last = list(past.alarms), past.last
+    for found in watched.alarms:
+        alarm = found.moved(tested.before)
+        _judge(task, store, tested, last, alarm.unit)
+        name = _identifier(task.arm, history, tested.at(alarm.unit))
+        earlier = store.alarm(task.arm, names[-1]) if names else None
+        known = store.alarm(task.arm, name)
+        explained, stream = _explain(task, model, tested, alarm, name, earlier, known is None)
+        if known is None:
+            store.add_alarm(task.arm, name, explained)
+        names.append(name)
+        last = Last(name, alarm, stream)
+    _judge(task, store, tested, last, count - 1)
+    reached = watched.reached.moved(tested.before)
+    kept = reached.begin
+    if last is not None and last.alarm.unit + _AFTER >= count:
+        kept = min(kept, last.alarm.unit)
+    kept = max(0, kept - 2 * HORIZON)
+    numbers = np.concatenate([past.numbers, np.arange(past.count, count)])
+    stay = np.flatnonzero((numbers < task.healthy) | (numbers >= kept))
+    seconds = float(np.cumsum(np.concatenate([[past.seconds], new.units.seconds]))[-1])
+    most = watched.evidence.max(axis=0)
+    return Running(
+        asked=past.asked,
+        seen=past.seen | {head.log for head in new.logs},
+        count=count,
+        seconds=seconds,
+        history=history.take(stay),
+        numbers=numbers[stay].astype(np.intp),
+        reached=reached,
+        most=most if past.most is None else np.maximum(past.most, most),
+        alarms=tuple(names),
+        last=last,
+        limit=float(watched.limits[-1]),
+        known=tested.adjusted.known,
+        notes=tested.notes,
+    )
+
+
+def _judge(task: Task, store: Store, tested: Tested, last: Last | None, until: int) -> None:
+    """Judge anew how the last alarm's effect came, with what is known by now."""
+    if last is None:
+        return
+    alarm = last.alarm
+    first, until = max(alarm.from_unit, alarm.since - HORIZON), min(until, alarm.unit + _AFTER)
+    known = store.alarm(task.arm, last.name)
+    if known is None or tested.at(first) < tested.tail:
+        return
+    span = slice(tested.at(first), tested.at(until) + 1)
+    units = tested.history.units
+    how = course(units.when[span], tested.adjusted.values[span, last.stream])
+    judged = {**known, "course": {**how.to_dict(), "of": _label(tested.listed[last.stream])}}
+    if judged != known:
+        store.add_alarm(task.arm, last.name, judged)
+
+
+def _identifier(arm: str, history: History, at: int) -> str:
+    text = f"{arm} {history.logs[history.units.log[at]].log} {history.pieces[at, 0]}"
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def _by_place(tested: Tested) -> list[dict[str, Any]]:
+def _by_place(listed: Sequence[Stream], most: Array) -> list[dict[str, Any]]:
     """The most evidence that there ever was for each effect at each place, natural logarithm."""
-    most = tested.watched.evidence.max(axis=0, initial=-np.inf)
     found: dict[tuple[str, int | None, int | None], float] = {}
-    for stream, value in zip(tested.listed, most.tolist(), strict=True):
+    for stream, value in zip(listed, most.tolist(), strict=True):
         found[stream.place] = max(found.get(stream.place, -np.inf), value)
     return [
         {
@@ -161,11 +280,12 @@ def _explain(
     alarm: Alarm,
     name: str,
     earlier: dict[str, Any] | None,
-) -> dict[str, Any]:
+    new: bool,
+) -> tuple[dict[str, Any], int]:
+    """What an alarm says, and the stream whose history shows its course; one that is not new is not diagnosed again."""
     history, units = tested.history, tested.history.units
-    until = next((a.unit for a in tested.watched.alarms if a.unit > alarm.unit), units.count - 1)
-    before = range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)
-    window = later_part(alarm.since, alarm.unit)
+    before = [tested.at(u) for u in range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)]
+    window = [tested.at(u) for u in later_part(alarm.since, alarm.unit)]
     named = name_change(
         model.arm,
         units.columns,
@@ -174,20 +294,21 @@ def _explain(
     )
     stream = tested.listed[alarm.stream]
     column = _main_column(tested, named, alarm)
-    span = slice(alarm.from_unit, until + 1)
-    how = course(units.when[span], tested.adjusted.values[span, column])
     logs = sorted({int(units.log[u]) for u in window})
-    delay = float(units.seconds[alarm.since : alarm.unit + 1].sum()) / 3600.0
+    at, since = tested.at(alarm.unit), tested.at(alarm.since)
+    delay = float(units.seconds[since : at + 1].sum()) / 3600.0
+    span = slice(tested.at(max(alarm.from_unit, alarm.since - HORIZON)), at + 1)
+    how = course(units.when[span], tested.adjusted.values[span, column])
     answer: dict[str, Any] = {
         "id": name,
         "arm": task.arm,
-        "when": float(units.when[alarm.unit] + units.seconds[alarm.unit]),
-        "since": float(units.when[alarm.since]),
-        "log": history.names[units.log[alarm.unit]],
-        "since_log": history.names[units.log[alarm.since]],
+        "when": float(units.when[at] + units.seconds[at]),
+        "since": float(units.when[since]),
+        "log": history.logs[units.log[at]].name,
+        "since_log": history.logs[units.log[since]].name,
         "delay": {"units": alarm.unit - alarm.since + 1, "operation_hours": delay},
         "log_evidence": alarm.log_evidence,
-        "limit": tested.watched.limit,
+        "limit": float(tested.watched.limits[alarm.unit - tested.before]),
         "false_alarm_hours": task.hours,
         "shown_by": {
             "effect": stream.name,
@@ -199,11 +320,11 @@ def _explain(
         "course": {**how.to_dict(), "of": _label(tested.listed[column])},
         "alternatives": _warm_up(tested.adjusted, named),
         "continues": _continues(earlier, named),
-        "notes": tested.notes,
+        "notes": list(tested.notes),
     }
-    if task.full:
-        answer["diagnosis"] = _diagnosis(task, model, [history.logs[log] for log in logs])
-    return answer
+    if task.full and new:
+        answer["diagnosis"] = _diagnosis(task, model, [history.logs[log].log for log in logs])
+    return answer, column
 
 
 def _equations(tested: Tested, index: Sequence[int], healthy: int) -> Normal:
@@ -229,7 +350,7 @@ def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm) -> int:
     if not named:
         return alarm.stream
     own = [s for s, stream in enumerate(tested.listed) if stream.place == named[0].place]
-    return max(own, key=lambda s: tested.watched.evidence[alarm.unit, s])
+    return max(own, key=lambda s: tested.watched.evidence[alarm.unit - tested.before, s])
 
 
 def _warm_up(adjusted: Adjusted, named: Sequence[Named]) -> list[dict[str, Any]]:

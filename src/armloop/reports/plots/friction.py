@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
 from armloop.reports.plots.style import BLUE, MUTED, every, figure, legend, panels, polish
 from armloop.reports.words import unit
-from armloop.signals import smooth
 
 Array = NDArray[np.float64]
 

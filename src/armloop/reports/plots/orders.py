@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from armloop.reconstruction import StepReport
+from armloop.identification.reconstruction import StepReport
 from armloop.reports.plots.style import BLUE, INK, MUTED, figure, panels, polish
 from armloop.reports.words import percent
 

@@ -1,0 +1,164 @@
+"""The running state of one arm's tests: what they need of the past, however long that is (sequential testing).
+
+Kept are the arm's first logs, from which warmth is learned, and the last few hundred; of the others only what they came
+to. All that is computed of a log depends on it and on those before it, so that logs that come one by one leave the same
+bytes as logs that come at once. A state that is lost, or whose order a late log upsets, is computed anew from the sums.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.monitoring.alarms import Alarm, Reached
+from armloop.monitoring.catalogue import Column
+from armloop.monitoring.units import Units
+from armloop.watch.history import Head, History
+from armloop.watch.store import Store, lists, matrix, placing
+
+Array = NDArray[np.float64]
+
+_VECTORS = ("when", "seconds", "since_start")
+_MATRICES = ("moment", "size", "rows", "energy", "torque", "temperature")
+
+
+@dataclass(frozen=True)
+class Last:
+    """The last alarm, whose course is judged anew as long as it becomes clearer.
+
+    Attributes:
+        name: its identifier.
+        alarm: where it was, units counted from the arm's first.
+        stream: whose history shows the course.
+    """
+
+    name: str
+    alarm: Alarm
+    stream: int
+
+
+@dataclass(frozen=True, eq=False)
+class Running:
+    """State of the tests of an arm after so many units.
+
+    Attributes:
+        asked: what it was computed with; another question begins anew.
+        seen: digests of the logs.
+        count: number of units; seconds: of operation.
+        history: the units that are kept, and numbers: (K,) which they are, counted from the arm's first.
+        reached: how far the tests are, counted likewise.
+        most: (S,) the most evidence that there ever was.
+        alarms: identifiers, in order; last: the last of them.
+        limit: the threshold; known: what tells how warm the arm is; notes: on the promise's premise.
+    """
+
+    asked: str
+    seen: frozenset[str] = frozenset()
+    count: int = 0
+    seconds: float = 0.0
+    history: History | None = None
+    numbers: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    reached: Reached = field(default_factory=Reached)
+    most: Array | None = None
+    alarms: tuple[str, ...] = ()
+    last: Last | None = None
+    limit: float = float("nan")
+    known: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def save(self, store: Store, arm: str) -> None:
+        """Write the state into its store (atomic write)."""
+        import pyarrow
+        import pyarrow.parquet
+
+        assert self.history is not None and self.most is not None
+        units = self.history.units
+        table: dict[str, Any] = {name: pyarrow.array(getattr(units, name)) for name in _VECTORS}
+        table |= {name: lists(getattr(units, name)) for name in _MATRICES}
+        table["number"], table["log"] = pyarrow.array(self.numbers), pyarrow.array(units.log)
+        table["piece"] = lists(self.history.pieces.astype(float))
+        about = {
+            "asked": self.asked,
+            "seen": sorted(self.seen),
+            "count": self.count,
+            "seconds": self.seconds,
+            "logs": [
+                [head.when, head.name, head.log, head.programme, head.path.parent.name.removeprefix("day=")]
+                for head in self.history.logs
+            ],
+            "columns": [column.key for column in units.columns],
+            "reached": vars(self.reached),
+            "most": [value if np.isfinite(value) else None for value in self.most.tolist()],
+            "alarms": self.alarms,
+            "last": None
+            if self.last is None
+            else {"name": self.last.name, "alarm": vars(self.last.alarm), "stream": self.last.stream},
+            "limit": self.limit,
+            "known": self.known,
+            "notes": self.notes,
+        }
+        written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
+        with placing(store.running(arm)) as draft:
+            pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
+
+    @staticmethod
+    def load(store: Store, arm: str, model: str) -> Running | None:
+        """Read the state of an arm; None where there is none that can be used."""
+        import pyarrow
+        import pyarrow.parquet
+
+        path = store.running(arm)
+        if not path.exists():
+            return None
+        try:
+            table = pyarrow.parquet.read_table(path, use_threads=False, partitioning=None)
+            about = json.loads(table.schema.metadata[b"armloop"])
+        except (OSError, pyarrow.ArrowException, KeyError, TypeError, ValueError):
+            # it holds nothing that the sums do not
+            return None
+        heads = [
+            Head(when, name, log, programme, store.file(arm, day, log, model))
+            for when, name, log, programme, day in about["logs"]
+        ]
+        return Running(
+            asked=about["asked"],
+            seen=frozenset(about["seen"]),
+            count=about["count"],
+            seconds=about["seconds"],
+            history=_history(table, heads, about["columns"]),
+            numbers=table["number"].to_numpy().astype(np.intp),
+            reached=Reached(**about["reached"]),
+            most=np.array([-np.inf if value is None else value for value in about["most"]]),
+            alarms=tuple(about["alarms"]),
+            last=None
+            if about["last"] is None
+            else Last(about["last"]["name"], Alarm(**about["last"]["alarm"]), about["last"]["stream"]),
+            limit=about["limit"],
+            known=about["known"],
+            notes=tuple(about["notes"]),
+        )
+
+
+def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> History:
+    names = sorted({head.programme for head in heads})
+    log = table["log"].to_numpy().astype(np.intp)
+    programme = np.array([names.index(head.programme) for head in heads], dtype=np.intp)
+    units = Units(
+        columns=tuple(Column.of(key) for key in columns),
+        log=log,
+        programme=programme[log],
+        **{name: table[name].to_numpy() for name in _VECTORS},
+        **{name: matrix(table[name]) for name in _MATRICES},
+    )
+    return History(tuple(heads), units, matrix(table["piece"]).astype(np.intp))
+
+
+def stored(store: Store, arm: str, model: str) -> dict[str, Path]:
+    """Files of an arm's logs against one model, by the digest of the log."""
+    return {path.stem.partition("-")[0]: path for path in store.files(arm, model)}
