@@ -1,4 +1,4 @@
-"""From measured logs to samples fit for regression: one uniform grid, one filter, one derivative.
+"""Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter, one differentiation.
 
 Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
 motion it belongs to stay together in time; runs are treated one by one, never across a gap.
@@ -130,7 +130,7 @@ def derivative(x: Array, period: float) -> Array:
     return np.gradient(x, period, axis=0, edge_order=2)
 
 
-def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
+def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
@@ -169,6 +169,9 @@ def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None 
     period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
     motion = Motion(time, q, v, vdot, starts)
     return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
+
+
+condition = preprocess  # the name before November 2026
 
 
 def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:

@@ -1,4 +1,4 @@
-"""What of a model another tool's description of an arm can say: links, drives, damping, dry friction, springs, gravity.
+"""Conversion of a model to another tool's description of an arm: links, drives, damping, dry friction, springs, gravity.
 
 A description has one number where a model has a law: what does not fit is named, with what is written in its place.
 """

@@ -1,4 +1,4 @@
-"""Moments of angle sums as they would be without the noise in q, v and v̇.
+"""Errors-in-variables moments of angle sums: as they would be without the noise in q, v and v̇.
 
 Gaussian noise e of covariance Σ in the angles shrinks every wave by its own factor, E cos k·(q + e) =
 exp(−½ kᵀΣk) cos k·q, and mixes none of them; noise in a factor of a power is undone by Hermite polynomials,

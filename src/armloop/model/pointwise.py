@@ -1,4 +1,4 @@
-"""Evaluating a model one sample at a time, fast enough for a 1 kHz loop in Python.
+"""Inverse dynamics of a model at one sample, fast enough for a 1 kHz loop in Python.
 
 Sparse terms of all steps are merged into one table of waves; friction is plain arithmetic; rigid bodies go through the
 recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Pointwise = Callable[[Array, Array, Array], Array]
 
 
-class Drive(Protocol):
+class InverseDynamics(Protocol):
     """Inverse dynamics of one sample."""
 
     def __call__(self, q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
@@ -38,7 +38,7 @@ def pointwise(
     friction: Sequence[Sequence[Acting]],
     effects: Sequence[tuple[bool, EffectPointwise]],
     step: int,
-) -> Drive:
+) -> InverseDynamics:
     """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
     Args:

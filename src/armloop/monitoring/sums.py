@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import condition, independent_rows, smooth
+from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
 from armloop.util.errors import LogError
@@ -96,7 +96,7 @@ def log_sums(
     n = model.arm.n
     if log.joints != n:
         raise LogError(f"{log.name}: {log.joints} joints; the model's arm {model.arm.name} has {n}")
-    samples = condition([log], model.conditioning)
+    samples = preprocess([log], model.conditioning)
     motion = samples.motion
     # two samples per period of the corner: what lies closer is not told apart by the filter
     kept = np.flatnonzero(independent_rows(samples))[::2]

@@ -1,4 +1,4 @@
-"""Sorting samples into static, constant-velocity and varying-velocity data.
+"""Classification of samples into motion regimes: static, constant-velocity and varying-velocity data.
 
 The relative activation indicator (Eqs. 5-8) maps the velocities and the accelerations of all joints to
 two numbers; k-means sorts the samples in that plane (Algorithm 1), and the elbow of the within-cluster

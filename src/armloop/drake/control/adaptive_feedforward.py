@@ -1,4 +1,4 @@
-"""What has been named joins the feedforward while the simulation runs, and leaves it again if it does not help."""
+"""Adaptive feedforward: an effect named while the simulation runs is added, and removed again if it does not help."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion nearest to a reference that the drives can do, by quadratic programs: limits of torque and of its rate.
+"""Reference governor: the motion nearest to a reference that the drives can do, by quadratic programs (torque, its rate).
 
 Where a reference asks for more torque than there is, or for it sooner, the drives clip: the arm falls behind, the
 integrator winds up, and it overshoots. Known ahead, the shortage can be met before it comes: the reference gives way, as

@@ -1,4 +1,4 @@
-"""How well a joint followed, besides its mean error: effort, torque not had, time in stick, settling after a reversal."""
+"""Tracking metrics besides the mean error: effort, torque not had, time in stick, settling after a reversal."""
 
 from __future__ import annotations
 

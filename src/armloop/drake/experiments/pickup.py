@@ -1,4 +1,4 @@
-"""A load is grasped while the arm follows its reference; what is learned from the log is used from then on."""
+"""Payload pick-up: a load is grasped while the arm tracks; what is learned from the log is used from then on."""
 
 from __future__ import annotations
 

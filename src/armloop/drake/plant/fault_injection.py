@@ -1,4 +1,4 @@
-"""Effects that a plant has and nobody declared, put into the simulated arm itself.
+"""Fault injection: effects that a plant has and nobody declared, put into the simulated arm itself.
 
 The laws are those of the diagnosis (:mod:`armloop.laws.effects`), with its sign: what the drive must supply *in addition* (a
 spring k (q - q0) pulls on the plant with -k (q - q0)), or what the sensor says. Nothing here knows how they are found

@@ -1,4 +1,4 @@
-"""What acts on the joints of a simulated arm besides torque-mode drives: friction, servos, springs, ripples."""
+"""Joint loads of a simulated arm besides torque-mode drives: friction, servos, springs, ripples."""
 
 from __future__ import annotations
 

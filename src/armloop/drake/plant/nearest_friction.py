@@ -1,4 +1,4 @@
-"""Eq. (34) nearest to the friction of a reconstructed model: what a simulated plant of the same arm is given."""
+"""Stribeck friction, Eq. (34), fitted to that of a reconstructed model: what a simulated plant of the arm is given."""
 
 from __future__ import annotations
 

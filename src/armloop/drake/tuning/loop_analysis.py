@@ -1,4 +1,4 @@
-"""How much room a PID loop has before it rings: margins of each joint's loop about a posture.
+"""Stability margins of each joint's PID loop about a posture: how much room it has before it rings.
 
 The arm at rest at q0 is linearised by Drake, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the
 stiffness of gravity. Dry friction is not linear and left out: it only adds damping where the joint slides.

@@ -1,4 +1,4 @@
-"""A small step by the linear loop and by the simulated arm: whether margins say what really happens."""
+"""Step responses of the linear loop and of the simulated arm: whether margins say what really happens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much more data a random reference needs for the coefficient error that an optimised one reaches."""
+"""Relative efficiency: how much more data a random reference needs for the coefficient error of an optimised one."""
 
 from __future__ import annotations
 

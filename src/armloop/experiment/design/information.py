@@ -1,4 +1,4 @@
-"""The information that a motion gives about coefficients, in units that no choice of units changes.
+"""Information matrix of a motion's regression, in units that no choice of units changes.
 
 Every column is divided by its root mean square over random motions within the same limits, counted in
 standard deviations of the torque noise of the joint it acts on. A coefficient's unit is then one noise level of

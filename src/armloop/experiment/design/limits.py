@@ -1,4 +1,4 @@
-"""What the arm may do: ranges of motion, and the torque that the motion is predicted to take."""
+"""Constraints of a designed motion: ranges of motion, and the torque that it is predicted to take."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Find the motion of a family that a criterion likes best, within the arm's limits.
+"""Constrained optimisation of a family's motion under a criterion, within the arm's limits.
 
 The columns are functions of each sample's state, so the criterion's derivative by the states costs one evaluation
 of the columns at 3 n + 1 neighbouring motions, whatever the number of coefficients; from the states to the

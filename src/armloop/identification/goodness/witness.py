@@ -1,4 +1,4 @@
-"""What a model leaves, beside all that it may depend on: rows to be judged, summed chunk by chunk."""
+"""Residuals beside all that they may depend on: rows to be judged, summed chunk by chunk."""
 
 from __future__ import annotations
 

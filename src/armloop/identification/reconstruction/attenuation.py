@@ -1,4 +1,4 @@
-"""A step's coefficients without the attenuation that noise in q, v and v̇ causes, on the terms already chosen.
+"""Errors-in-variables correction of a step's coefficients, on the terms already chosen: noise in q, v, v̇ attenuates them.
 
 One more pass over the samples: unbiased sums of the chosen terms and of the inherited ones, whose torque the noise
 attenuates as well. Friction columns count as exact: they are used where a joint clearly moves.
@@ -39,7 +39,7 @@ class _Sums:
         )
 
 
-def unattenuated(
+def without_attenuation(
     data: Data, choice: Choice, columns: Columns, fits: Sequence[Fit], snr: tuple[float, float, float]
 ) -> list[Fit]:
     """The fits with corrected coefficients, joint by joint; a joint's stay where noise drowns its columns.

@@ -20,7 +20,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, LowPass, ShortRunError, condition, uniform_period
+from armloop.data.signals import Conditioning, LowPass, ShortRunError, preprocess, uniform_period
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -176,7 +176,7 @@ def table_at(
     total = sum(log.samples for log in logs)
     for k, log in enumerate(logs):
         try:
-            samples = condition([log], replace(how, cutoff_hz=corner, oversampling=1e9))
+            samples = preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9))
         except ShortRunError:
             continue
         motion, period = samples.motion, uniform_period(log.time)

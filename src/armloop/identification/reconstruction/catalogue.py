@@ -1,4 +1,4 @@
-"""Every law of the catalogue may be a rung: which of them an arm had all along, found in its training data.
+"""Forward selection among the catalogue's laws: which of them an arm had all along, found in its training data.
 
 A law that the model lacks is half hidden, for the base parameters that were fitted without it have soaked up part of
 it: what is left looks like no law at all. So a law is judged on columns from which the model's own have been projected

@@ -1,4 +1,4 @@
-"""Sorting more samples than were clustered: each takes the condition of the nearest one that was."""
+"""Nearest-neighbour classification of samples into motion regimes that were found on fewer of them."""
 
 from __future__ import annotations
 

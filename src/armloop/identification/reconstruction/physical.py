@@ -1,4 +1,4 @@
-"""What physics demands of coefficients that were regressed, kept as linear inequalities.
+"""Physical-consistency constraints on regressed coefficients, kept as linear inequalities.
 
 M(q) is kept positive definite over the joint limits, not only where the arm was seen: cutting planes at random postures,
 and at the worst ones that a search finds afterwards, until it finds none. By how much is a small part of each joint's mean

@@ -1,4 +1,4 @@
-"""All terms chosen once more on all samples, where what the three steps leave is no noise.
+"""Reselection of all terms on all samples, where what the three steps leave is no noise.
 
 Each step inherits what the last one found, its mistakes too: fifty postures do not tell dozens of terms of gravity
 apart, and a hundred short stretches at constant velocity hardly tell those of two velocities. Samples at varying

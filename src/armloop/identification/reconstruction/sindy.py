@@ -1,4 +1,4 @@
-"""One-shot SINDy through pysindy: the baseline that the stepwise method has to beat on the same data.
+"""One-shot SINDy through pysindy: the reference method that the stepwise one has to beat on the same data.
 
 All candidates of the one library (velocities and accelerations together) are regressed on all samples at
 once by sequentially thresholded least squares (Brunton, Proctor and Kutz 2016).
@@ -96,7 +96,7 @@ def _stlsq(X: Array, tau: Array, names: list[str], threshold: float, ridge: floa
         feature_library=pysindy.IdentityLibrary(),
     )
     with warnings.catch_warnings():
-        # An ill-conditioned library is the baseline's own trouble and shows in its held-out error.
+        # An ill-conditioned library is the reference method's own trouble and shows in its held-out error.
         warnings.simplefilter("ignore")
         model.fit(X / size, t=1.0, x_dot=tau, feature_names=names)
     return np.asarray(model.coefficients()) / size

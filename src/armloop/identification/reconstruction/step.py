@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet, Factors
 from armloop.features.wave_moments import WaveProducts
-from armloop.identification.reconstruction.attenuation import unattenuated
+from armloop.identification.reconstruction.attenuation import without_attenuation
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.distinct import repeated, twins
 from armloop.identification.reconstruction.options import Options, StepReport
@@ -220,7 +220,7 @@ def regress_step(
     if not options.sparse.how.shrinks:
         final = _corrected(final, joints, partial(_gradients, data, choice, columns))
     if options.snr is not None:
-        final = unattenuated(data, choice, columns, final, options.snr)
+        final = without_attenuation(data, choice, columns, final, options.snr)
     terms, friction = _collect(final, candidates.step, columns, plan)
     reports = []
     for part, found in zip(plan.parts, terms, strict=True):

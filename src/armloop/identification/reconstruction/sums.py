@@ -1,4 +1,4 @@
-"""What a step's regression needs of the samples: sums over them, joint by joint, chunk by chunk.
+"""Sufficient statistics of a step's regression: sums over the samples, joint by joint, chunk by chunk.
 
 A sample counts for the joints that move in it. Samples are therefore summed apart by which joints move, and by
 whether they choose orders; the normal equations of a joint are the sums of its cells, and joints with the same cells

@@ -1,4 +1,4 @@
-"""How well a model predicts held-out samples, summed chunk by chunk."""
+"""Held-out prediction error of a model, summed chunk by chunk."""
 
 from __future__ import annotations
 

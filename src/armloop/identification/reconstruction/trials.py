@@ -1,4 +1,4 @@
-"""What candidate fits leave on samples that did not fit them, and the correction of a fit on the samples themselves."""
+"""Held-out residuals of candidate fits, and the correction of a fit on the samples themselves."""
 
 from __future__ import annotations
 

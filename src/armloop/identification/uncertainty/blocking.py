@@ -1,4 +1,4 @@
-"""How long residuals stay correlated, and blocks of samples so long that they count as independent."""
+"""Correlation time of residuals, and blocks of samples so long that they count as independent."""
 
 from __future__ import annotations
 
