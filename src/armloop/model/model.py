@@ -179,7 +179,8 @@ class ReconstructedModel:
             self._bare_context(motion, effects),
             load=load,
             predicted=predicted,
-            predict=lambda other: self._mechanical(other)[0],
+            # effects ask for the motion itself at every step of their search
+            predict=lambda other: predicted if other is motion else self._mechanical(other)[0],
         )
 
     def inertial_parameters(self) -> Array:
