@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armloop.data.motion import Samples
@@ -21,10 +20,9 @@ from armloop.identification.uncertainty.solving import solve_given_terms
 from armloop.identification.uncertainty.standard_errors import Fitted
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown, problems
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 from armloop_paper.simulated import Collection, Disturbance, collection, true_model
-
-Array = NDArray[np.float64]
 
 NOMINAL = 0.95
 

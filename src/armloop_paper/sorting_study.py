@@ -14,9 +14,9 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.regimes.sorting import Condition, sort_samples
 from armloop.data.signals import Conditioning, preprocess
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int_]
 
 #: Signal-to-noise ratios of velocity and acceleration, dB; the paper's Fig. 1 has 60 and 50.

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples, filter_reach
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -175,7 +174,7 @@ condition = preprocess  # the name before November 2026
 
 
 def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:
-    """Instants, s, that :func:`condition` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
+    """Instants, s, that :func:`preprocess` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
     kept, spans = [], []
     for run in log.runs():
         time = log.time[run]

@@ -14,9 +14,8 @@ from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 #: Instants of a run at which the feedforward is compared: as many as a figure can show.
 _INSTANTS = 2000

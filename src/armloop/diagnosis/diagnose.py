@@ -25,10 +25,9 @@ from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 SCHEMA = "armloop/diagnosis/2"
 

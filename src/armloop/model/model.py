@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
@@ -27,11 +26,10 @@ from armloop.model.components import COMPONENTS, Component
 from armloop.model.pointwise import InverseDynamics, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, ModelError
 from armloop.util.files import write_json
 from armloop.util.reading import read_json
-
-Array = NDArray[np.float64]
 
 SCHEMA = "armloop/model/2"
 

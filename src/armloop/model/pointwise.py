@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import KINDS, Acting, Sliding, stribeck_fall, torque_along
@@ -18,9 +17,9 @@ from armloop.model.components import Component, Lagrangian, RigidBody, SparseTer
 from armloop.model.wave_table import WaveTable
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH
 
-Array = NDArray[np.float64]
 Pointwise = Callable[[Array, Array, Array], Array]
 
 

@@ -19,9 +19,8 @@ from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 #: Longest block, s.
 BLOCK_SECONDS = 30.0

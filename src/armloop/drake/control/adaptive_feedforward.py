@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from armloop.laws.effects.base import Pointwise
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.blockwise import Known
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Effects = tuple[AddedEffect, ...]
 
 #: Seconds between two looks at what is named and at the tracking error.

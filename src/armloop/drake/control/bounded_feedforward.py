@@ -21,10 +21,9 @@ from armloop.drake.control.bounded_program import Program
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference, TableReference
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 8
 _NEAR = 0.3  # w of the program once a round moves the velocities farther than the one before

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 STILL = 1e-4
 """A joint slower than this rests, rad/s (m/s); sticking joints of the simulation creep 1e-7 at most."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.primitives import Linearize
@@ -26,9 +26,8 @@ from armloop.drake.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+
 Criterion = Callable[[Array], tuple[float, Array]]
 """F (p, p) -> its measure, and the measure's gradient (p, p)."""
 

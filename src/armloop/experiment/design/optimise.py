@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from armloop.data.motion import Motion
@@ -20,9 +19,8 @@ from armloop.experiment.design.information import Regression
 from armloop.experiment.design.limits import Limits
 from armloop.experiment.design.series import Series, sampled
 from armloop.experiment.excitation import FourierReference
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 #: Samples per period of the highest harmonic, while optimising and when checking.
 _COARSE, _FINE = 16, 320

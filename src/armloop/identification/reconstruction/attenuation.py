@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.unbiased import Noise, UnbiasedTerms, WaveTerm, wave_terms
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -19,8 +18,7 @@ from armloop.identification.reconstruction.sums import Choice, Columns
 from armloop.identification.reconstruction.trials import Fit
 from armloop.model.components import SparseTerms
 from armloop.regression.errors_in_variables import corrected
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

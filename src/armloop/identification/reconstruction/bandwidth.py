@@ -25,9 +25,8 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 #: Corners tried, as parts of the highest.
 _PARTS = (1.0, 0.71, 0.5, 0.35, 0.25)

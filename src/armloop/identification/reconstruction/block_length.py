@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import stretch
 from armloop.data.motion import Samples
@@ -22,8 +21,6 @@ from armloop.identification.reconstruction.shared import PLAIN_FRICTION
 from armloop.identification.uncertainty.blocking import correlation_time
 from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 #: Samples of the plain regression, from so many logs at most, and the speed from which on a joint counts as moving.
 _SAMPLES, _LOGS, _SLOW = 8000, 16, 0.01

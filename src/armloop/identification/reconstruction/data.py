@@ -23,11 +23,10 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, ShortRunError, independent_rows, preprocess, velocity_noise
 from armloop.identification.reconstruction.options import Options
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.

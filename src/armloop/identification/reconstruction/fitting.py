@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Samples
@@ -20,10 +19,8 @@ from armloop.identification.reconstruction.projected import Projected, Rows
 from armloop.identification.reconstruction.training import Training, fitted_rows
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: So many rows tell laws apart as well as more do.
 _ROWS = 15_000

@@ -21,7 +21,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.identification.reconstruction.design import Design
@@ -30,9 +29,8 @@ from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, 
 from armloop.identification.reconstruction.training import Training
 from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 #: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0

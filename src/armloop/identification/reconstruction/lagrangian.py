@@ -42,11 +42,10 @@ from armloop.identification.reconstruction.training import Survey, Training, fit
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Rows = NDArray[np.bool_]
 
 #: Most terms tried beside the joints' own inertias, and additions without a gain after which the search ends.

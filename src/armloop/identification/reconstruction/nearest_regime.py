@@ -8,8 +8,7 @@ from scipy.spatial import cKDTree
 
 from armloop.data.motion import Motion
 from armloop.data.regimes.indicators import units
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Of the largest speed or acceleration: less counts as none.
 _NONE = 1e-6

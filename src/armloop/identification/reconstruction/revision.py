@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.regimes import Condition
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -26,9 +25,8 @@ from armloop.identification.reconstruction.sums import Choice
 from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Part of the squared residual that repeats after a period of the filter from which on it is no noise.
 _MOST = 0.5

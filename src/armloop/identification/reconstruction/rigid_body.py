@@ -13,7 +13,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.dynamics.physics import joint_limits
@@ -37,9 +36,8 @@ from armloop.identification.reconstruction.training import Training
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Standard deviations of a link's mass from the URDF's that are tried, kg.
 _SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)

@@ -21,10 +21,9 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Thresholds as a share of each joint's torque; ridges as a share of the columns' squared size.
 _SETTINGS = [(threshold, ridge) for ridge in (1e-4, 1e-2) for threshold in (3e-3, 1e-2, 3e-2)]

@@ -27,10 +27,8 @@ from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ExcitationError, InputError
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
 STRIBECK_GRID = tuple(float(v) for v in np.round(np.geomspace(0.01, 1.0, 60), 4))

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
@@ -16,9 +15,8 @@ from armloop.identification.reconstruction import Options
 from armloop.identification.validation.crossvalidate import CrossValidation, crossvalidate
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 #: Postures drawn within the range of the training data, and as many beyond it.
 POSTURES = 500
