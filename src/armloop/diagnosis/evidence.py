@@ -20,8 +20,7 @@ from armloop.data.signals import independent_rows, smooth
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0

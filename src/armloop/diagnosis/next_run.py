@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.apart import Stage
 from armloop.diagnosis.diagnose import Diagnosis
@@ -22,11 +21,10 @@ from armloop.diagnosis.rivals import Law, found_laws, lookalikes, pairs
 from armloop.experiment.design import sampled
 from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import Effect
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 
 __all__ = ["FAR_ENOUGH", "NextRun", "Told", "Wish", "next_run", "training_ranges"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

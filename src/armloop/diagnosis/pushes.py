@@ -14,9 +14,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3

@@ -29,10 +29,8 @@ from armloop.diagnosis.search import Found, Outcome
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
 #: found at another joint, this part …

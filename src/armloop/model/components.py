@@ -14,11 +14,10 @@ from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors, product_name, products
 from armloop.features.lagrangian import EnergyTerms
 from armloop.robot.arm import Arm
-from armloop.robot.newton_euler import inverse_dynamics
+from armloop.robot.newton_euler import joint_torques
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
-from armloop.util.functions import NUMPY
 
-Array = NDArray[np.float64]
 Term = tuple[int, float, str]
 
 
@@ -156,11 +155,7 @@ class RigidBody:
         v = motion.v if step >= 2 else np.zeros_like(motion.v)
         vdot = motion.vdot if step >= 3 else np.zeros_like(motion.vdot)
         n = arm.n
-        links = inverse_dynamics(arm, self.parameters[: 10 * n], functions=NUMPY)
-        # A torque that no sample changes comes as a plain number.
-        tau = np.empty_like(motion.q)
-        for j, column in enumerate(links(*([x[:, j] for j in range(n)] for x in (motion.q, v, vdot)))):
-            tau[:, j] = column
+        tau = joint_torques(arm, self.parameters[: 10 * n], motion.q, v, vdot)
         return tau + self.parameters[10 * n :] * vdot if len(self.parameters) > 10 * n else tau
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:

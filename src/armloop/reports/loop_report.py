@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters
-from armloop.data.signals import condition, smooth
+from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import Diagnosis
 from armloop.identification.reconstruction import Reconstruction
 from armloop.reports import paper as published
@@ -76,7 +76,7 @@ class LoopResult(Protocol):
     @property
     def reconstruction(self) -> Reconstruction: ...
     @property
-    def baseline(self) -> Reconstruction | None: ...
+    def reference(self) -> Reconstruction | None: ...
     @property
     def tracking(self) -> Mapping[str, TrackingResult]: ...
     @property
@@ -112,7 +112,7 @@ def loop_report(
     sections = [
         _measure_section(result),
         conditions_section(result.clusters),
-        *reconstruction_sections(result.reconstruction, varying, result.baseline),
+        *reconstruction_sections(result.reconstruction, varying, result.reference),
         _control_section(result),
         *diagnosis_sections(result.diagnosis, ["the second run"]),
         _truth_section(result),
@@ -249,7 +249,7 @@ def mean_eta(result: TrackingResult) -> float:
 def _varying(result: LoopResult) -> Samples:
     """The richest log, conditioned as the model's were."""
     longest = max(result.logs.values(), key=lambda log: max(run.stop - run.start for run in log.runs()))
-    return condition([longest], result.reconstruction.model.conditioning)
+    return preprocess([longest], result.reconstruction.model.conditioning)
 
 
 def _piece(samples: Samples) -> slice:

@@ -10,7 +10,7 @@ import numpy as np
 from armloop.diagnosis import Diagnosis
 from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
-from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, reasons
 from armloop.reports.html import Picture, Section
 from armloop.reports.plots import residual_time_figure
@@ -63,7 +63,14 @@ def measured_section(result: MeasuredResult) -> Section:
         _TITLE,
         text,
         [Picture(residual_time_figure(result.diagnosis), caption)],
-        [_free_table(result), *([_pushes_table(result), _during_table(result)] if contacts else [])],
+        [
+            _free_table(result),
+            *(
+                [events_table(result.diagnosis), _pushes_table(result), _during_table(result)]
+                if contacts
+                else []
+            ),
+        ],
         notes=reasons(result.diagnosis),
     )
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Parameters of one link, about its frame's origin and in its frame.
 LINK_PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+#: Samples that are carried along the chain together: their columns stay in a processor's cache.
+_AT_A_TIME = 1024
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class LinkMotion:
     """Motion of every link, expressed in the link's own frame.
 
     Attributes:
-        R: (n, N, 3, 3) rotation from link i's frame into the previous link's.
-        p: (n, N, 3) origin of link i in the previous link's frame, m.
-        w, wdot: (n, N, 3) angular velocity and acceleration, rad/s, rad/s².
-        a: (n, N, 3) acceleration of the origin minus gravity, m/s².
+        R: (n, 3, 3, N) rotation from link i's frame into the previous link's.
+        p: (n, 3, N) origin of link i in the previous link's frame, m.
+        w, wdot: (n, 3, N) angular velocity and acceleration, rad/s, rad/s².
+        a: (n, 3, N) acceleration of the origin minus gravity, m/s².
     """
 
     R: Array
@@ -47,9 +47,23 @@ def _rotations(axis: Array, angle: Array) -> Array:
     return np.eye(3) + s * K + (1 - c) * (K @ K)
 
 
+def _cross(x: Array, y: Array) -> Array:
+    """x × y along the first axis; the others broadcast (np.cross takes several times as long)."""
+    out = np.empty(np.broadcast_shapes(x.shape, y.shape))
+    out[0] = x[1] * y[2] - x[2] * y[1]
+    out[1] = x[2] * y[0] - x[0] * y[2]
+    out[2] = x[0] * y[1] - x[1] * y[0]
+    return out
+
+
+def _out_of(R: Array, x: Array) -> Array:
+    """Express x (3, ..., N) of the frame whose rotation is R (3, 3, ..., N) in the previous frame: R x."""
+    return np.asarray(R[:, 0] * x[0] + R[:, 1] * x[1] + R[:, 2] * x[2])
+
+
 def _into(R: Array, x: Array) -> Array:
-    """Express x (N, 3) of the previous frame in the frame whose rotation is R: Rᵀ x."""
-    return np.einsum("kji,kj->ki", R, x)
+    """Express x (3, N) of the previous frame in the frame whose rotation is R (3, 3, N): Rᵀ x."""
+    return np.asarray(R[0] * x[0] + R[1] * x[1] + R[2] * x[2])
 
 
 def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None = None) -> LinkMotion:
@@ -61,59 +75,55 @@ def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None
     """
     N, n = q.shape
     g = arm.gravity if gravity is None else np.asarray(gravity, dtype=float)
-    R, p = np.empty((n, N, 3, 3)), np.empty((n, N, 3))
-    w, wdot, a = np.empty((n, N, 3)), np.empty((n, N, 3)), np.empty((n, N, 3))
-    w_prev, wdot_prev = np.zeros((N, 3)), np.zeros((N, 3))
-    a_prev = np.broadcast_to(-g, (N, 3))
+    R, p = np.empty((n, 3, 3, N)), np.empty((n, 3, N))
+    w, wdot, a = np.empty((n, 3, N)), np.empty((n, 3, N)), np.empty((n, 3, N))
+    w_prev, wdot_prev = np.zeros((3, 1)), np.zeros((3, 1))
+    a_prev = -g[:, None]
     for i, joint in enumerate(arm.joints):
         R_PF, p_PF, s = arm.X_PF[i, :3, :3], arm.X_PF[i, :3, 3], arm.axis[i]
         turning = joint.kind == "revolute"
         if turning:
-            R[i] = R_PF @ _rotations(s, q[:, i])
-            p[i] = p_PF
+            x, y, z = s
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            B, C = R_PF @ K, R_PF @ (K @ K)  # Rodrigues
+            R[i] = R_PF[..., None] + B[..., None] * np.sin(q[:, i]) + C[..., None] * (1 - np.cos(q[:, i]))
+            p[i] = p_PF[:, None]
         else:
-            R[i] = R_PF
-            p[i] = p_PF + q[:, i : i + 1] * (R_PF @ s)
-        rotated = wdot_prev, w_prev
-        carried = a_prev + np.cross(rotated[0], p[i]) + np.cross(w_prev, np.cross(w_prev, p[i]))
-        w_i, wdot_i, a_i = _into(R[i], w_prev), _into(R[i], wdot_prev), _into(R[i], carried)
-        rate, accel = v[:, i : i + 1] * s, vdot[:, i : i + 1] * s
+            R[i] = R_PF[..., None]
+            p[i] = p_PF[:, None] + (R_PF @ s)[:, None] * q[:, i]
+        carried = a_prev + _cross(wdot_prev, p[i]) + _cross(w_prev, _cross(w_prev, p[i]))
+        w[i], wdot[i], a[i] = _into(R[i], w_prev), _into(R[i], wdot_prev), _into(R[i], carried)
+        rate, accel = s[:, None] * v[:, i], s[:, None] * vdot[:, i]
         if turning:
-            wdot_i = wdot_i + accel + np.cross(w_i, rate)
-            w_i = w_i + rate
+            wdot[i] += accel + _cross(w[i], rate)
+            w[i] += rate
         else:
-            a_i = a_i + accel + 2 * np.cross(w_i, rate)
-        w[i], wdot[i], a[i] = w_i, wdot_i, a_i
-        w_prev, wdot_prev, a_prev = w_i, wdot_i, a_i
+            a[i] += accel + 2 * _cross(w[i], rate)
+        w_prev, wdot_prev, a_prev = w[i], wdot[i], a[i]
     return LinkMotion(R, p, w, wdot, a)
 
 
-def _skew(x: Array) -> Array:
-    out = np.zeros((*x.shape[:-1], 3, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = x[..., 2], -x[..., 1], x[..., 0]
-    return out
-
-
 def _inertia_columns(w: Array) -> Array:
-    """(N, 3, 6): w -> L with I w = L [Ixx Iyy Izz Ixy Ixz Iyz]."""
-    out = np.zeros((len(w), 3, 6))
-    x, y, z = w.T
-    out[:, 0, 0], out[:, 0, 3], out[:, 0, 4] = x, y, z
-    out[:, 1, 1], out[:, 1, 3], out[:, 1, 5] = y, x, z
-    out[:, 2, 2], out[:, 2, 4], out[:, 2, 5] = z, x, y
+    """(3, 6, N): w (3, N) -> L with I w = L [Ixx Iyy Izz Ixy Ixz Iyz]."""
+    out = np.zeros((3, 6, w.shape[1]))
+    x, y, z = w
+    out[0, 0], out[0, 3], out[0, 4] = x, y, z
+    out[1, 1], out[1, 3], out[1, 5] = y, x, z
+    out[2, 2], out[2, 4], out[2, 5] = z, x, y
     return out
 
 
-def link_wrench_columns(w: Array, wdot: Array, a: Array) -> tuple[Array, Array]:
-    """Force and moment (about the link's origin) per unit of each link parameter: (N, 3, 10) each."""
-    N = len(w)
-    force, moment = np.zeros((N, 3, 10)), np.zeros((N, 3, 10))
-    W = _skew(w)
-    force[:, :, 0] = a
-    force[:, :, 1:4] = _skew(wdot) + W @ W
-    moment[:, :, 1:4] = -_skew(a)
-    moment[:, :, 4:] = _inertia_columns(wdot) + W @ _inertia_columns(w)
+def _wrench_columns(w: Array, wdot: Array, a: Array) -> tuple[Array, Array]:
+    """Force (3, 4, N) per unit of m, mx, my, mz of a link (it depends on no others), and moment (3, 10, N) about the
+    link's origin per unit of each of its parameters.
+    """
+    N = w.shape[1]
+    force, moment = np.empty((3, 4, N)), np.zeros((3, 10, N))
+    axes = np.eye(3)[:, :, None]
+    force[:, 0] = a
+    force[:, 1:] = _cross(wdot[:, None], axes) + _cross(w[:, None], _cross(w[:, None], axes))
+    moment[:, 1:4] = _cross(axes, a[:, None])
+    moment[:, 4:] = _inertia_columns(wdot) + _cross(w[:, None], _inertia_columns(w))
     return force, moment
 
 
@@ -127,18 +137,25 @@ def regressor(
     """
     N, n = q.shape
     chosen = list(range(n)) if links is None else links
-    motion = link_motion(arm, q, v, vdot, gravity)
     Y = np.zeros((N, n, 10 * len(chosen)))
-    for k, link in enumerate(chosen):
-        force, moment = link_wrench_columns(motion.w[link], motion.wdot[link], motion.a[link])
-        for i in range(link, -1, -1):
-            wrench = moment if arm.joints[i].kind == "revolute" else force
-            Y[:, i, 10 * k : 10 * k + 10] = np.einsum("j,kjp->kp", arm.axis[i], wrench)
-            if i:
-                lever = motion.p[i][:, :, None]
-                force = motion.R[i] @ force
-                moment = motion.R[i] @ moment + np.cross(lever, force, axis=1)
+    for first in range(0, N, _AT_A_TIME):
+        some = slice(first, first + _AT_A_TIME)
+        motion = link_motion(arm, q[some], v[some], vdot[some], gravity)
+        for k, link in enumerate(chosen):
+            _fill(Y[some, :, 10 * k : 10 * k + 10], arm, motion, link)
     return Y
+
+
+def _fill(Y: Array, arm: Arm, motion: LinkMotion, link: int) -> None:
+    """Write the columns of one link's parameters, (N, n, 10): its wrench, carried inwards along the chain."""
+    force, moment = _wrench_columns(motion.w[link], motion.wdot[link], motion.a[link])
+    for i in range(link, -1, -1):
+        wrench = moment if arm.joints[i].kind == "revolute" else force
+        Y[:, i, : wrench.shape[1]] = np.tensordot(arm.axis[i], wrench, 1).T
+        if i:
+            R = motion.R[i][:, :, None]
+            force, moment = _out_of(R, force), _out_of(R, moment)
+            moment[:, :4] += _cross(motion.p[i][:, None], force)
 
 
 def nominal_parameters(arm: Arm) -> Array:

@@ -11,12 +11,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.arm import Arm
-from armloop.util.functions import MATH, Functions
+from armloop.util.arrays import Array
+from armloop.util.functions import MATH, NUMPY, Functions
 
-Array = NDArray[np.float64]
 Vector = tuple[Any, Any, Any]
 MassMatrix = Callable[[Sequence[Any] | Array], list[list[Any]]]
 InverseDynamics = Callable[[Sequence[Any] | Array, Sequence[Any] | Array, Sequence[Any] | Array], list[Any]]
@@ -88,6 +87,16 @@ def inverse_dynamics(
         return tau
 
     return torques
+
+
+def joint_torques(arm: Arm, parameters: Array, q: Array, v: Array, vdot: Array) -> Array:
+    """(N, n) joint torques of links with these parameters (10 n,) on samples q, v, vdot, (N, n) each."""
+    law = inverse_dynamics(arm, parameters, functions=NUMPY)
+    tau = np.empty_like(q)
+    # A torque that no sample changes comes as a plain number.
+    for j, column in enumerate(law(*([x[:, j] for j in range(arm.n)] for x in (q, v, vdot)))):
+        tau[:, j] = column
+    return tau
 
 
 def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> MassMatrix:

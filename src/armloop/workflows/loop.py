@@ -12,7 +12,7 @@ import numpy as np
 
 from armloop.data.log import MotionLog, read_log, write_log
 from armloop.data.regimes import Clusters, sort_samples
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan, load_tracking
@@ -55,7 +55,7 @@ class LoopResult:
 
     Attributes:
         logs: what was collected, per condition.
-        reconstruction, baseline: the stepwise model, and one-shot SINDy on the same logs.
+        reconstruction, reference: the stepwise model, and one-shot SINDy on the same logs.
         tracking: PID, PID + Step I, PID + Step III on the arm as it was collected.
         diagnosis: of the second measured run.
         undeclared: the effect that was put into the plant, as revealed after the verdict.
@@ -70,7 +70,7 @@ class LoopResult:
     logs: dict[str, MotionLog]
     clusters: Clusters
     reconstruction: Reconstruction
-    baseline: Reconstruction | None
+    reference: Reconstruction | None
     tracking: dict[str, TrackingResult]
     diagnosis: Diagnosis
     undeclared: dict[str, Any]
@@ -108,7 +108,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise")
             model = reconstruction.model
             model.save(folder / "model.json")
-            samples = condition(list(logs.values()), model.conditioning)
+            samples = preprocess(list(logs.values()), model.conditioning)
             clusters = sort_samples(samples.motion)
         print(steps_table(reconstruction.reports), end="\n\n")
         print(score_table(reconstruction.held_out, plant.arm), end="\n\n", flush=True)
@@ -119,7 +119,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             tracking = {name: run.result() for name, run in zip(scenario.controllers, runs, strict=True)}
             # last in the queue: it has a core while the main process diagnoses and draws
             pushed = workers.submit(_measured, folder / MEASURED)
-            baseline = one_shot.result()
+            reference = one_shot.result()
         print(eta_table(tracking, paper=True), end="\n\n", flush=True)
         with _Clock(
             seconds, "diagnose", progress, "4/7 measured again: tracing the residual of the second run"
@@ -143,7 +143,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         logs=logs,
         clusters=clusters,
         reconstruction=reconstruction,
-        baseline=baseline,
+        reference=reference,
         tracking=tracking,
         diagnosis=diagnosis,
         undeclared=_revealed(undeclared),
@@ -176,7 +176,7 @@ def loop_answer(result: LoopResult, scenario: TrackingScenario) -> dict[str, Any
         "schema": SCHEMA,
         "seed": result.seed,
         "reconstruct": result.reconstruction.to_dict(),
-        "sindy": None if result.baseline is None else result.baseline.to_dict(),
+        "sindy": None if result.reference is None else result.reference.to_dict(),
         "tracking": tracking_answer(scenario, result.tracking),
         "diagnosis": result.diagnosis.to_dict(),
         "undeclared": result.undeclared,

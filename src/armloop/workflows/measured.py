@@ -10,7 +10,7 @@ import numpy as np
 
 from armloop.data.log import read_log
 from armloop.data.motion import Samples
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, close, diagnose
 from armloop.identification.reconstruction import reconstruct
 from armloop.identification.scoring import Score, residual, score
@@ -77,7 +77,7 @@ def run_measured(folder: Path, progress: Progress) -> MeasuredResult:
         recorded={"unit": "A", "drive_gains": _GAINS},
     ).model
     progress("2/3 a free run that the model was not made of")
-    free = score(model, condition([log(_FREE)], model.conditioning))
+    free = score(model, preprocess([log(_FREE)], model.conditioning))
     progress("3/3 the same motion, in which something happened that nobody declared")
     pushed = log(_PUSHED)
     diagnosis = diagnose(model, [pushed], progress)

@@ -52,7 +52,7 @@ def test_a_payload_in_motion_is_mass_times_acceleration():
     com = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
     without_gravity = replace(arm, gravity=np.zeros(3))
     tau = Payload().torque(Context(without_gravity, motion), PAYLOAD)
-    w = link_motion(arm, motion.q, motion.v, motion.vdot).w[-1]
+    w = link_motion(arm, motion.q, motion.v, motion.vdot).w[-1].T
     step = 1e-6
 
     def centre(q: np.ndarray) -> np.ndarray:

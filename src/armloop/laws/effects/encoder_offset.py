@@ -1,4 +1,4 @@
-"""A position reading of one joint that is shifted by a constant."""
+"""Encoder offset: a position reading of one joint that is shifted by a constant."""
 
 from __future__ import annotations
 
@@ -50,6 +50,8 @@ class EncoderOffset(Effect):
 
     def _shifted(self, context: Context, offset: float) -> Array:
         assert self.joint is not None and context.predict is not None
+        if offset == 0.0:
+            return context.predict(context.motion)
         q = np.array(context.motion.q)
         q[:, self.joint - 1] -= offset
         return context.predict(replace(context.motion, q=q))
