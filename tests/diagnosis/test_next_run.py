@@ -112,7 +112,7 @@ CASES: dict[str, tuple[Law, float, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["spring", pytest.param("encoder", marks=pytest.mark.long)])
 def test_the_next_run_names_what_is_there_and_has_no_such_alternatives(model, case) -> None:
     law, size, truth = CASES[case]
     first = diagnose(model, [log(small_motion(3, size), law, 3)])
