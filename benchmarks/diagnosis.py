@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from armloop.data.blocks import block_numbers
 from armloop.data.log import MotionLog
-from armloop.data.signals import condition, smooth
+from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.identification.scoring import score
 from armloop.laws.effects import hypotheses
@@ -138,7 +138,7 @@ def problem(n: int, seconds: float, rate: float) -> tuple[ReconstructedModel, di
     size = np.sqrt(np.mean(torque(arm, links, *motion(n, 20.0, 50.0, 1)[1:]) ** 2, axis=0))
     law = friction(np.maximum(size, 0.2 * size.max()))
     bare = ReconstructedModel(arm, (RigidBody(links, (), np.zeros(0)),), law)
-    clean = condition([run(arm, law, links, 0.0, seconds, rate, 2)], bare.conditioning)
+    clean = preprocess([run(arm, law, links, 0.0, seconds, rate, 2)], bare.conditioning)
     model = replace(bare, baseline=score(bare, clean).moving)
     loaded = np.array(links)
     mass, centre = 0.15 * links[::10].sum(), np.array([0.05, 0.02, 0.0])
@@ -177,7 +177,7 @@ def split(model: ReconstructedModel, log: MotionLog) -> list[tuple[str, float]]:
 def rival(model: ReconstructedModel, log: MotionLog) -> tuple[float, int]:
     """Seconds of one pass of refits by `numpy.linalg.lstsq`, and how many there were."""
     start = time.perf_counter()
-    samples = condition([log], model.conditioning)
+    samples = preprocess([log], model.conditioning)
     listed = hypotheses(model.arm)
     context = model.context(samples.motion, listed)
     left = samples.tau - smooth(samples, model.predict(samples.motion))

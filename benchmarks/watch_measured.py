@@ -32,7 +32,7 @@ from watch_promise import EVERY_S, UNIT_SECONDS, delay, delays_header, false_ala
 
 from armloop.data.log import MotionLog, read_log  # noqa: E402
 from armloop.data.motion import Motion  # noqa: E402
-from armloop.data.signals import condition  # noqa: E402
+from armloop.data.signals import preprocess  # noqa: E402
 from armloop.identification.reconstruction import reconstruct  # noqa: E402
 from armloop.model import ReconstructedModel  # noqa: E402
 from armloop.monitoring.alarms import find_alarms  # noqa: E402
@@ -111,7 +111,7 @@ def read(folder: Path, patterns: tuple[str, ...], gains: tuple[float, ...] | Non
 
 def with_torque(model: ReconstructedModel, log: MotionLog, law: Law, level: float) -> MotionLog:
     """A log as it would be with a further torque along the same motion."""
-    motion = condition([log], model.conditioning).motion
+    motion = preprocess([log], model.conditioning).motion
     more = level * law(model, motion)
     return replace(
         log, tau=log.tau + np.column_stack([np.interp(log.time, motion.time, column) for column in more.T])

@@ -10,7 +10,7 @@ from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.export.consistent import pseudo_inertias
 from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.features.lagrangian import candidates
@@ -133,7 +133,7 @@ def as_it_was(log: MotionLog | None = None) -> ReconstructedModel:
     bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
     if log is None:
         return bare
-    return replace(bare, baseline=score(bare, condition([log], bare.conditioning)).moving)
+    return replace(bare, baseline=score(bare, preprocess([log], bare.conditioning)).moving)
 
 
 def six_joints() -> Arm:

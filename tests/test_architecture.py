@@ -4,12 +4,15 @@ A new package has to be put into `LAYERS`; if it is not clear where, the plan is
 """
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from armloop.moved import present_name
 
 SOURCE = Path(__file__).resolve().parents[1] / "src"
 
@@ -48,7 +51,7 @@ FORBIDDEN = {
     "identification": {"drake"},
 }
 # All that pure numerics (arrays in, arrays out) may know.
-ONLY = {"regression": {"armloop.util.errors", "armloop.util.registry"}}
+ONLY = {"regression": {"armloop.util.arrays", "armloop.util.errors", "armloop.util.registry"}}
 
 
 def modules() -> dict[str, Path]:
@@ -135,6 +138,36 @@ def test_the_paper_is_known_to_its_command_alone() -> None:
         if is_within(module, "armloop") and module != "armloop.commands.reproduce":
             for name in imports(module):
                 assert not is_within(name, "armloop_paper"), f"{module} imports {name}"
+
+
+FORMER = re.compile(r"(?<![\w.])armloop(?:\.\w+)+")
+#: What tells or tests the former names.
+TELLING = {"tests/test_moved.py", "src/armloop/moved.py", "docs/moved.md"}
+
+
+def test_nothing_here_uses_a_former_name() -> None:
+    root = SOURCE.parent
+    for path in [
+        *SOURCE.rglob("*.py"),
+        *(p for kind in ("tests", "benchmarks", "scenarios") for p in (root / kind).rglob("*.py")),
+    ]:
+        if str(path.relative_to(root)) not in TELLING:
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    names = [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
+                for name in names:
+                    assert present_name(name) is None, f"{path}: {name} is now {present_name(name)}"
+    for page in [
+        root / "README.md",
+        root / "CONTRIBUTING.md",
+        *(root / "docs").rglob("*.md"),
+        *(root / "docs").rglob("*.py"),
+    ]:
+        if str(page.relative_to(root)) not in TELLING:
+            for line in page.read_text(encoding="utf-8").splitlines():
+                for name in [] if "entry-points" in line else FORMER.findall(line):
+                    assert present_name(name) is None, f"{page}: {name} is now {present_name(name)}"
 
 
 def test_no_modules_import_each_other() -> None:

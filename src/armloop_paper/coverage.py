@@ -12,19 +12,17 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armloop.data.motion import Samples
-from armloop.data.signals import condition, independent_rows
+from armloop.data.signals import independent_rows, preprocess
 from armloop.identification.uncertainty.solving import solve_given_terms
 from armloop.identification.uncertainty.standard_errors import Fitted
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown, problems
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 from armloop_paper.simulated import Collection, Disturbance, collection, true_model
-
-Array = NDArray[np.float64]
 
 NOMINAL = 0.95
 
@@ -115,7 +113,7 @@ class _Run:
 def _one(
     truth: ReconstructedModel, design: Collection, disturbance: Disturbance, jointly: bool, seed: int
 ) -> _Run:
-    samples = condition(design.logs(disturbance, seed), truth.conditioning)
+    samples = preprocess(design.logs(disturbance, seed), truth.conditioning)
     fitted = _fitted(samples, len(design.motions[0].starts), len(design.motions[1].starts), jointly)
     _, parts = solve_given_terms(truth, samples, fitted)
     true_values = {_key(u): u.value for problem in problems(truth) for u in problem.unknowns}

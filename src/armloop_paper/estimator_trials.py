@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
@@ -22,11 +21,10 @@ from armloop.identification.reconstruction.sums import Choice
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import ESTIMATORS, Sparse
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import InputError
 from armloop_paper.experiments import EXPERIMENTS, STEPS, Experiment, as_motion
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: Per step and joint, the columns of the step's library that are in use, and their coefficients.
 Fitted = list[list[tuple[Index, Array]]]
 

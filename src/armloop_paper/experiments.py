@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
@@ -15,8 +14,7 @@ from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Second feature set of each step, and of one-shot SINDy.
 SECOND = {"sindy": "both", "step1": "none", "step2": "velocity", "step3": "acceleration"}

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armloop.data.motion import Motion
 from armloop.features.angle_sums import AngleSums
 from armloop.features.wave_moments import WaveProducts
+from armloop.util.arrays import Array
 from armloop_paper.refined import refined
-
-Array = NDArray[np.float64]
 
 
 def least_squares(library: AngleSums, motion: Motion, tau: Array) -> tuple[WaveProducts, Array]:

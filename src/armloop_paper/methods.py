@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
@@ -15,12 +14,12 @@ from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet, products
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
+from armloop.util.arrays import Array
 from armloop_paper.experiments import STEPS, Experiment, as_motion
 from armloop_paper.gram import library_moments
 from armloop_paper.lasso import lasso, stopped_early
 from armloop_paper.readings import Reading
 
-Array = NDArray[np.float64]
 Library = DoubleFeatureSet | AngleSums
 
 

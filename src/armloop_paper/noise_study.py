@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.util.arrays import Array
 from armloop_paper.context import Context
 from armloop_paper.experiments import EXPERIMENTS, Experiment
 from armloop_paper.lasso import NotConverged
 from armloop_paper.methods import armloop_stepwise, one_shot, stepwise
 from armloop_paper.readings import READINGS, Reading, collected
 
-Array = NDArray[np.float64]
 Snr = tuple[float, float, float] | None
 
 METHODS = {"sindy": "SINDy", "stepwise": "stepwise", "armloop": "armloop"}

@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from armloop.reports.plots.style import BLUE, GREEN, INK, MUTED, ORANGE, figure, legend, panels, polish
 from armloop.reports.words import unit
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _COLORS = (ORANGE, GREEN, BLUE)
 

@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.experiment.excitation import fourier_reference
 from armloop.experiment.sampling import CONDITIONS, inverse_dynamics_samples
+from armloop.util.arrays import Array
 from armloop_paper.experiments import STEPS, Experiment
-
-Array = NDArray[np.float64]
 
 #: The penalised error, and by what λ is multiplied to give the weight of ‖Ξ‖₁ beside ½‖τ − YΞ‖².
 OBJECTIVES = ("‖r‖²/2m", "‖r‖²/m", "½‖r‖²", "‖r‖²", "‖r‖")

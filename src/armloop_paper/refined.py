@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpotrf, dpotrs
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Added to the unit diagonal, per column: what round-off may have made of a dependent column.
 RIDGE = 1e-15

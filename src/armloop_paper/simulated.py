@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from armloop.data.log import MotionLog
@@ -19,8 +18,7 @@ from armloop.model import ReconstructedModel
 from armloop.model.components import Component, SparseTerms
 from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 RATE = 100.0
 #: Friction of Eq. (34) per joint: f_s, f_c in N·m, v_s in rad/s, f_v in N·m·s/rad.

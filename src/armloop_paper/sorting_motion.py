@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Motion
 from armloop.data.regimes import Condition
 from armloop.experiment.excitation import MotionRanges
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _PERIOD = 0.01
 _DWELL = 0.8

@@ -12,15 +12,13 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Lasso
 
 from armloop.laws.friction import stribeck_fall
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
-
-Array = NDArray[np.float64]
 
 #: Samples slower than so many standard deviations of the velocity's noise have no certain direction.
 DEAD_ZONE = 4.0

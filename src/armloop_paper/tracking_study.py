@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armloop.data.motion import Samples
-from armloop.data.signals import condition, smooth
+from armloop.data.signals import preprocess, smooth
 from armloop.drake.control.controllers import Exact
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.scenarios import load_plan, load_tracking
@@ -56,7 +56,7 @@ def _run(seed: int) -> Run:
     model = reconstruct(list(logs.values()), plant.arm, library="double-feature-set").model
     reference = paper_reference(periods=1)
     measured = measure_run(plant.arm, plant.config, seed + 100, rate=250.0, reference=reference)
-    samples = condition([measured], model.conditioning)
+    samples = preprocess([measured], model.conditioning)
     rms = np.sqrt(np.mean(samples.tau**2, axis=0))
     nrmse = {}
     for step in (1, 2, 3):

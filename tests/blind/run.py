@@ -50,7 +50,7 @@ def make(seed: int, cases: int, place: Path, outside: bool = False, measured: Pa
 
             generate_outside(seed, cases, place / "logs", place / "answers")
             return ""
-        generate(seed, cases, load_plan("paper"), place / "logs", place / "answers")
+        generate(seed, range(cases), load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
         return str(error)
     return ""

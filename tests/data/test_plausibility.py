@@ -12,7 +12,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 
 from armloop.cli import main
 from armloop.data.log import MotionLog, read_log, require_different, write_log
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -163,7 +163,7 @@ def test_without_v_it_is_differentiated_from_q(tmp_path: Path) -> None:
         read = read_log(path, joints=3)
     assert read.v_derived and not log.v_derived
     ten = Conditioning()
-    with_v, without = condition([log], ten), condition([read], ten)
+    with_v, without = preprocess([log], ten), preprocess([read], ten)
     size = np.sqrt(np.mean(with_v.motion.v**2))
     assert np.sqrt(np.mean((with_v.motion.v - without.motion.v) ** 2)) < 0.02 * size
     write_log(tmp_path / "again.csv", read)  # what was not measured is not written as if it had been
@@ -232,7 +232,7 @@ def test_the_origin_of_time_does_not_matter(tmp_path: Path) -> None:
     log = good(seconds=20.0, rate=500.0)
     found = []
     for origin in (0.0, -1000.0, 1.7e9):
-        samples = condition([replace(log, time=log.time + origin)], Conditioning())
+        samples = preprocess([replace(log, time=log.time + origin)], Conditioning())
         found.append(samples)
         assert samples.motion.time[0] == pytest.approx(origin + 0.05, abs=1e-6)
     for other in found[1:]:
@@ -248,8 +248,8 @@ def test_a_first_sample_before_a_gap_is_left_out() -> None:
     log = good()
     time = log.time.copy()
     time[0] -= 5.0
-    samples = condition([replace(log, time=time)], Conditioning())
-    whole = condition([log.select(slice(1, None))], Conditioning())
+    samples = preprocess([replace(log, time=time)], Conditioning())
+    whole = preprocess([log.select(slice(1, None))], Conditioning())
     np.testing.assert_array_equal(samples.motion.q, whole.motion.q)
 
 

@@ -11,7 +11,7 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 from armloop.cli import main
 from armloop.data.log import MotionLog, write_log
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis.next_run import Wish, next_run, training_ranges
 from armloop.experiment.excitation import MotionRanges, Reference, read_reference
@@ -88,7 +88,7 @@ def model() -> ReconstructedModel:
     friction = FrictionLaw(((FrictionTerm("sign", COULOMB), FrictionTerm("viscous", VISCOUS)),) * 2)
     bare = ReconstructedModel(ARM, (body,), friction, history={"range": RANGES})
     clean = log(fourier_motion(40.0, 125.0, 90, ARM), None, 90)
-    return replace(bare, baseline=score(bare, condition([clean], bare.conditioning)).moving)
+    return replace(bare, baseline=score(bare, preprocess([clean], bare.conditioning)).moving)
 
 
 def check_limits(reference: Reference, ranges: MotionRanges) -> None:
@@ -112,7 +112,7 @@ CASES: dict[str, tuple[Law, float, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["spring", pytest.param("encoder", marks=pytest.mark.long)])
 def test_the_next_run_names_what_is_there_and_has_no_such_alternatives(model, case) -> None:
     law, size, truth = CASES[case]
     first = diagnose(model, [log(small_motion(3, size), law, 3)])

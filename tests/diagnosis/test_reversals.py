@@ -9,7 +9,7 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.reversals import turning
 from armloop.identification.scoring import score
@@ -35,7 +35,7 @@ def coulomb_and_viscous(baseline: MotionLog) -> ReconstructedModel:
     body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
     law = FrictionLaw(tuple((FrictionTerm("sign", float(f)), FrictionTerm("viscous", 1.0)) for f in LEVEL))
     bare = ReconstructedModel(three_axis(), (body,), law)
-    rmse = score(bare, condition([baseline], bare.conditioning)).moving
+    rmse = score(bare, preprocess([baseline], bare.conditioning)).moving
     return replace(bare, baseline={**rmse, "worst": [2 * x for x in rmse["rmse"]]})
 
 

@@ -8,7 +8,7 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.whereabouts import Whereabouts, whereabouts
@@ -25,7 +25,7 @@ def found(law: Callable[[Motion], np.ndarray], seed: int) -> Whereabouts:
     motion = fourier_motion(60.0, 100.0, seed)
     tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
     tau[:, 1] += law(motion)
-    samples = condition([measured(motion, tau, seed, noise=0.001)], model.conditioning)
+    samples = preprocess([measured(motion, tau, seed, noise=0.001)], model.conditioning)
     evidence = Evidence.of(model, samples, [])
     return whereabouts(evidence, fit(evidence, evidence.residual([]), [], []), 1)
 

@@ -51,7 +51,7 @@ def test_eta_bars_are_the_etas(loop: SimpleNamespace) -> None:
 def test_reconstruction_figures(loop: SimpleNamespace) -> None:
     assert len(drawn(plots.clusters_figure(loop.clusters)).axes) == 2
     assert plots.has_trials(loop.reconstruction.reports)
-    drawn(plots.orders_figure(loop.reconstruction.reports, loop.baseline.reports))
+    drawn(plots.orders_figure(loop.reconstruction.reports, loop.reference.reports))
 
 
 def test_a_residual_lies_under_every_torque(loop: SimpleNamespace) -> None:

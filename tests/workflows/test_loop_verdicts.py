@@ -19,10 +19,9 @@ def blind():
     return module
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("seed", "clean"), [*(pytest.param(seed, False, marks=pytest.mark.long) for seed in (2, 13)), (101, True)]
-)
+# The README's loop, and a clean run of the small blind part, are run every time (tests/fresh, tests/blind).
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "clean"), [(2, False), (13, False), (101, True)])
 def test_the_verdict_is_right(seed, clean):
     case = blind().run("three_axis", seed, clean)
     assert case.right, f"hidden: {case.hidden}; verdict: {case.found}"

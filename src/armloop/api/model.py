@@ -157,7 +157,7 @@ def reconstruct(
     """Reconstruct a model of an arm's joint torques from its logs; the options of ``armloop reconstruct``.
 
     Args:
-        method: "stepwise" or "sindy", the one-shot baseline.
+        method: "stepwise" or "sindy", one regression of everything, the reference method.
         library: "double-feature-set" (default up to four joints), "rigid-body" (default beyond) or "lagrangian".
         estimator: how terms are chosen.
         penalty: of the Lassos, or the threshold; by held-out error if None.

@@ -26,7 +26,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--block", type=float, default=1.0, metavar="SECONDS", help="length of a block (%(default)s)"
     )
     p.add_argument(
-        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+        "--method",
+        default="stepwise",
+        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
     )
     p.add_argument("--library", default=None, help="as of armloop reconstruct (default: by number of joints)")
     p.add_argument(

@@ -18,7 +18,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
     add_chain(p)
     p.add_argument("--out", required=True, help="the model file, JSON")
     p.add_argument(
-        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+        "--method",
+        default="stepwise",
+        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
     )
     p.add_argument(
         "--library",

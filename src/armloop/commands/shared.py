@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.log import MotionLog, read_log, same_measurement
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.doubts import said
@@ -120,5 +120,5 @@ def held_out_logs(
                     "--held-out takes runs that are not fitted"
                 )
     for log in logs:
-        condition([log], model.conditioning)  # what is wrong with a log is said before the long work
+        preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

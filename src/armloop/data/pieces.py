@@ -1,4 +1,4 @@
-"""Logs that are read piece by piece, each time they are needed: for more samples than memory holds.
+"""Out-of-core logs: read piece by piece, each time they are needed, for more samples than memory holds.
 
 A piece is a run of its own to everything after it, so that no filter and no derivative crosses two of them.
 """

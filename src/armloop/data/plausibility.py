@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 # No joint of an arm turns beyond, moves faster, accelerates harder or bears more (rad, rad/s, rad/s², N·m or A).
 _LARGEST = {"q": 1e4, "v": 1e3, "vdot": 1e6, "tau": 1e6}

@@ -1,4 +1,4 @@
-"""From measured logs to samples fit for regression: one uniform grid, one filter, one derivative.
+"""Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter, one differentiation.
 
 Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
 motion it belongs to stay together in time; runs are treated one by one, never across a gap.
@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples, filter_reach
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -130,7 +129,7 @@ def derivative(x: Array, period: float) -> Array:
     return np.gradient(x, period, axis=0, edge_order=2)
 
 
-def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
+def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
@@ -171,8 +170,11 @@ def condition(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None 
     return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
 
 
+condition = preprocess  # the name before November 2026
+
+
 def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:
-    """Instants, s, that :func:`condition` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
+    """Instants, s, that :func:`preprocess` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
     kept, spans = [], []
     for run in log.runs():
         time = log.time[run]

@@ -1,4 +1,4 @@
-"""How far two effects are apart on a motion: what of the torque of one no mixture of the other can stand for."""
+"""Isolability of two effects on a motion: what of the torque of one no mixture of the other can stand for."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.experiment.excitation import Reference
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Least singular value, relative to the largest, of columns of unit size that is more than round-off.
 _ROUND_OFF = 1e-6

@@ -1,4 +1,4 @@
-"""What a diagnosis changes: the torque that a controller now adds, and the error on runs that nothing was fitted to."""
+"""Feedforward compensation of diagnosed effects: the torque a controller now adds, the error on runs not fitted to."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 #: Instants of a run at which the feedforward is compared: as many as a figure can show.
 _INSTANTS = 2000
@@ -128,7 +127,7 @@ def held_out_run(before: ReconstructedModel, after: ReconstructedModel, log: Mot
         raise InputError(
             f"{log.name}: {log.joints} joints, but the model's arm {before.arm.name} has {before.arm.n}"
         )
-    samples = condition([log], before.conditioning)
+    samples = preprocess([log], before.conditioning)
     old, new = (score(lasting(model), samples) for model in (before, after))
     return HeldOutRun(log.name, old, new)
 

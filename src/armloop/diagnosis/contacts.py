@@ -1,4 +1,4 @@
-"""Events of a run: pushes on the arm and torques on a joint, each with its interval, found before everything else.
+"""Event detection: pushes on the arm and torques on a joint, each with its interval, found before everything else.
 
 An event shows as a stretch in which the residual is unlike what it is in like motion (:mod:`armloop.diagnosis.novelty`).
 It belongs to one log and would spoil the search for what is there all the time; so its samples are kept out of that.
@@ -19,9 +19,7 @@ from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2

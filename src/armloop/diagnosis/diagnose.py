@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog, require_different
 from armloop.data.motion import Samples
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
@@ -25,10 +25,9 @@ from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 SCHEMA = "armloop/diagnosis/2"
 
@@ -215,7 +214,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
             )
     require_different(logs)
     progress("conditioning the run like the model's training logs")
-    samples = condition(logs, model.conditioning)
+    samples = preprocess(logs, model.conditioning)
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
             raise InputError(

@@ -1,4 +1,4 @@
-"""A residual as evidence: what the model leaves on a run, weighed by what it leaves on its own baseline.
+"""Normalised residual: what the model leaves on a run, weighed by what it leaves on its own baseline.
 
 One weighted unit is the model's baseline residual of a joint, so joints compare, and the model's own
 shortcomings count as the noise they are. Blocks of the run are dealt into folds; whatever is judged is
@@ -20,8 +20,7 @@ from armloop.data.signals import independent_rows, smooth
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0

@@ -17,9 +17,8 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.dynamics import Dynamics
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
-
-Array = NDArray[np.float64]
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2

@@ -1,4 +1,4 @@
-"""The motion to make next: one that tells what was found from what it may be mistaken for.
+"""Discriminating experiment: the motion to make next, which tells what was found from what it may be mistaken for.
 
 A diagnosis lists as alternatives what its run cannot tell from what was found. Here a reference within the arm's limits
 is designed on which, whichever of the two is there, the other fits badly (`armloop.experiment.design.unexplained`). Without
@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.apart import Stage
 from armloop.diagnosis.diagnose import Diagnosis
@@ -22,11 +21,10 @@ from armloop.diagnosis.rivals import Law, found_laws, lookalikes, pairs
 from armloop.experiment.design import sampled
 from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import Effect
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 
 __all__ = ["FAR_ENOUGH", "NextRun", "Told", "Wish", "next_run", "training_ranges"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Designing a motion for a diagnosis: within limits, for whatever columns and criterion the purpose asks."""
+"""Experiment design for a diagnosis: a motion within limits, for whatever columns and criterion the purpose asks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.diagnosis.apart import Stage, context_of
@@ -30,10 +29,9 @@ from armloop.experiment.design import (
 from armloop.experiment.excitation import FourierReference, MotionRanges
 from armloop.laws.friction import FrictionTerm
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: s of a period, repeated, and its harmonics: up to 0.4 Hz.
 PERIOD, _HARMONICS = 20.0, 8

@@ -1,4 +1,4 @@
-"""What an event was: a force on the tool, on a link, or a torque on one joint, by which explains its samples best."""
+"""Classification of events: a force on the tool, on a link, or a torque on one joint, by which explains its samples best."""
 
 from __future__ import annotations
 
@@ -14,9 +14,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3

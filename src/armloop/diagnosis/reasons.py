@@ -1,4 +1,4 @@
-"""What a reader must know before relying on a verdict, one true sentence with its number each."""
+"""Caveats of a verdict: what a reader must know before relying on it, one true sentence with its number each."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
 
 #: So many times the baseline is no baseline any more.
 MULTIPLE = 2.0

@@ -1,4 +1,4 @@
-"""Reversals: what a joint does while it turns around, judged by itself.
+"""Friction at reversals: what a joint does while it turns around, judged by itself.
 
 The torque of a joint at rest is not determined by its motion, so standstill is kept out of training, baseline and
 search, with as much around it as the filter smears. A joint that turns around is not at rest, but it passes zero
@@ -29,10 +29,8 @@ from armloop.diagnosis.search import Found, Outcome
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
 #: found at another joint, this part …

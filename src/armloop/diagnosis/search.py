@@ -1,4 +1,4 @@
-"""The search: add the effect that explains most on data not fitted, the simplest of equals, until none is left.
+"""Forward selection of effects: add what explains most on data not fitted, the simplest of equals, until none is left.
 
 Every time one is added, those found before are asked again whether, beside the others, they are still the
 simplest of those that do equally well: the first effect named may have stood for two.
@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
@@ -26,9 +25,8 @@ from armloop.diagnosis.judgement import (
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, paced
-
-Array = NDArray[np.float64]
 
 #: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
 #: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for

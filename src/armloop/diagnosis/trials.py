@@ -1,4 +1,4 @@
-"""What is known of a run so far, and what every further effect would add to it."""
+"""State of the selection: what is known of a run so far, and what every further effect would add to it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.laws.effects import Effect
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _REFITS = 2
 

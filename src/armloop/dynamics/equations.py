@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from math import prod
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armloop.model.components import Lagrangian
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics, mass_matrix
+from armloop.util.arrays import Array
 from armloop.util.functions import Functions
 
-Array = NDArray[np.float64]
 Numbers = Sequence[Any]
 Rows = list[list[Any]]
 

@@ -29,8 +29,7 @@ from armloop.data.motion import Motion
 from armloop.features.rigid_body import full_columns
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, nominal_parameters
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _STATES = 300
 _RANK = 1e-9

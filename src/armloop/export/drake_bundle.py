@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.drake.plant.beyond_bodies import presliding_elements
@@ -21,12 +20,11 @@ from armloop.export.robot_xml import urdf_text
 from armloop.export.round_trip import drake_torque
 from armloop.model import ReconstructedModel
 from armloop.robot.newton_euler import mass_matrix
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
 from armloop.util.functions import MATH
 from armloop.util.quiet import quiet
-
-Array = NDArray[np.float64]
 
 _STEP = 1e-3
 _SMALLEST_SMOOTHING = 0.01

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.export.c_code import c_source
@@ -20,10 +19,9 @@ from armloop.export.reading_c import CompiledTorque, compiler
 from armloop.export.robot_xml import SDF_FEATURES, URDF_FEATURES, sdf_text, urdf_text
 from armloop.export.round_trip import NotInstalled, drake_torque, mujoco_torque
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError, ModelError
 from armloop.util.files import write_text
-
-Array = NDArray[np.float64]
 
 TARGETS = ("urdf", "sdf", "mjcf", "drake", "c")
 _SAMPLES = 400

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _MOST = 400
 

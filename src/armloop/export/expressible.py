@@ -1,4 +1,4 @@
-"""What of a model another tool's description of an arm can say: links, drives, damping, dry friction, springs, gravity.
+"""Conversion of a model to another tool's description of an arm: links, drives, damping, dry friction, springs, gravity.
 
 A description has one number where a model has a law: what does not fit is named, with what is written in its place.
 """
@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.data.motion import Motion
@@ -23,10 +22,9 @@ from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 from armloop.util.functions import NUMPY
-
-Array = NDArray[np.float64]
 
 _STATES = 600
 #: What is left of the rigid torque, relative to its RMS, beyond which a model's terms are no rigid body's.

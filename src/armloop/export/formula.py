@@ -1,4 +1,4 @@
-"""A model's inverse dynamics as formulas of traced numbers, with and without the memory of its friction."""
+"""Inverse dynamics of a model as traced formulas, with and without the memory of its friction."""
 
 from __future__ import annotations
 

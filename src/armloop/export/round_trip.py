@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.util.arrays import Array
 from armloop.util.quiet import quiet
-
-Array = NDArray[np.float64]
 
 
 class NotInstalled(Exception):

@@ -1,4 +1,4 @@
-"""Numbers that remember how they were computed: a law run on them gives its own formula, to be written as C.
+"""Symbolic tracing by operator overloading: numbers that remember how they were computed, to be written as C.
 
 The same plain arithmetic that serves floats, arrays and symbols (see :mod:`armloop.util.functions`) runs once on these; what
 comes out is a graph of operations in which equal ones are one (hash consing) and what multiplies zero is gone.

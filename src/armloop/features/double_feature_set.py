@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Second feature sets: what the monomials of order N2 are made of, per step and for one-shot SINDy.
 SECOND_SETS = {"none": "", "velocity": "v", "acceleration": "a", "both": "va"}

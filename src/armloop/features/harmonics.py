@@ -1,4 +1,4 @@
-"""Products of sines and cosines as sums of waves.
+"""Product-to-sum identities: products of sines and cosines as sums of waves.
 
 With sin x = (e^ix - e^-ix) / 2i and cos x = (e^ix + e^-ix) / 2 a product of sin k·q and cos k·q is a sum of few
 exponentials e^(i k·q), that is of waves cos k·q and sin k·q: sin q1 cos q1 = sin(2 q1) / 2. What a model evaluates at

@@ -37,9 +37,7 @@ from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 #: Rows of columns evaluated at once.
 _CHUNK = 256

@@ -19,8 +19,7 @@ from scipy.linalg import qr
 from armloop.data.motion import Motion
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Within a link, what to keep first when one of several parameters must stand for the sum.
 _PREFERENCE = ("mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m")

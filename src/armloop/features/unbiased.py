@@ -1,4 +1,4 @@
-"""Moments of angle sums as they would be without the noise in q, v and v̇.
+"""Errors-in-variables moments of angle sums: as they would be without the noise in q, v and v̇.
 
 Gaussian noise e of covariance Σ in the angles shrinks every wave by its own factor, E cos k·(q + e) =
 exp(−½ kᵀΣk) cos k·q, and mixes none of them; noise in a factor of a power is undone by Hermite polynomials,
@@ -15,13 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors, products
+from armloop.util.arrays import Array, Index
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Wave = tuple[int, ...]
 Monomial = tuple[int, ...]
 

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.laws.hysteresis import stop_operator
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 from armloop.util.functions import NUMPY, Functions
-
-Array = NDArray[np.float64]
 
 #: A joint that is no faster than this when a run begins, rad/s or m/s, begins at rest.
 _AT_REST = 0.005

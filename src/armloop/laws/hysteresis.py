@@ -19,11 +19,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from armloop.util.arrays import Array
 from armloop.util.functions import Functions
 
-Array = NDArray[np.float64]
 #: Maps z -> clip(z + shift, lower, upper), one per sample, arrays of one shape.
 _Maps = tuple[Array, Array, Array]
 

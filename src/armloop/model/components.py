@@ -15,9 +15,9 @@ from armloop.features.double_feature_set import Factors, product_name, products
 from armloop.features.lagrangian import EnergyTerms
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 
-Array = NDArray[np.float64]
 Term = tuple[int, float, str]
 
 

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
@@ -24,14 +23,13 @@ from armloop.laws.effects.base import Placed
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import Acting, FrictionLaw
 from armloop.model.components import COMPONENTS, Component
-from armloop.model.pointwise import Drive, pointwise, stacked
+from armloop.model.pointwise import InverseDynamics, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, ModelError
 from armloop.util.files import write_json
 from armloop.util.reading import read_json
-
-Array = NDArray[np.float64]
 
 SCHEMA = "armloop/model/2"
 
@@ -210,7 +208,7 @@ class ReconstructedModel:
         """
         return self.drive(step)(q, v, vdot, sliding)
 
-    def drive(self, step: int = 3) -> Drive:
+    def drive(self, step: int = 3) -> InverseDynamics:
         """The function behind :meth:`feedforward`, for loops in which a look-up counts."""
         if step not in self._pointwise:
             self._pointwise[step] = pointwise(*self._parts(step), step)
@@ -237,7 +235,7 @@ class ReconstructedModel:
         return self.arm, self.components, friction, effects
 
     @cached_property
-    def _pointwise(self) -> dict[int, Drive]:
+    def _pointwise(self) -> dict[int, InverseDynamics]:
         return {}
 
     def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:

@@ -1,4 +1,4 @@
-"""Evaluating a model one sample at a time, fast enough for a 1 kHz loop in Python.
+"""Inverse dynamics of a model at one sample, fast enough for a 1 kHz loop in Python.
 
 Sparse terms of all steps are merged into one table of waves; friction is plain arithmetic; rigid bodies go through the
 recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import KINDS, Acting, Sliding, stribeck_fall, torque_along
@@ -18,13 +17,13 @@ from armloop.model.components import Component, Lagrangian, RigidBody, SparseTer
 from armloop.model.wave_table import WaveTable
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH
 
-Array = NDArray[np.float64]
 Pointwise = Callable[[Array, Array, Array], Array]
 
 
-class Drive(Protocol):
+class InverseDynamics(Protocol):
     """Inverse dynamics of one sample."""
 
     def __call__(self, q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
@@ -38,7 +37,7 @@ def pointwise(
     friction: Sequence[Sequence[Acting]],
     effects: Sequence[tuple[bool, EffectPointwise]],
     step: int,
-) -> Drive:
+) -> InverseDynamics:
     """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
     Args:

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.harmonics import Wave, waves_of
 from armloop.model.components import SparseTerms
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 #: Indices into (1, q, v, vdot) whose product is a monomial of prismatic positions and rates.
 Monomial = tuple[int, ...]
 

@@ -12,8 +12,7 @@ from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
 from armloop.monitoring.naming import Normal, name_change
 from armloop.monitoring.sums import joint_sums, residual_scale
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: What a cumulative sum lets pass per block, and where it alarms, in units of the largest healthy score: a lasting
 #: score half as large again as everything healthy alarms after a dozen blocks, one four times as large after one.

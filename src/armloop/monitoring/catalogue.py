@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Motion, Samples
 from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters
-from armloop.data.signals import condition, smooth
+from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import Diagnosis
 from armloop.identification.reconstruction import Reconstruction
 from armloop.reports import paper as published
@@ -76,7 +76,7 @@ class LoopResult(Protocol):
     @property
     def reconstruction(self) -> Reconstruction: ...
     @property
-    def baseline(self) -> Reconstruction | None: ...
+    def reference(self) -> Reconstruction | None: ...
     @property
     def tracking(self) -> Mapping[str, TrackingResult]: ...
     @property
@@ -95,21 +95,29 @@ class LoopResult(Protocol):
     def notes(self) -> Sequence[str]: ...
 
 
-def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
+def loop_report(
+    result: LoopResult,
+    replay: str | None = "replay.html",
+    further: Sequence[Section] = (),
+    links: Sequence[tuple[str, str]] = (),
+) -> str:
     """One HTML page on a run of the loop.
 
     Args:
         replay: relative address of the recorded motion, or None where there is none.
+        further: sections on what was done beside the simulated arm.
+        links: words and relative addresses of further pages.
     """
     varying = _varying(result)
     sections = [
         _measure_section(result),
         conditions_section(result.clusters),
-        *reconstruction_sections(result.reconstruction, varying, result.baseline),
+        *reconstruction_sections(result.reconstruction, varying, result.reference),
         _control_section(result),
         *diagnosis_sections(result.diagnosis, ["the second run"]),
         _truth_section(result),
         _control_again_section(result),
+        *further,
         _account_section(result),
     ]
     return render(
@@ -119,7 +127,7 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
             f"arm changed that nobody declared. {_outcome(result)}",
             sections,
             _cards(result),
-            [("Watch the replay", replay)] if replay else [],
+            [*([("Watch the replay", replay)] if replay else []), *links],
             Picture(
                 loop_figure(result, varying),
                 "The loop, clockwise from the upper left, with the numbers and signals of this run.",
@@ -241,7 +249,7 @@ def mean_eta(result: TrackingResult) -> float:
 def _varying(result: LoopResult) -> Samples:
     """The richest log, conditioned as the model's were."""
     longest = max(result.logs.values(), key=lambda log: max(run.stop - run.start for run in log.runs()))
-    return condition([longest], result.reconstruction.model.conditioning)
+    return preprocess([longest], result.reconstruction.model.conditioning)
 
 
 def _piece(samples: Samples) -> slice:

@@ -11,8 +11,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import independent_rows
 from armloop.diagnosis import Diagnosis
 from armloop.diagnosis.fit import Fit
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Runs laid end to end are this far apart, as a part of all of them.
 _GAP = 0.02

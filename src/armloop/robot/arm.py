@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.robot.urdf import base_links, read_urdf, serial_chain
+from armloop.util.arrays import Array
 from armloop.util.errors import ArmError
 from armloop.util.resources import urdf_names, urdf_path
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 

@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Parameters of one link, about its frame's origin and in its frame.
 LINK_PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")

@@ -11,12 +11,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH, NUMPY, Functions
 
-Array = NDArray[np.float64]
 Vector = tuple[Any, Any, Any]
 MassMatrix = Callable[[Sequence[Any] | Array], list[list[Any]]]
 InverseDynamics = Callable[[Sequence[Any] | Array, Sequence[Any] | Array, Sequence[Any] | Array], list[Any]]

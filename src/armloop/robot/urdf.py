@@ -11,12 +11,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.util.arrays import Array
 from armloop.util.doubts import warn
 from armloop.util.errors import ArmError
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 MOST_JOINTS = 16

@@ -1,4 +1,4 @@
-"""What a command may write over: never what it reads, never a device, never a file that it did not write itself.
+"""Overwrite protection: a command replaces neither what it reads, nor a device, nor a file that it did not write itself.
 
 A file tells who wrote it: JSON, HTML and PNG by a mark near their beginning (:func:`stamp`), every other by a line
 ``SHA-256  command  name`` of the file ``.armloop`` beside it. The rules hold while a command runs (:func:`guarding`);

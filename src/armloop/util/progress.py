@@ -1,4 +1,4 @@
-"""How long work tells where it stands: a function that takes one line, silent unless one is handed in."""
+"""Progress reporting: a function that takes one line, silent unless one is handed in."""
 
 from __future__ import annotations
 

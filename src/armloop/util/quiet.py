@@ -1,4 +1,4 @@
-"""Other libraries' loggers kept quiet for a while: what goes wrong is told by our own line."""
+"""Log suppression: other libraries' loggers kept quiet for a while; what goes wrong is told by our own line."""
 
 from __future__ import annotations
 

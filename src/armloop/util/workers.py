@@ -1,4 +1,4 @@
-"""The same function on many chunks: one after the other, in processes of this machine, or on a Dask cluster.
+"""Parallel map over chunks: one after the other, in processes of this machine, or on a Dask cluster.
 
 Answers come back in the order of the chunks whoever computed them, so that sums of them are the same to the bit
 for any number of workers.

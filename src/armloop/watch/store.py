@@ -26,12 +26,10 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.monitoring.sums import LogSums
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 SCHEMA = "armloop/watch/1"
 PER_JOINT = ("rows", "mean", "energy", "lagged", "torque", "speed", "load", "temperature")

@@ -1,4 +1,4 @@
-"""A load grasped mid-run: the residual of the log is diagnosed, and the feedforward swapped, in the same run."""
+"""Payload pick-up in one run: the residual of the log is diagnosed, and the feedforward swapped."""
 
 from __future__ import annotations
 

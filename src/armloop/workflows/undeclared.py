@@ -1,4 +1,4 @@
-"""The effect of the demonstration: drawn from a seed, put into the plant, sealed until the verdict is out.
+"""Blind fault injection of the demonstration: an effect drawn from a seed, sealed until the verdict is out.
 
 Only the simulation is handed what is drawn here. The diagnosis reads a model file and a log; it can import
 neither this file nor the simulator (a test forbids it).

@@ -53,7 +53,7 @@ def model(scenario):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["load", "friction"])
+@pytest.mark.parametrize("case", ["load", pytest.param("friction", marks=pytest.mark.long)])
 def test_a_change_is_named_and_supplied(scenario, model, case) -> None:
     change = {
         "load": UndeclaredEffect("payload", None, {"mass": 0.5, "com": [0.02, 0.0, 0.01]}),

@@ -29,10 +29,10 @@ def test_known_noise_is_corrected(seed):
 
 
 def test_the_order_of_a_support_does_not_matter():
-    from armloop.data.signals import condition
+    from armloop.data.signals import preprocess
     from armloop.features.angle_sums import AngleSums
     from armloop.features.wave_moments import WaveProducts
-    from armloop.identification.reconstruction.attenuation import unattenuated
+    from armloop.identification.reconstruction.attenuation import without_attenuation
     from armloop.identification.reconstruction.data import Data
     from armloop.identification.reconstruction.found import Found
     from armloop.identification.reconstruction.sums import Choice, Columns
@@ -41,7 +41,7 @@ def test_the_order_of_a_support_does_not_matter():
 
     arm, ranges = load_arm("scara"), load_plant("scara").config.ranges
     logs = list(inverse_dynamics_samples(arm, ranges, (50, 200, 400), 0, SNR).values())
-    data = Data.of(condition(logs, Conditioning(cutoff_hz=0.0)), Options())
+    data = Data.of(preprocess(logs, Conditioning(cutoff_hz=0.0)), Options())
     library = AngleSums(tuple(map(bool, arm.revolute)), 1, 1, "acceleration")
     columns = Columns(WaveProducts(library.factors, library.index), ((FrictionTerm("viscous"),),) * arm.n)
     choice = Choice(None, (1, 2, 3), Found(arm, friction=[[] for _ in arm.joints]))
@@ -50,7 +50,7 @@ def test_the_order_of_a_support_does_not_matter():
 
     def corrected(support):
         fits = [Fit(support, np.zeros(len(support))) for _ in arm.joints]
-        return [fit.beta for fit in unattenuated(data, choice, columns, fits, SNR)]
+        return [fit.beta for fit in without_attenuation(data, choice, columns, fits, SNR)]
 
     for straight, shuffled in zip(corrected(support), corrected(support[mixed]), strict=True):
         assert np.abs(straight).max() > 0

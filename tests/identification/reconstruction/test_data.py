@@ -11,7 +11,7 @@ from synthetic import LOWER, UPPER, fourier_motion, friction, measured, rigid_to
 from armloop.data.log import MotionLog, write_log
 from armloop.data.pieces import log_sources
 from armloop.data.regimes.indicators import size
-from armloop.data.signals import Conditioning, ShortRunError, condition
+from armloop.data.signals import Conditioning, ShortRunError, preprocess
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
@@ -115,7 +115,7 @@ def test_files_on_a_dask_cluster_give_the_same_model(
 
 
 def test_chunks_play_the_parts_of_the_whole(logs: list[MotionLog]) -> None:
-    whole = Chunk.of(condition(logs, Conditioning()), Options())
+    whole = Chunk.of(preprocess(logs, Conditioning()), Options())
     data = Data.streamed(logs, Conditioning(), Options())
     chunks = list(data.map(lambda chunk: chunk))
     assert len(chunks) == 3
@@ -171,12 +171,12 @@ def test_a_log_too_short_for_the_filter_is_left_out_unless_all_are(logs: list[Mo
 
 
 def test_unsorted_samples_take_the_condition_of_their_neighbours(logs: list[MotionLog]) -> None:
-    motion = condition(logs, Conditioning()).motion
+    motion = preprocess(logs, Conditioning()).motion
     speed = size(motion.v)
     labels = np.digitize(speed, np.quantile(speed, [0.3, 0.6]))
     sorter = Sorter(motion, labels)
     assert sorter(motion) is labels
-    half = Chunk.of(condition(logs, Conditioning()), Options()).take(np.arange(0, len(labels), 2))
+    half = Chunk.of(preprocess(logs, Conditioning()), Options()).take(np.arange(0, len(labels), 2))
     learnt = Sorter(half.samples.motion, labels[::2])
     assert (learnt(motion)[::2] == labels[::2]).all()
     assert (learnt(motion) == labels).mean() > 0.97  # all but those near a border

@@ -7,7 +7,7 @@ import pytest
 from synthetic import fourier_motion, measured, three_axis
 
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import design
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
@@ -34,7 +34,7 @@ def whole(samples: Samples, size: int, monkeypatch: pytest.MonkeyPatch) -> np.nd
 
 def test_pieces_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     motion = fourier_motion(40.0, 125.0, 4)
-    samples = condition([measured(motion, motion.q, 4)], Conditioning())
+    samples = preprocess([measured(motion, motion.q, 4)], Conditioning())
     pieces = whole(samples, 300, monkeypatch)
     at_once = whole(samples, 10**9, monkeypatch)
     assert np.abs(at_once).max(axis=(0, 1)).min() > 0.1

@@ -8,9 +8,9 @@ from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction.friction_selection import restricted, rungs
+from armloop.identification.reconstruction.friction_selection import extensions, restricted
 from armloop.identification.reconstruction.inner_folds import inner_folds
 from armloop.laws.friction import FRICTION_LAWS as LAWS
 from armloop.robot.kinematics import nominal_parameters, regressor
@@ -53,7 +53,7 @@ def test_only_the_laws_that_are_named_are_chosen(library: str) -> None:
 
 def test_every_element_of_the_ladder_belongs_to_a_law_with_a_name() -> None:
     motion = fourier_motion(5.0, 100.0, 1)
-    ladder = rungs(three_axis(), motion)
+    ladder = extensions(three_axis(), motion)
     elements = {term.kind for rung in ladder for own in rung.elements for term in own}
     assert elements == {kind for law in LAWS.values() for kind in law}
     assert restricted(ladder, tuple(LAWS)) == restricted(ladder, None) == ladder
@@ -63,13 +63,13 @@ def test_every_element_of_the_ladder_belongs_to_a_law_with_a_name() -> None:
 
 
 def test_folds_are_runs_where_there_are_enough_and_blocks_else():
-    many = condition([a_run(seed, 0.0) for seed in range(1, 6)], Conditioning(cutoff_hz=9.5))
+    many = preprocess([a_run(seed, 0.0) for seed in range(1, 6)], Conditioning(cutoff_hz=9.5))
     used = np.ones(many.motion.samples, dtype=bool)
     fold, judged = inner_folds(many, used, Options())
     assert judged.all()
     assert [set(fold[run]) for run in many.motion.runs()] == [{0}, {1}, {2}, {3}, {4}]
 
-    one = condition([a_run(1, 0.0)], Conditioning(cutoff_hz=9.5))
+    one = preprocess([a_run(1, 0.0)], Conditioning(cutoff_hz=9.5))
     fold, judged = inner_folds(one, np.ones(one.motion.samples, dtype=bool), Options())
     assert set(fold) == set(range(10)) and 0.8 < judged.mean() < 1.0
     borders = np.flatnonzero(np.diff(fold))
@@ -77,7 +77,7 @@ def test_folds_are_runs_where_there_are_enough_and_blocks_else():
 
 
 def test_samples_that_are_no_time_series_have_no_borders():
-    part = condition([a_run(1, 0.0)], Conditioning(cutoff_hz=9.5))
+    part = preprocess([a_run(1, 0.0)], Conditioning(cutoff_hz=9.5))
     motion = part.motion
     apart = Motion(np.arange(float(motion.samples)), motion.q, motion.v, motion.vdot, motion.starts)
     _, judged = inner_folds(
@@ -88,8 +88,8 @@ def test_samples_that_are_no_time_series_have_no_borders():
 
 def test_the_ladder_reaches_down_to_the_slowest_motion() -> None:
     arm, motion = three_axis(), fourier_motion(5.0, 100.0, 1)
-    usual = rungs(arm, motion)
-    assert rungs(arm, motion, np.full(3, 0.01)) == usual
-    elements = rungs(arm, motion, np.array([0.01, 0.002, 0.01]))[0].elements
+    usual = extensions(arm, motion)
+    assert extensions(arm, motion, np.full(3, 0.01)) == usual
+    elements = extensions(arm, motion, np.array([0.01, 0.002, 0.01]))[0].elements
     sharpest = [min(term.parameter for term in own if term.parameter) for own in elements]
     assert sharpest[1] < 0.001 and all(len(own) == len(usual[0].elements[0]) + 1 for own in elements)

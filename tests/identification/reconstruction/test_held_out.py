@@ -7,7 +7,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.reconstruction.bandwidth import choose_bandwidth
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -76,7 +76,7 @@ def test_the_low_pass_is_chosen_without_them(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.slow
 def test_laws_friction_and_ripple_are_chosen_and_fitted_without_them() -> None:
     log, arm = run(), three_axis()
-    samples = condition([log], USUAL)
+    samples = preprocess([log], USUAL)
     held = Chunk.of(samples, OPTIONS).held_out
     noise = 30 * np.random.default_rng(0).normal(size=samples.tau.shape)
     other = replace(samples, tau=np.where(held[:, None], noise, samples.tau))

@@ -9,7 +9,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.features.lagrangian import candidates
 from armloop.identification.reconstruction import Reconstruction, reconstruct
 from armloop.identification.reconstruction.physical import PhysicalSolution
@@ -63,7 +63,7 @@ def test_the_planted_energies_are_found_under_noise(result: Reconstruction):
 
 
 def test_a_fresh_run_is_predicted(result: Reconstruction):
-    samples = condition([a_run(9, noise=0.0)], result.model.conditioning)
+    samples = preprocess([a_run(9, noise=0.0)], result.model.conditioning)
     assert max(score(result.model, samples).moving["nrmse"]) < 0.02
     assert max(result.held_out.moving["nrmse"]) < 0.03
 

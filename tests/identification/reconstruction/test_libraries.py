@@ -9,7 +9,7 @@ import pytest
 from synthetic import conditioned_samples, fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.dynamics import check_physics
 from armloop.dynamics.physics import PhysicsChecks
 from armloop.features.lagrangian import candidates as energies
@@ -152,7 +152,7 @@ def test_a_library_of_more_candidates_than_independent_torques_is_not_tried() ->
 
 
 def test_blocks_choose_the_library_or_judge_the_model_and_neither_is_fitted(logs: list[MotionLog]) -> None:
-    samples = condition(logs, three_axis_conditioning())
+    samples = preprocess(logs, three_axis_conditioning())
     chunk = Chunk.of(samples, OPTIONS)
     selection, test = chunk.judging("selection"), chunk.judging("test")
     assert selection.any() and test.any() and not (selection & test).any()

@@ -7,7 +7,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
@@ -43,7 +43,7 @@ def test_data_without_clean_conditions_are_said_to_be_regressed_together(togethe
 
 
 def test_regressed_together_the_model_still_predicts_a_run_it_never_saw(together: Reconstruction):
-    fresh = score(together.model, condition([a_run(7)], together.model.conditioning))
+    fresh = score(together.model, preprocess([a_run(7)], together.model.conditioning))
     assert max(fresh.moving["nrmse"]) < 0.08  # 0.03, 0.02, 0.01 came out
     assert max(together.held_out.moving["nrmse"]) < 0.05
 
@@ -51,7 +51,7 @@ def test_regressed_together_the_model_still_predicts_a_run_it_never_saw(together
 def test_the_held_out_score_is_the_baseline_of_the_model(together: Reconstruction):
     held = together.held_out.moving
     logs, how, options = [a_run(1), a_run(2)], together.model.conditioning, Options()
-    samples = condition(logs, how)
+    samples = preprocess(logs, how)
     apart = independent_blocks(three_axis(), logs, how, options.block_seconds, options.folds)
     data = Data.of(samples, replace(options, block_seconds=apart.seconds))
     rows = data.reference.judging("all", apart.margin)
@@ -71,14 +71,14 @@ def test_the_model_remembers_how_it_came_about(together: Reconstruction):
         ["run1", "run2"],
     )
     half_q, half_v, half_a, centre = np.array(history["range"])
-    motion = condition([a_run(1), a_run(2)], Conditioning()).motion
+    motion = preprocess([a_run(1), a_run(2)], Conditioning()).motion
     assert (np.abs(motion.q - centre) <= half_q * 1.05).mean() > 0.99
     assert (np.abs(motion.v) <= half_v).mean() > 0.98 and (np.abs(motion.vdot) <= half_a).mean() > 0.98
 
 
 def test_held_out_blocks_do_not_reach_the_model():
     # spoil the torque in every held-out block
-    samples = condition([a_run(3)], SHARED_CONDITIONING)
+    samples = preprocess([a_run(3)], SHARED_CONDITIONING)
 
     def parameters(tau: np.ndarray) -> np.ndarray:
         options = Options()
@@ -102,7 +102,7 @@ def test_a_short_file_of_independent_samples_is_not_held_out_as_a_whole():
     log = a_run(3, 5.0)
     static = replace(log.select(slice(0, 50)), vdot=np.zeros((50, 3)))
     many = replace(log, vdot=log.v)
-    samples = condition([static, many], Conditioning(cutoff_hz=0))
+    samples = preprocess([static, many], Conditioning(cutoff_hz=0))
     held = held_out_rows(samples, Options())
     assert 0.15 < held[:50].mean() < 0.25 and 0.15 < held[50:].mean() < 0.25
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
@@ -44,7 +44,7 @@ def biased():
 
 def test_friction_comes_back_from_varying_motion_alone(varying):
     found = biased()
-    data = Data.of(condition(varying, true_model().conditioning), Options())
+    data = Data.of(preprocess(varying, true_model().conditioning), Options())
     assert refit(found, data, Sparse("evidence").how)
     for j in range(3):
         law = found.law.stribeck_parameters(j)
@@ -55,7 +55,7 @@ def test_friction_comes_back_from_varying_motion_alone(varying):
 
 
 def test_shrunken_and_unfiltered_coefficients_are_left_alone(varying):
-    found, samples = biased(), condition(varying, true_model().conditioning)
+    found, samples = biased(), preprocess(varying, true_model().conditioning)
     before = found.law
     assert not refit(found, Data.of(samples, Options()), Sparse("lasso").how)
     assert not refit(found, Data.of(replace(samples, cutoff_hz=0.0), Options()), Sparse("evidence").how)
@@ -63,7 +63,7 @@ def test_shrunken_and_unfiltered_coefficients_are_left_alone(varying):
 
 
 def test_held_out_samples_are_not_used(varying):
-    samples = condition(varying, true_model().conditioning)
+    samples = preprocess(varying, true_model().conditioning)
     data = Data.of(samples, Options())
     tau = np.where(data.reference.held_out[:, None], 1e3, samples.tau)
     one, other = biased(), biased()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armloop.data.regimes import sort_samples
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.fitted import fitted_rows
 from armloop.identification.reconstruction.found import Found
@@ -28,7 +28,7 @@ ORDERS = ([2, 0], [1, 2], [1, 1])
 def data() -> Data:
     """Creeping, constant and varying velocity."""
     logs = collection(0, poses=40, segments=40, seconds=20.0).logs(Disturbance("white", white=0.01), 1)
-    return Data.of(condition(logs, true_model().conditioning), OPTIONS)
+    return Data.of(preprocess(logs, true_model().conditioning), OPTIONS)
 
 
 @pytest.fixture(scope="module")

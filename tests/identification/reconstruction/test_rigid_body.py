@@ -8,7 +8,7 @@ from synthetic import fourier_motion, friction, measured, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction.shared import SHARED_CONDITIONING, sliding_rows
@@ -57,7 +57,7 @@ def test_base_parameters_are_recovered_though_the_urdf_is_wrong(result: Reconstr
 
 
 def test_a_fresh_run_is_predicted(result: Reconstruction):
-    samples = condition([a_run(9)], result.model.conditioning)
+    samples = preprocess([a_run(9)], result.model.conditioning)
     assert max(score(result.model, samples).moving["nrmse"]) < 0.03
     assert max(result.held_out.moving["nrmse"]) < 0.03
 
@@ -159,7 +159,7 @@ def test_friction_keeps_its_level_where_a_joint_creeps() -> None:
     logs = [exact(fourier_motion(40.0, 100.0, seed), seed) for seed in (1, 2)]
     for library, most in (("rigid-body", 0.01), ("lagrangian", 0.03)):
         model = reconstruct([*logs, creeping(1)], three_axis(), library=library).model
-        slow = condition([creeping(2)], model.conditioning)
+        slow = preprocess([creeping(2)], model.conditioning)
         assert slow.moving.all()
         error = model.predict(slow.motion) - slow.tau
         level = np.sqrt(np.mean(slow.tau**2, axis=0))
@@ -167,11 +167,11 @@ def test_friction_keeps_its_level_where_a_joint_creeps() -> None:
 
 
 def test_steady_creeping_counts_and_a_slow_reversal_does_not() -> None:
-    slow = condition([creeping(1)], SHARED_CONDITIONING)
+    slow = preprocess([creeping(1)], SHARED_CONDITIONING)
     assert sliding_rows(slow).all()
     time = np.arange(0, 4.0, 0.01)
     v = np.column_stack([0.05 * np.sin(np.pi * time)] * 3)
     motion = Motion(time, np.cumsum(v, axis=0) / 100, v, np.zeros_like(v), np.array([0]))
-    swing = condition([exact(motion, 1)], SHARED_CONDITIONING)
+    swing = preprocess([exact(motion, 1)], SHARED_CONDITIONING)
     rows, speed = sliding_rows(swing), np.abs(swing.motion.v)
     assert rows[speed > 0.011].all() and not rows[speed < 0.009].any()

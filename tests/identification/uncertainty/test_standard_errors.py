@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from armloop.data.signals import condition, independent_rows
+from armloop.data.signals import independent_rows, preprocess
 from armloop.identification.uncertainty import Fitted, standard_errors
 from armloop.identification.uncertainty import standard_errors as module_function
 from armloop.identification.uncertainty.solving import solve_given_terms
@@ -18,7 +18,7 @@ from armloop_paper.simulated import Disturbance, collection, true_model
 def fit():
     design = collection(0, poses=10, segments=20, seconds=20.0)
     logs = design.logs(Disturbance("coloured", coloured=0.01), 1)
-    samples = condition(logs, true_model().conditioning)
+    samples = preprocess(logs, true_model().conditioning)
     fitted = [Fitted((1, 2, 3), samples.moving & independent_rows(samples)[:, None])]
     model, _ = solve_given_terms(true_model(), samples, fitted, 2)
     return model, samples, fitted

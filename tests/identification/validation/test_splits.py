@@ -5,7 +5,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.validation.splits import by_blocks, by_file, judging_rows
 from armloop.util.errors import InputError
 
@@ -35,7 +35,7 @@ def test_alternating_blocks_share_every_sample_out():
 
 def test_no_filtered_sample_of_what_judges_was_near_what_is_fitted():
     log = a_run()
-    samples = condition([log], Conditioning(cutoff_hz=10.0))
+    samples = preprocess([log], Conditioning(cutoff_hz=10.0))
     for split in by_blocks([log], 1.0):
         time = samples.motion.time[judging_rows(samples.motion.time, samples, split.left_out[0])]
         nearest = np.abs(time[:, None] - split.training[0].time).min()

@@ -1,4 +1,4 @@
-"""Sorting samples by what the arm does: at rest, at constant velocity, or speeding up and slowing down."""
+"""Motion regimes: samples classified as at rest, at constant velocity, or at varying velocity."""
 
 from armloop.data.regimes.indicators import limit, noise_floor, paper_indicator, robust_indicator, size
 from armloop.data.regimes.kmeans import algorithm_1

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi, norm
 from sklearn.cluster import KMeans
 
 from armloop.data.regimes.kmeans import fitted
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Size that counts as exactly zero, relative to the largest.
 _NOTHING = 1e-6

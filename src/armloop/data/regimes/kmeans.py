@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: More iterations than Lloyd's method ever takes on a cloud in the plane.
 _MOST = 10_000

@@ -1,4 +1,4 @@
-"""Sorting samples into static, constant-velocity and varying-velocity data.
+"""Classification of samples into motion regimes: static, constant-velocity and varying-velocity data.
 
 The relative activation indicator (Eqs. 5-8) maps the velocities and the accelerations of all joints to
 two numbers; k-means sorts the samples in that plane (Algorithm 1), and the elbow of the within-cluster
@@ -17,8 +17,7 @@ from sklearn.cluster import KMeans
 from armloop.data.motion import Motion
 from armloop.data.regimes.indicators import paper_indicator, robust_indicator
 from armloop.data.regimes.kmeans import fitted
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Where the robust indicator puts samples at rest, at constant and at varying velocity.
 _IDEAL = np.array([[0.0, 0.0], [1.1, 0.0], [1.1, 1.1]])

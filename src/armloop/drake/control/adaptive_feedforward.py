@@ -1,19 +1,19 @@
-"""What has been named joins the feedforward while the simulation runs, and leaves it again if it does not help."""
+"""Adaptive feedforward: an effect named while the simulation runs is added, and removed again if it does not help."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
 from armloop.laws.effects.base import Pointwise
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.blockwise import Known
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Effects = tuple[AddedEffect, ...]
 
 #: Seconds between two looks at what is named and at the tracking error.

@@ -1,4 +1,4 @@
-"""The motion nearest to a reference that the drives can do, by quadratic programs: limits of torque and of its rate.
+"""Reference governor: the motion nearest to a reference that the drives can do, by quadratic programs (torque, its rate).
 
 Where a reference asks for more torque than there is, or for it sooner, the drives clip: the arm falls behind, the
 integrator winds up, and it overshoots. Known ahead, the shortage can be met before it comes: the reference gives way, as
@@ -21,10 +21,9 @@ from armloop.drake.control.bounded_program import Program
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference, TableReference
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 8
 _NEAR = 0.3  # w of the program once a round moves the velocities farther than the one before

@@ -20,10 +20,9 @@ from typing import Any
 
 import numpy as np
 import osqp
-from numpy.typing import NDArray
 from scipy import sparse
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _UNIT, _TIME = 0.01, 0.1
 """rad (m), L above, and s: in them deviations and their derivatives are of the size of 1, as torques are in their limits."""

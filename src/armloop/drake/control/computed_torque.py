@@ -7,15 +7,13 @@ from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 FRICTION_SOURCES = ("reference", "state", "none")
 

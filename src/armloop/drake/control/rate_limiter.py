@@ -1,4 +1,4 @@
-"""What a drive's amplifier does to a torque that is asked for too soon."""
+"""Torque rate limit: what a drive's amplifier does to a torque that is asked for too soon."""
 
 from __future__ import annotations
 

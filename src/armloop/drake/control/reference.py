@@ -6,7 +6,6 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import (
     BasicVector,
@@ -24,10 +23,9 @@ from armloop.drake.scalars import vector
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 from armloop.util.functions import NUMPY
-
-Array = NDArray[np.float64]
 
 _CHUNK = 1000  # rows of feedforward evaluated at once, when the first of them is needed
 

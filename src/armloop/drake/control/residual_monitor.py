@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, State
 
 from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known, Watch, advance, block_sums
-
-Array = NDArray[np.float64]
 
 #: A joint counts as sliding above this part of the fastest speed that the model was fitted on.
 _SLIDES = 0.02

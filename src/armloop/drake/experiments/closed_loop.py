@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
@@ -22,8 +22,7 @@ from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 CONTROLLERS = ("pid", "computed_torque")
 """The controllers that `add_arm_with_controller` knows; `add_arm_under` takes a law of your own."""

@@ -11,7 +11,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.drake.experiments.speed_mode import Recording, SpeedModeArm
@@ -28,7 +27,6 @@ from armloop.experiment.excitation import (
 from armloop.robot.arm import Arm
 from armloop.util.workers import Pool
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 """Called with the condition's name and the part of the whole collection that is done, 0 to 1."""
 

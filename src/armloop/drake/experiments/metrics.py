@@ -1,4 +1,4 @@
-"""How well a joint followed, besides its mean error: effort, torque not had, time in stick, settling after a reversal."""
+"""Tracking metrics besides the mean error: effort, torque not had, time in stick, settling after a reversal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 STILL = 1e-4
 """A joint slower than this rests, rad/s (m/s); sticking joints of the simulation creep 1e-7 at most."""

@@ -1,4 +1,4 @@
-"""A load is grasped while the arm follows its reference; what is learned from the log is used from then on."""
+"""Payload pick-up: a load is grasped while the arm tracks; what is learned from the log is used from then on."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 
@@ -17,8 +16,7 @@ from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import MAIN_MODEL, RecordedArm, TrackingResult, score
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 CONTROLLER = "pid_step3"
 PHASES = ("unloaded", "loaded", "augmented")

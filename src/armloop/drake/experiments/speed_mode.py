@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
@@ -22,8 +21,7 @@ from armloop.drake.plant.joint_loads import Law, ServoGains
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 STIFF = ServoGains(p=1e6, d=1e4)
 """A stiff drive: 10 N*m move it by 1e-5 rad, and it settles in d/p = 10 ms."""

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
@@ -20,9 +19,8 @@ from armloop.drake.experiments.metrics import Metrics, measure
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
+from armloop.util.arrays import Array
 from armloop.util.workers import Pool
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common import RandomDistribution
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
@@ -22,8 +21,7 @@ from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.plant import ArmPlant
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import controllers_for, track
 from armloop.drake.plant.friction import JointFriction
+from armloop.util.arrays import Array
 from armloop.util.checkpoints import Kept
 from armloop.util.workers import Processes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

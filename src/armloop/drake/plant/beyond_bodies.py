@@ -1,4 +1,4 @@
-"""What a model knows of an arm beyond its bodies, as a force on a plant: all friction, springs, ripples, tilt."""
+"""Joint forces of a model beside its rigid bodies, as a force on a plant: all friction, springs, ripples, tilt."""
 
 from __future__ import annotations
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.drake.plant.friction import JointFriction
 from armloop.experiment.excitation import MotionRanges
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The model that a perfect reconstruction would find: what a simulated arm is made of."""
+"""Ground truth as a model: what a perfect reconstruction of a simulated arm would find."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects that a plant has and nobody declared, put into the simulated arm itself.
+"""Fault injection: effects that a plant has and nobody declared, put into the simulated arm itself.
 
 The laws are those of the diagnosis (:mod:`armloop.laws.effects`), with its sign: what the drive must supply *in addition* (a
 spring k (q - q0) pulls on the plant with -k (q - q0)), or what the sensor says. Nothing here knows how they are found
@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.drake.plant.own_effects import Law, own_law
 from armloop.laws.effects import EFFECTS as LISTED
@@ -24,9 +23,9 @@ from armloop.laws.effects.gravity_tilt import GravityTilt, base_rotation
 from armloop.laws.effects.payload import Payload
 from armloop.laws.friction import KINDS
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ModelError, ScenarioError
 
-Array = NDArray[np.float64]
 Fault = Callable[[Array, Array, Array], tuple[Array, Array]]
 """What a sensor makes of q and tau (N, n), recorded at times (N,)."""
 

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 0.01
 """Speed within which dry friction changes sign, rad/s (m/s)."""

@@ -1,4 +1,4 @@
-"""One time step of joints under laws too stiff to be explicit: dry friction that sticks, servos of stiff drives.
+"""Implicit time stepping of joints under laws too stiff to be explicit: dry friction that sticks, servos of stiff drives.
 
 Explicit friction would chatter about zero velocity instead of sticking, and an explicit servo of a stiff drive
 would explode. Both are taken at the velocities that the step ends with. Plain floats throughout: for a handful

@@ -1,4 +1,4 @@
-"""What acts on the joints of a simulated arm besides torque-mode drives: friction, servos, springs, ripples."""
+"""Joint loads of a simulated arm besides torque-mode drives: friction, servos, springs, ripples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.multibody.plant import MultibodyPlant, MultibodyPlant_
 from pydrake.multibody.tree import JacobianWrtVariable
@@ -24,9 +23,8 @@ from armloop.dynamics.model import solve
 from armloop.laws.effects.base import Placed
 from armloop.laws.friction import Acting, Direction, Sliding, torque_along
 from armloop.laws.hysteresis import stop_step
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH, Functions
-
-Array = NDArray[np.float64]
 
 _STEP = 1e-5  # rad/s (m/s), of the slope of what is smooth
 _LOAD_ROUNDS = 4

@@ -1,18 +1,16 @@
-"""Eq. (34) nearest to the friction of a reconstructed model: what a simulated plant of the same arm is given."""
+"""Stribeck friction, Eq. (34), fitted to that of a reconstructed model: what a simulated plant of the arm is given."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.drake.plant.friction import JointFriction
 from armloop.dynamics import ModelEquations, training_range
 from armloop.laws.friction import stribeck_fall
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.functions import NUMPY
-
-Array = NDArray[np.float64]
 
 _SPEEDS = 60
 _VELOCITIES = np.geomspace(0.005, 1.0, 40)  # v_s tried, as parts of the largest speed

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -29,9 +28,8 @@ from armloop.drake.plant.fault_injection import Realisation, UndeclaredEffect, r
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import JointLoads, Law, ServoGains
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, ScenarioError
-
-Array = NDArray[np.float64]
 
 PAYLOAD_DENSITY = 7850.0
 """A payload is a steel ball, kg/m^3: its mass and centre are exact, its own inertia is small and known."""

@@ -1,4 +1,4 @@
-"""A reconstructed model as a plant whose joints really stick."""
+"""Forward dynamics of a reconstructed model with stick-slip: a plant whose joints really stick."""
 
 from __future__ import annotations
 

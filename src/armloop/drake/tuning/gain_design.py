@@ -10,13 +10,11 @@ joints do to each other is left to the check: `sampled_margins` of the whole arm
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.tuning.loop_analysis import SampledArm, sampled_margins
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 _TURNS = 60
 _CLOSE = 0.01

@@ -1,4 +1,4 @@
-"""How much room a PID loop has before it rings: margins of each joint's loop about a posture.
+"""Stability margins of each joint's PID loop about a posture: how much room it has before it rings.
 
 The arm at rest at q0 is linearised by Drake, M(q0) dv + F dq' + G(q0) dq = du, with F the viscous friction and G the
 stiffness of gravity. Dry friction is not linear and left out: it only adds damping where the joint slides.
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.primitives import Linearize
@@ -26,9 +26,8 @@ from armloop.drake.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.functions import MATH
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
-"""A small step by the linear loop and by the simulated arm: whether margins say what really happens."""
+"""Step responses of the linear loop and of the simulated arm: whether margins say what really happens."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
@@ -16,8 +16,7 @@ from armloop.drake.experiments.closed_loop import add_arm_with_controller
 from armloop.drake.experiments.scenarios import Plant
 from armloop.drake.plant.exact import exact_model
 from armloop.drake.tuning.loop_analysis import SampledArm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import TrackingScenario
@@ -18,8 +17,7 @@ from armloop.drake.tuning.loop_analysis import (
     sampled_margins,
 )
 from armloop.drake.tuning.step_check import linear_step, simulated_step
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 STEP = 1.0  # deg (mm), the small step
 _POSTURES = 10  # along the reference

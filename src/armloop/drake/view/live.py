@@ -1,4 +1,4 @@
-"""A look at simulated arms while they move, in a browser on the same computer (Meshcat)."""
+"""Live view of simulated arms in a browser on the same computer (Meshcat)."""
 
 from __future__ import annotations
 

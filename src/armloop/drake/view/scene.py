@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
@@ -19,8 +18,6 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from armloop.drake.plant.plant import add_links
 from armloop.robot.arm import Arm
 from armloop.util.quiet import quiet
-
-Array = NDArray[np.float64]
 
 COLOURS = ((0.93, 0.70, 0.13), (0.20, 0.45, 0.80), (0.85, 0.30, 0.55), (0.25, 0.65, 0.40), (0.55, 0.40, 0.75))
 """One per controller: yellow, blue and pink as in Fig. 15, then more."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.experiment.design.information import Columns
@@ -13,8 +12,7 @@ from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Friction beside the links: level, offset, viscous and quadratic. Friction with memory is no function of a sample.
 _FRICTION = ("offset", "smooth_sign", "viscous", "quadratic")

@@ -1,4 +1,4 @@
-"""What makes a motion informative: scalar measures of its information matrix, each with its gradient.
+"""Optimality criteria of experiment design: scalar measures of the information matrix, each with its gradient.
 
 Information is F = sum over samples of X' W X, for unit columns and noise (see `information`); the covariance of
 the coefficients that a regression finds is its inverse. All measures are to be made large.
@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+
 Criterion = Callable[[Array], tuple[float, Array]]
 """F (p, p) -> its measure, and the measure's gradient (p, p)."""
 

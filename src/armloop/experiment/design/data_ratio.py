@@ -1,4 +1,4 @@
-"""How much more data a random reference needs for the coefficient error that an optimised one reaches."""
+"""Relative efficiency: how much more data a random reference needs for the coefficient error of an optimised one."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.experiment.design.criteria import ROUND_OFF
 from armloop.experiment.design.information import Regression
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.experiment.design.columns import double_feature_columns, rigid_body_columns
@@ -20,10 +19,9 @@ from armloop.experiment.design.series import Series, sampled
 from armloop.experiment.design.settings import Settings, Timing
 from armloop.experiment.excitation import FourierReference, MotionRanges
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 #: Speed below which a joint's direction fades in the columns, relative to its fastest.
 _SLOW = 0.02

@@ -1,4 +1,4 @@
-"""The information that a motion gives about coefficients, in units that no choice of units changes.
+"""Information matrix of a motion's regression, in units that no choice of units changes.
 
 Every column is divided by its root mean square over random motions within the same limits, counted in
 standard deviations of the torque noise of the joint it acts on. A coefficient's unit is then one noise level of
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from armloop.data.motion import Motion
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Columns = Callable[[Motion], Array]
 """The columns (N, m, p) of a motion's regression: p coefficients shared by m rows a sample (one per joint, or one in
 all where every joint is regressed on the same candidates). They must depend on each sample alone."""

@@ -1,4 +1,4 @@
-"""What the arm may do: ranges of motion, and the torque that the motion is predicted to take."""
+"""Constraints of a designed motion: ranges of motion, and the torque that it is predicted to take."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.experiment.excitation import FourierReference, MotionRanges, static_poses
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
 from armloop.robot.newton_euler import joint_torques
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 
-Array = NDArray[np.float64]
 TorqueLaw = Callable[[Motion], Array]
 """Predicted joint torques (N, n) of a motion, N*m (N)."""
 

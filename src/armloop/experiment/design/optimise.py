@@ -1,4 +1,4 @@
-"""Find the motion of a family that a criterion likes best, within the arm's limits.
+"""Constrained optimisation of a family's motion under a criterion, within the arm's limits.
 
 The columns are functions of each sample's state, so the criterion's derivative by the states costs one evaluation
 of the columns at 3 n + 1 neighbouring motions, whatever the number of coefficients; from the states to the
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from armloop.data.motion import Motion
@@ -20,9 +19,8 @@ from armloop.experiment.design.information import Regression
 from armloop.experiment.design.limits import Limits
 from armloop.experiment.design.series import Series, sampled
 from armloop.experiment.excitation import FourierReference
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 #: Samples per period of the highest harmonic, while optimising and when checking.
 _COARSE, _FINE = 16, 320

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from armloop.data.motion import Motion
 from armloop.experiment.excitation import FourierReference
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.experiment.excitation.ranges import MotionRanges
 from armloop.experiment.excitation.table import TableReference
-
-Array = NDArray[np.float64]
 
 _PEAK_SPEED = 15 / 8  # of the minimum-jerk profile: way / time
 _PEAK_PULL = 10 / np.sqrt(3)  # way / time^2

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.experiment.excitation.ranges import MotionRanges
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 class Reference(Protocol):

@@ -9,13 +9,12 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.data.tables import place, read_columns, read_header, write_columns
 from armloop.experiment.excitation.reference import Reference
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 #: How far q may differ from the integral of v within a row's step, relative to the fastest step: coarse tables and
 #: rounded ones pass, degrees beside radians do not.

@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.laws.hysteresis import stop_operator
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Speeds over which a direction fades in, and widths of presliding elements, as parts of the joint's fastest speed
 #: and of its range.

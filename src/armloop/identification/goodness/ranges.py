@@ -1,4 +1,4 @@
-"""How much of a motion lies where a model was never fitted."""
+"""Extrapolation: how much of a motion lies where a model was never fitted."""
 
 from __future__ import annotations
 

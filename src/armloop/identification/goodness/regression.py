@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.identification.goodness.split import FOLDS, Split
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
 _PENALTIES = tuple(10.0**k for k in range(-5, 2))

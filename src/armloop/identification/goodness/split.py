@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 FOLDS = 4
 #: A block is so many times as long as the gap beside it; there are at least so many blocks, however long the gap

@@ -1,4 +1,4 @@
-"""What a model leaves, beside all that it may depend on: rows to be judged, summed chunk by chunk."""
+"""Residuals beside all that they may depend on: rows to be judged, summed chunk by chunk."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.goodness.features import Scales, features
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Most rows of a joint, and seconds that runs of different logs lie apart.

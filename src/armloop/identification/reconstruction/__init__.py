@@ -1,4 +1,4 @@
-"""Turning motion logs into a model: the stepwise method, the one-shot baseline, and scalable libraries."""
+"""System identification from motion logs: the stepwise method, one-shot SINDy as its reference, and scalable libraries."""
 
 from armloop.identification.reconstruction.libraries import LIBRARIES
 from armloop.identification.reconstruction.library import METHODS

@@ -1,4 +1,4 @@
-"""A step's coefficients without the attenuation that noise in q, v and v̇ causes, on the terms already chosen.
+"""Errors-in-variables correction of a step's coefficients, on the terms already chosen: noise in q, v, v̇ attenuates them.
 
 One more pass over the samples: unbiased sums of the chosen terms and of the inherited ones, whose torque the noise
 attenuates as well. Friction columns count as exact: they are used where a joint clearly moves.
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.unbiased import Noise, UnbiasedTerms, WaveTerm, wave_terms
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -19,8 +18,7 @@ from armloop.identification.reconstruction.sums import Choice, Columns
 from armloop.identification.reconstruction.trials import Fit
 from armloop.model.components import SparseTerms
 from armloop.regression.errors_in_variables import corrected
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,7 @@ class _Sums:
         )
 
 
-def unattenuated(
+def without_attenuation(
     data: Data, choice: Choice, columns: Columns, fits: Sequence[Fit], snr: tuple[float, float, float]
 ) -> list[Fit]:
     """The fits with corrected coefficients, joint by joint; a joint's stay where noise drowns its columns.

@@ -20,14 +20,13 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, LowPass, ShortRunError, condition, uniform_period
+from armloop.data.signals import Conditioning, LowPass, ShortRunError, preprocess, uniform_period
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 #: Corners tried, as parts of the highest.
 _PARTS = (1.0, 0.71, 0.5, 0.35, 0.25)
@@ -176,7 +175,7 @@ def table_at(
     total = sum(log.samples for log in logs)
     for k, log in enumerate(logs):
         try:
-            samples = condition([log], replace(how, cutoff_hz=corner, oversampling=1e9))
+            samples = preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9))
         except ShortRunError:
             continue
         motion, period = samples.motion, uniform_period(log.time)

@@ -1,4 +1,4 @@
-"""How long held-out blocks must be: several correlation times of what a model leaves, so that they say something new.
+"""Block length of cross-validation: several correlation times of the residual, so that blocks say something new.
 
 A sample that lies next to fitted ones, nearer than the residual's correlation, has half of its error in common with
 them; an error on such samples is one on data that were fitted. How long the residual remembers is seen on that of a
@@ -11,19 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import stretch
 from armloop.data.motion import Samples
 from armloop.data.pieces import LogSource
-from armloop.data.signals import Conditioning, ShortRunError, condition, smooth
+from armloop.data.signals import Conditioning, ShortRunError, preprocess, smooth
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.shared import PLAIN_FRICTION
 from armloop.identification.uncertainty.blocking import correlation_time
 from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 #: Samples of the plain regression, from so many logs at most, and the speed from which on a joint counts as moving.
 _SAMPLES, _LOGS, _SLOW = 8000, 16, 0.01
@@ -72,7 +69,7 @@ def independent_blocks(
     parts, covered = [], 0.0
     for log in some:
         try:
-            samples = condition([log.read()], how)
+            samples = preprocess([log.read()], how)
         except ShortRunError:
             continue
         covered += samples.motion.samples * samples.period

@@ -1,4 +1,4 @@
-"""Every law of the catalogue may be a rung: which of them an arm had all along, found in its training data.
+"""Forward selection among the catalogue's laws: which of them an arm had all along, found in its training data.
 
 A law that the model lacks is half hidden, for the base parameters that were fitted without it have soaked up part of
 it: what is left looks like no law at all. So a law is judged on columns from which the model's own have been projected
@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armloop.data.motion import Motion, Samples
@@ -27,9 +26,8 @@ from armloop.identification.reconstruction.projected import Projected, Trial
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Part of the squared error of the joint it shows on most that a law must remove …
 WORTH = 0.05

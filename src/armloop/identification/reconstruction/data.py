@@ -21,13 +21,12 @@ from armloop.data.blocks import block_numbers, stretch
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
-from armloop.data.signals import Conditioning, ShortRunError, condition, independent_rows, velocity_noise
+from armloop.data.signals import Conditioning, ShortRunError, independent_rows, preprocess, velocity_noise
 from armloop.identification.reconstruction.options import Options
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Answer = TypeVar("Answer")
 
 #: Samples of the reference: enough for clusters and quantiles.
@@ -134,7 +133,7 @@ class _Conditioned:
     def chunk(self) -> Chunk | None:
         """None where no run is long enough for the filter."""
         try:
-            samples = condition([self.source.read()], self.how, self.noise)
+            samples = preprocess([self.source.read()], self.how, self.noise)
         except ShortRunError:
             return None
         return Chunk.of(samples, self.options, self.first)
@@ -187,7 +186,7 @@ class Data:
                 chunks.append(chunk)
                 first = int(chunk.blocks[-1]) + 1
         if not chunks:
-            condition(logs, how, noise)  # says how long a run must be
+            preprocess(logs, how, noise)  # says how long a run must be
         return Data([_Kept(chunk) for chunk in chunks], _joined(chunks), Serial())
 
     def nested(self) -> Data:
@@ -237,7 +236,7 @@ class Data:
                 )
                 first += blocks
         if not parts:
-            condition([logs[0].read()], how, noise)  # says which run is too short
+            preprocess([logs[0].read()], how, noise)  # says which run is too short
         return Data(parts, _joined(reference), workers, progress)
 
     def sampled(self, count: int) -> Data:

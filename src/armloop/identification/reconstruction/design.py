@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import overlapping
 from armloop.data.motion import Motion, Samples
@@ -19,9 +18,7 @@ from armloop.data.signals import smooth
 from armloop.identification.reconstruction.catalogue import Laws
 from armloop.laws.friction import Direction, FrictionTerm, sliding_direction
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 #: Samples at a time, and periods of the filter beside them: what it carries further is round-off.
 _SAMPLES, _BESIDE = 4096, 15.0

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from armloop.features.double_feature_set import Factors
 from armloop.laws.friction import FrictionTerm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 #: Squared sine of the angle between two columns below which they are one function on the data: their difference
 #: is a thousandth of either.

@@ -1,4 +1,4 @@
-"""Whether samples can determine a model at all, checked before any regression."""
+"""Persistency of excitation: whether samples can determine a model at all, checked before any regression."""
 
 from __future__ import annotations
 

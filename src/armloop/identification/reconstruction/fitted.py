@@ -1,4 +1,4 @@
-"""Which samples each regression of a reconstruction used: what standard errors have to know."""
+"""Provenance of a regression: which samples it used, and what standard errors have to know."""
 
 from __future__ import annotations
 

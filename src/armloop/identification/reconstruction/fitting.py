@@ -6,13 +6,12 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Samples
 from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, search
 from armloop.identification.reconstruction.design import Design
-from armloop.identification.reconstruction.friction_selection import Ladder, climb
+from armloop.identification.reconstruction.friction_selection import FrictionSelection, select_friction
 from armloop.identification.reconstruction.inner_folds import inner_folds
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Prior, Solution
@@ -20,10 +19,8 @@ from armloop.identification.reconstruction.projected import Projected, Rows
 from armloop.identification.reconstruction.training import Training, fitted_rows
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: So many rows tell laws apart as well as more do.
 _ROWS = 15_000
@@ -59,7 +56,7 @@ class Fitting:
         self._arm, self._own, self._design, self._training = arm, design, design, training
         self._priors, self._options, self._progress = priors, options, progress
 
-    def chosen(self) -> tuple[Ladder, Laws]:
+    def chosen(self) -> tuple[FrictionSelection, Laws]:
         """The laws that the training data show, and every joint's friction chosen beside them."""
         self._progress("choosing each joint's friction on held-out data")
         ladder, samples = self._climbed(), self._training.window.samples
@@ -78,27 +75,27 @@ class Fitting:
             ladder = self._beside(laws, ladder)
         return ladder, laws
 
-    def _beside(self, laws: Laws, ladder: Ladder) -> Ladder:
+    def _beside(self, laws: Laws, ladder: FrictionSelection) -> FrictionSelection:
         """Friction chosen anew beside some laws, by the load of what is solved with that of a ladder before."""
         design = self._own.with_laws(laws)
         self._design = design.loaded(self._window_solution(design, ladder).theta)
         self._progress("choosing each joint's friction anew beside the laws found")
         return without_offsets(self._climbed(), laws.constant_at())
 
-    def _climbed(self) -> Ladder:
+    def _climbed(self) -> FrictionSelection:
         extra = self._design.laws.count
         priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
-        return climb(self._arm, self._training, self._design, self._options, priors)
+        return select_friction(self._arm, self._training, self._design, self._options, priors)
 
-    def _window_solution(self, design: Design, ladder: Ladder) -> Solution:
+    def _window_solution(self, design: Design, ladder: FrictionSelection) -> Solution:
         """The coefficients of a design and of a ladder's friction, on the window."""
         pooled = self._training.window_pooled(design, ladder.laws, self._options.physical)
         return pooled.solve(pooled.everything, self._prior(ladder, design.laws.count))
 
-    def _prior(self, ladder: Ladder, extra: int) -> Prior | None:
+    def _prior(self, ladder: FrictionSelection, extra: int) -> Prior | None:
         return None if ladder.prior is None else padded(cut(ladder.prior, self._own.count), extra)
 
-    def _bench(self, ladder: Ladder) -> Callable[[Sequence[Law]], Projected]:
+    def _bench(self, ladder: FrictionSelection) -> Callable[[Sequence[Law]], Projected]:
         """Regressions of the shared columns and some laws', with the friction of a ladder that is not zero."""
         chunk = self._training.window
         samples, usable, r = chunk.samples, fitted_rows(chunk), self._own.count
@@ -170,7 +167,7 @@ def _picked(
     return shared, friction
 
 
-def without_offsets(ladder: Ladder, joints: Collection[int]) -> Ladder:
+def without_offsets(ladder: FrictionSelection, joints: Collection[int]) -> FrictionSelection:
     """The ladder without the constant torque of joints (0-based) where a law brings one: the two cannot be told apart."""
 
     def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:

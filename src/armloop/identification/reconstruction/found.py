@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.identification.reconstruction.nearest_regime import Sorter
@@ -16,8 +15,7 @@ from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.model.components import Component
 from armloop.robot.arm import Arm
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""A ladder of friction laws: every rung must earn its place on data held out.
+"""Nested model selection of friction: each larger law must earn its place on held-out data; then backward elimination.
 
 The rungs go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
 Coulomb level it makes levels that differ with the direction), the Stribeck fall, nonlinear viscous friction,
@@ -21,7 +21,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.identification.reconstruction.design import Design
@@ -30,9 +29,8 @@ from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, 
 from armloop.identification.reconstruction.training import Training
 from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 #: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
@@ -48,22 +46,22 @@ _STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
 
 
 @dataclass(frozen=True)
-class Rung:
-    """A step of the ladder: its name, and the elements it brings for each joint."""
+class Extension:
+    """What the larger of two nested friction laws adds: its name, and the elements it brings for each joint."""
 
     name: str
     elements: list[list[FrictionTerm]]
 
 
 @dataclass
-class Climb:
-    """What one rung brought.
+class Comparison:
+    """What the comparison of two nested laws came to.
 
     Attributes:
         rung: its name.
         before, after: held-out nRMSE, mean over the joints.
         refused: held-out nRMSE that it would have led to, where it was not taken.
-        joints: those that took it (0-based), or, of the last entry, that handed rungs back.
+        joints: those that took it (0-based), or, of the last entry, that dropped extensions.
     """
 
     rung: str
@@ -78,12 +76,12 @@ class Climb:
 
 
 @dataclass(frozen=True, eq=False)
-class Ladder:
+class FrictionSelection:
     """The laws chosen, the prior of the shared coefficients, what each rung brought, all candidates, and the sums."""
 
     laws: list[list[FrictionTerm]]
     prior: Prior | None
-    climbs: list[Climb]
+    comparisons: list[Comparison]
     notes: list[str]
     candidates: list[list[FrictionTerm]]
     pooled: Pooled
@@ -97,8 +95,8 @@ class Ladder:
         return self.pooled.relative_errors(theta, self.pooled.choice(self.laws))
 
 
-def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
-    """The ladder of an arm; the Stribeck speeds follow each joint's fastest speed.
+def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Extension]:
+    """The nested friction laws of an arm; the Stribeck speeds follow each joint's fastest speed.
 
     Where a joint creeps, slower than the speed over which the direction fades in fastest, one more speed, for every
     joint, keeps the Coulomb level there.
@@ -131,14 +129,14 @@ def rungs(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Rung]:
     coulomb = [[*own, FrictionTerm("viscous")] for own in fading("smooth_sign")]
     falls = [[FrictionTerm("stribeck_peak", parameter=float(f"{v:.2g}")) for v in own] for own in stribeck]
     return [
-        Rung("Coulomb and viscous", coulomb),
-        Rung("offset (levels by direction)", same("offset")),
-        Rung("Stribeck", falls),
-        Rung("nonlinear viscous", same("nonlinear_viscous")),
-        Rung("viscous by direction", same("viscous_by_direction")),
-        Rung("Coulomb by load", fading("load_smooth_sign")),
-        Rung("presliding", scaled("hysteresis", _WIDTHS)),
-        Rung("presliding by load", scaled("load_hysteresis", _WIDTHS)),
+        Extension("Coulomb and viscous", coulomb),
+        Extension("offset (levels by direction)", same("offset")),
+        Extension("Stribeck", falls),
+        Extension("nonlinear viscous", same("nonlinear_viscous")),
+        Extension("viscous by direction", same("viscous_by_direction")),
+        Extension("Coulomb by load", fading("load_smooth_sign")),
+        Extension("presliding", scaled("hysteresis", _WIDTHS)),
+        Extension("presliding by load", scaled("load_hysteresis", _WIDTHS)),
     ]
 
 
@@ -153,7 +151,7 @@ def check_laws(names: Sequence[str] | None) -> None:
         raise InputError(f"no friction law is named; there are: {', '.join(FRICTION_LAWS)}")
 
 
-def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
+def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Extension]:
     """The rungs with the elements of some laws alone; all of them for None. Rungs left empty are dropped."""
     if names is None:
         return ladder
@@ -171,11 +169,13 @@ def restricted(ladder: list[Rung], names: Sequence[str] | None) -> list[Rung]:
         whole = elements == rung.elements
         called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
         if called:
-            kept.append(rung if whole else Rung(" and ".join(called), elements))
+            kept.append(rung if whole else Extension(" and ".join(called), elements))
     return kept
 
 
-def climb(arm: Arm, data: Training, design: Design, options: Options, priors: dict[str, Prior]) -> Ladder:
+def select_friction(
+    arm: Arm, data: Training, design: Design, options: Options, priors: dict[str, Prior]
+) -> FrictionSelection:
     """Choose the prior of the shared coefficients by its evidence, then every joint's friction on held-out folds.
 
     Args:
@@ -184,24 +184,24 @@ def climb(arm: Arm, data: Training, design: Design, options: Options, priors: di
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    ladder = restricted(rungs(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
+    ladder = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
     candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
     pooled = data.pooled(design, candidates, options.physical)
     ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
     places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
     state = _State(pooled, places, priors)
-    climbs = [state.take(level, rung.name, one_by_one=data.plenty) for level, rung in enumerate(ladder)]
+    comparisons = [state.take(level, rung.name, one_by_one=data.plenty) for level, rung in enumerate(ladder)]
     if data.plenty:
-        climbs.append(state.hand_back())
+        comparisons.append(state.eliminate_backward())
     notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
-    return Ladder(laws, state.prior, climbs, notes + _notes(climbs), candidates, pooled)
+    return FrictionSelection(laws, state.prior, comparisons, notes + _notes(comparisons), candidates, pooled)
 
 
 class _State:
-    """Where the climb stands: the rungs each joint has taken, and the squared errors on the held-out folds."""
+    """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds."""
 
     def __init__(self, pooled: Pooled, places: list[list[int]], priors: dict[str, Prior]) -> None:
         self.pooled, self._places = pooled, places
@@ -218,7 +218,7 @@ class _State:
         """Places of the elements of some rungs per joint."""
         return [[place for level in own for place in self._places[level]] for own in taken]
 
-    def take(self, level: int, name: str, one_by_one: bool) -> Climb:
+    def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
         """Take a rung for all joints or for some if it earns its place; the first, what every drive has, anyway."""
         before = self._error(self._errors)
         everyone = [[*own, level] for own in self.taken]
@@ -237,10 +237,10 @@ class _State:
         if joints:
             self._weights, self._errors = self._judged()
         after = self._error(self._errors)
-        return Climb(name, before, after, None if joints else self._error(errors), joints)
+        return Comparison(name, before, after, None if joints else self._error(errors), joints)
 
-    def hand_back(self) -> Climb:
-        """Let every joint drop the rungs it does not miss, the last first."""
+    def eliminate_backward(self) -> Comparison:
+        """Backward elimination: every joint drops the extensions it does not miss, the last first."""
         before, joints = self._error(self._errors), set()
         for level in reversed(range(len(self._places))):
             for j, own in enumerate(self.taken):
@@ -250,7 +250,7 @@ class _State:
                     if -self._gain(errors, _SURE, [j])[0] < _KEEP:
                         self.taken, self._errors = shorter, errors
                         joints.add(j)
-        return Climb("rungs handed back", before, self._error(self._errors), None, sorted(joints))
+        return Comparison("backward elimination", before, self._error(self._errors), None, sorted(joints))
 
     def _earns_alone(self, joint: int, level: int) -> bool:
         more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
@@ -291,10 +291,10 @@ class _State:
         return float(gains.sum()), float(gains.sum()) > times * scatter
 
 
-def _notes(climbs: list[Climb]) -> list[str]:
+def _notes(comparisons: list[Comparison]) -> list[str]:
     """What each rung brought, in a line each."""
     notes = []
-    for rung in climbs:
+    for rung in comparisons:
         who = "joints " + ", ".join(str(joint + 1) for joint in rung.joints) if rung.joints else "no joint"
         change = f"{rung.before:.4f} → {rung.after:.4f}"
         if rung.refused is not None:

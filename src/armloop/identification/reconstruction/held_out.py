@@ -16,8 +16,7 @@ from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, kept_instants
 from armloop.identification.reconstruction.options import Options
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 def held_out_intervals(

@@ -10,15 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import at_least
 from armloop.identification.reconstruction.options import Options
-
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Index, Mask
 
 #: Folds: so many where there is plenty of data, s of them; else twice as many, of blocks that may become as short as so
 #: many periods of the filter, so that what is left can still determine the rest.

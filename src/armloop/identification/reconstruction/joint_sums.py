@@ -12,9 +12,7 @@ from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""How good a reconstruction is: the parts of the torque on held-out blocks, of logs in memory or streamed."""
+"""Goodness of fit of a reconstruction: the parts of the torque on held-out blocks, of logs in memory or streamed."""
 
 from __future__ import annotations
 

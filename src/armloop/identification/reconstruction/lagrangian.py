@@ -42,11 +42,10 @@ from armloop.identification.reconstruction.training import Survey, Training, fit
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Rows = NDArray[np.bool_]
 
 #: Most terms tried beside the joints' own inertias, and additions without a gain after which the search ends.
@@ -112,7 +111,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
             ):  # terms found in little data may leave no room for M; the notes then say so
                 pass
         body = Lagrangian(energy, theta[: energy.count])
-        history = {"friction_ladder": [rung.to_dict() for rung in ladder.climbs], **physics}
+        history = {"friction_ladder": [rung.to_dict() for rung in ladder.comparisons], **physics}
         effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
         friction = found_friction(ladder.laws, theta[r:])
         return Found(arm, [body], friction, history=history, effects=effects), theta

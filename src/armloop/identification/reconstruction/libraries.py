@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import PhysicsChecks, check_physics
@@ -32,9 +31,8 @@ from armloop.identification.reconstruction.tally import SELECTION, Part, Tally
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-
-Array = NDArray[np.float64]
 
 #: By name, the richest first.
 LIBRARIES: dict[str, Library] = {

@@ -21,17 +21,17 @@ class Method:
 
     Attributes:
         streams: whether it passes over the samples, so that not all of them need be in memory.
-        baseline: whether it is there to be beaten: nothing beyond its terms is looked for.
+        reference: whether it is a reference method, there to be beaten: nothing beyond its terms is looked for.
     """
 
     name: str
     streams: bool = True
-    baseline: bool = False
+    reference: bool = False
 
 
 #: The default first.
 METHODS: dict[str, Method] = {
-    method.name: method for method in (Method("stepwise"), Method("sindy", streams=False, baseline=True))
+    method.name: method for method in (Method("stepwise"), Method("sindy", streams=False, reference=True))
 }
 
 Find = Callable[[Arm, Data, Options, Progress], Found]

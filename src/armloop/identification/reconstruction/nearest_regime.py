@@ -1,4 +1,4 @@
-"""Sorting more samples than were clustered: each takes the condition of the nearest one that was."""
+"""Nearest-neighbour classification of samples into motion regimes that were found on fewer of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from scipy.spatial import cKDTree
 
 from armloop.data.motion import Motion
 from armloop.data.regimes.indicators import units
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Of the largest speed or acceleration: less counts as none.
 _NONE = 1e-6

@@ -1,4 +1,4 @@
-"""What physics demands of coefficients that were regressed, kept as linear inequalities.
+"""Physical-consistency constraints on regressed coefficients, kept as linear inequalities.
 
 M(q) is kept positive definite over the joint limits, not only where the arm was seen: cutting planes at random postures,
 and at the worst ones that a search finds afterwards, until it finds none. By how much is a small part of each joint's mean
@@ -21,9 +21,8 @@ from armloop.dynamics.physics import lowest
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.constrained import Cuts, TooCostly, constrained_least_squares
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
-
-Array = NDArray[np.float64]
 
 #: Postures of the motion, and more within the joint limits, at which M(q) is kept positive definite from the start.
 POSTURES, _BEYOND = 60, 240

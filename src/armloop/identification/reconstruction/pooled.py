@@ -13,16 +13,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from armloop.identification.reconstruction.joint_sums import JointSums
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments, total
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: For every joint the candidates of its friction that are used, by their place.
 Choice = list[list[int]]
 

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from armloop.data.blocks import block_sums
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 _RIDGE = 1e-7
 #: Directions of the model's columns that are weaker than this part of the strongest span nothing.

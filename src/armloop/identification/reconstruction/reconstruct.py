@@ -125,7 +125,7 @@ def reconstruct(
     Args:
         logs: runs of the same arm, in memory or read when needed (:mod:`armloop.data.pieces`); which sample serves
             which step is found from the samples.
-        method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the baseline).
+        method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the reference method).
         library: the name of one of :mod:`reconstruction.libraries`; by default the best of them, unless an
             option speaks of one.
         conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
@@ -257,7 +257,7 @@ def _finished(
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if not METHODS[method].baseline:
+    if not METHODS[method].reference:
         bare = ReconstructedModel(
             arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
         )

@@ -1,4 +1,4 @@
-"""Coefficients regressed once more, the terms being chosen, on columns that are filtered like the torque.
+"""Refitting: coefficients regressed once more, the terms being chosen, on columns that are filtered like the torque.
 
 Friction steps where a joint reverses, and the filter smears the step in the torque; unless its column is smeared
 alike, f_s comes out low and v_s high, most of all where a log holds no slow motion but that around reversals. All

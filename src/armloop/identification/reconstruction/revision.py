@@ -1,4 +1,4 @@
-"""All terms chosen once more on all samples, where what the three steps leave is no noise.
+"""Reselection of all terms on all samples, where what the three steps leave is no noise.
 
 Each step inherits what the last one found, its mistakes too: fifty postures do not tell dozens of terms of gravity
 apart, and a hundred short stretches at constant velocity hardly tell those of two velocities. Samples at varying
@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.regimes import Condition
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -26,9 +25,8 @@ from armloop.identification.reconstruction.sums import Choice
 from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Part of the squared residual that repeats after a period of the filter from which on it is no noise.
 _MOST = 0.5

@@ -13,7 +13,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.dynamics.physics import joint_limits
@@ -37,9 +36,8 @@ from armloop.identification.reconstruction.training import Training
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Standard deviations of a link's mass from the URDF's that are tried, kg.
 _SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -97,7 +95,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         inertial = body.parameters[: 10 * arm.n].tolist()
         history = {
             "inertial": inertial,
-            "friction_ladder": [rung.to_dict() for rung in ladder.climbs],
+            "friction_ladder": [rung.to_dict() for rung in ladder.comparisons],
             **physics,
         }
         effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))

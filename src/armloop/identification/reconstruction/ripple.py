@@ -18,13 +18,11 @@ from scipy.stats import t as student
 from armloop.data.blocks import block_numbers, block_sums
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import Conditioning, ShortRunError, condition
+from armloop.data.signals import Conditioning, ShortRunError, preprocess
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 #: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
 _BAND = 0.4
@@ -133,11 +131,11 @@ def _residuals(
         for part in log.runs():
             one = log.select(part)
             try:
-                low = condition([one], fine)
+                low = preprocess([one], fine)
             except ShortRunError:
                 continue
             period = low.period
-            full = condition([one], Conditioning(cutoff_hz=_BAND / period, oversampling=1e9))
+            full = preprocess([one], Conditioning(cutoff_hz=_BAND / period, oversampling=1e9))
             time, known = low.motion.time, samples.motion.time[runs[number]]
             nearest = np.clip(np.searchsorted(known, time), 0, len(known) - 1) + runs[number].start
             number += 1

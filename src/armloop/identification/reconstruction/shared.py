@@ -16,9 +16,8 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.determined import combination, told_apart
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
-
-Array = NDArray[np.float64]
 
 #: Friction with memory needs every sample.
 SHARED_CONDITIONING = Conditioning(cutoff_hz=9.5)

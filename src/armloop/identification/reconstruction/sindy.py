@@ -1,4 +1,4 @@
-"""One-shot SINDy through pysindy: the baseline that the stepwise method has to beat on the same data.
+"""One-shot SINDy through pysindy: the reference method that the stepwise one has to beat on the same data.
 
 All candidates of the one library (velocities and accelerations together) are regressed on all samples at
 once by sequentially thresholded least squares (Brunton, Proctor and Kutz 2016).
@@ -21,10 +21,9 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: Thresholds as a share of each joint's torque; ridges as a share of the columns' squared size.
 _SETTINGS = [(threshold, ridge) for ridge in (1e-4, 1e-2) for threshold in (3e-3, 1e-2, 3e-2)]
@@ -96,7 +95,7 @@ def _stlsq(X: Array, tau: Array, names: list[str], threshold: float, ridge: floa
         feature_library=pysindy.IdentityLibrary(),
     )
     with warnings.catch_warnings():
-        # An ill-conditioned library is the baseline's own trouble and shows in its held-out error.
+        # An ill-conditioned library is the reference method's own trouble and shows in its held-out error.
         warnings.simplefilter("ignore")
         model.fit(X / size, t=1.0, x_dot=tau, feature_names=names)
     return np.asarray(model.coefficients()) / size

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet, Factors
 from armloop.features.wave_moments import WaveProducts
-from armloop.identification.reconstruction.attenuation import unattenuated
+from armloop.identification.reconstruction.attenuation import without_attenuation
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.distinct import repeated, twins
 from armloop.identification.reconstruction.options import Options, StepReport
@@ -27,10 +27,8 @@ from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ExcitationError, InputError
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
 STRIBECK_GRID = tuple(float(v) for v in np.round(np.geomspace(0.01, 1.0, 60), 4))
@@ -220,7 +218,7 @@ def regress_step(
     if not options.sparse.how.shrinks:
         final = _corrected(final, joints, partial(_gradients, data, choice, columns))
     if options.snr is not None:
-        final = unattenuated(data, choice, columns, final, options.snr)
+        final = without_attenuation(data, choice, columns, final, options.snr)
     terms, friction = _collect(final, candidates.step, columns, plan)
     reports = []
     for part, found in zip(plan.parts, terms, strict=True):

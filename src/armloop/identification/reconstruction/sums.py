@@ -1,4 +1,4 @@
-"""What a step's regression needs of the samples: sums over them, joint by joint, chunk by chunk.
+"""Sufficient statistics of a step's regression: sums over the samples, joint by joint, chunk by chunk.
 
 A sample counts for the joints that move in it. Samples are therefore summed apart by which joints move, and by
 whether they choose orders; the normal equations of a joint are the sums of its cells, and joints with the same cells
@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import LowPass
@@ -22,10 +21,8 @@ from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments
+from armloop.util.arrays import Array, Index, Mask
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Index = NDArray[np.intp]
 #: Friction columns, dozens per joint, that exist at a time on all samples of a chunk.
 _AT_ONCE = 16
 #: Which joints move (a bit each), and whether the samples choose orders.

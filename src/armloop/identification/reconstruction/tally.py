@@ -1,4 +1,4 @@
-"""How well a model predicts held-out samples, summed chunk by chunk."""
+"""Held-out prediction error of a model, summed chunk by chunk."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.scoring import Score, residual
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
 Part = Literal["all", "selection", "test"]

@@ -24,9 +24,8 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.bandwidth import Table, even_selection, root_mean_square, table_at
 from armloop.identification.reconstruction.rigid_body import mass_columns
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
-
-Array = NDArray[np.float64]
 
 #: Share of friction's power that must be of one sign, and the least part of the torque that friction must be, to count.
 _DRIVES, _FRICTION = 0.5, 0.02

@@ -22,9 +22,7 @@ from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Pooled
 from armloop.identification.reconstruction.shared import PLAIN_FRICTION, fast_rows, sliding_rows
 from armloop.laws.friction import FrictionTerm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array
 
 #: Consecutive samples that tell laws of the catalogue apart as well as more do.
 _WINDOW = 150_000

@@ -1,18 +1,15 @@
-"""What candidate fits leave on samples that did not fit them, and the correction of a fit on the samples themselves."""
+"""Held-out residuals of candidate fits, and the correction of a fit on the samples themselves."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_sums
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.sums import Choice, Columns
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""How far the coefficients of a reconstructed model can be trusted."""
+"""Uncertainty of a reconstructed model's coefficients: standard errors and covariances."""
 
 from armloop.identification.uncertainty.standard_errors import Errors, Fitted, covariances, standard_errors
 

@@ -1,4 +1,4 @@
-"""How long residuals stay correlated, and blocks of samples so long that they count as independent."""
+"""Correlation time of residuals, and blocks of samples so long that they count as independent."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: Blocks are so many correlation times long, and where data are short at least so many: what spills over their
 #: ends takes one part in twenty (in four) from the variance of an exponentially correlated residual.

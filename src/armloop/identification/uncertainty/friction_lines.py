@@ -17,8 +17,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Speeds at which a law is compared with its line, and the quantiles of the fitted speeds that they lie between.
 _SPEEDS, _BETWEEN = 100, (0.1, 0.95)

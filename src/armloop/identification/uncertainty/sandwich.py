@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
 _RIDGE = 1e-10

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.features.rigid_body import BaseParameters
@@ -22,8 +21,7 @@ from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.robot.kinematics import nominal_parameters
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Part of the misfit that another iteration must remove to be worth one more.
 _WORTHWHILE = 1e-3

@@ -28,8 +28,7 @@ from armloop.identification.uncertainty.sandwich import Equations
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, told_apart
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0

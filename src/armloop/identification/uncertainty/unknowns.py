@@ -21,8 +21,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Name of the unknown v_s beside the friction terms of a joint.
 STRIBECK_VELOCITY = "v_s"

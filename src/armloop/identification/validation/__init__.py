@@ -1,4 +1,4 @@
-"""How well reconstruction does on data it was not given: logs or blocks left out in turn."""
+"""Cross-validation of reconstruction: logs or blocks left out in turn, and what physical constraints cost."""
 
 from armloop.identification.validation.crossvalidate import CrossValidation, LeftOut, crossvalidate
 from armloop.identification.validation.physics import MassMatrixCheck, PhysicalComparison, compare_physical

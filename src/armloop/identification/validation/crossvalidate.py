@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog, require_different
 from armloop.data.motion import Samples
-from armloop.data.signals import Conditioning, condition
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.scoring import Score, residual, score_errors
 from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows
@@ -167,7 +167,7 @@ _Judged = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
 def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:
     found = []
     for k, blocks in split.left_out.items():
-        samples = condition([logs[k]], model.conditioning)
+        samples = preprocess([logs[k]], model.conditioning)
         rows = judging_rows(_time(logs[k], samples), samples, blocks)
         found.append((k, (residual(model, samples)[rows], samples.tau[rows], samples.moving[rows])))
     return found

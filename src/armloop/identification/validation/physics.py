@@ -1,4 +1,4 @@
-"""What it costs and gains to demand that a model be physical: held-out error, constraints, and the mass matrix."""
+"""Cost and gain of physical-consistency constraints: held-out error, constraints, and the mass matrix."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import condition
+from armloop.data.signals import preprocess
 from armloop.dynamics.physics import mass_matrix
 from armloop.identification.reconstruction import Options
 from armloop.identification.validation.crossvalidate import CrossValidation, crossvalidate
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 #: Postures drawn within the range of the training data, and as many beyond it.
 POSTURES = 500
@@ -94,7 +92,7 @@ def compare_physical(
             for _, fit in run.results
         ]
         constraints[degree] = float(np.mean(counts))
-    q = condition(logs, runs["physical"].results[0][1].model.conditioning).motion.q
+    q = preprocess(logs, runs["physical"].results[0][1].model.conditioning).motion.q
     near, far = _postures(arm, q, seed)
     within, beyond = (
         {key: _worst([result.model for _, result in run.results], at) for key, run in runs.items()}

@@ -14,15 +14,14 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.laws.friction import Acting, Direction
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import regressor
 from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Value = float | list[float]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
 

@@ -1,4 +1,4 @@
-"""A position reading of one joint that is shifted by a constant."""
+"""Encoder offset: a position reading of one joint that is shifted by a constant."""
 
 from __future__ import annotations
 

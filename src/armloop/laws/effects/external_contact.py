@@ -1,4 +1,4 @@
-"""A push on the arm during an interval: somebody leans on the arm, or it touches something."""
+"""Contact force on the arm during an interval: somebody leans on it, or it touches something."""
 
 from __future__ import annotations
 

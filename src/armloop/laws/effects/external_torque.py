@@ -1,4 +1,4 @@
-"""A torque on one joint during an interval: somebody turns it, a cable pulls, a drive is disturbed."""
+"""External torque on one joint during an interval: somebody turns it, a cable pulls, a drive is disturbed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects of a user's own, beside the listed ones: installed as entry points, or registered in a session.
+"""User-defined effects, beside the listed ones: installed as entry points, or registered in a session.
 
 A package installs effects under the entry points ``armloop.effects``, each by its name (see ``docs/own_effect.md``):
 
