@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.arm import Arm, Joint
-from armloop.components import RigidBody
 from armloop.export.c_code import c_source
+from armloop.export.expressible import said
 from armloop.export.reading_c import FLAGS, compiler
 from armloop.export.robot_xml import urdf_text
-from armloop.export.said import said
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm, Joint
+from armloop.robot.kinematics import nominal_parameters
 
 LOOP = """
 #include <time.h>

@@ -39,23 +39,23 @@ from pydrake.systems.primitives import (
 from pydrake.trajectories import PiecewisePolynomial
 from threadpoolctl import threadpool_limits
 
-from armloop.components import SparseTerms
-from armloop.drake_systems import (
+from armloop.data.motion import Motion
+from armloop.drake import (
     AccelerationGains,
     Feedforward,
     PidGains,
     ReferenceSource,
     add_arm_with_controller,
 )
-from armloop.drake_systems.plant import add_links
-from armloop.drake_systems.scenarios import load_plant
-from armloop.excitation import paper_reference
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.angle_sums import AngleSums
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.drake.experiments.scenarios import load_plant
+from armloop.drake.plant.plant import add_links
+from armloop.experiment.excitation import paper_reference
+from armloop.features.angle_sums import AngleSums
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
+from armloop.model.components import SparseTerms
 from armloop.reports.tables import table
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 SPEC, REFERENCE, N, PERIOD = load_plant("three_axis"), paper_reference(), 3, 1e-3
 STICKING_GAIN = 1e5  # N*m*s/rad of the native friction actuator

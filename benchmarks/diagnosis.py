@@ -26,20 +26,20 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from armloop.arm import Arm, load_arm
-from armloop.blocks import block_numbers
-from armloop.components import RigidBody
+from armloop.data.blocks import block_numbers
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import Diagnosis, diagnose
-from armloop.effects import hypotheses
-from armloop.functions import NUMPY
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog
+from armloop.identification.scoring import score
+from armloop.laws.effects import hypotheses
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.newton_euler import inverse_dynamics
+from armloop.model.components import RigidBody
 from armloop.reports.tables import table
-from armloop.scoring import score
-from armloop.signals import condition, smooth
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.functions import NUMPY
 
 Array = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ def problem(n: int, seconds: float, rate: float) -> tuple[ReconstructedModel, di
     size = np.sqrt(np.mean(torque(arm, links, *motion(n, 20.0, 50.0, 1)[1:]) ** 2, axis=0))
     law = friction(np.maximum(size, 0.2 * size.max()))
     bare = ReconstructedModel(arm, (RigidBody(links, (), np.zeros(0)),), law)
-    clean = condition([run(arm, law, links, 0.0, seconds, rate, 2)], bare.conditioning)
+    clean = preprocess([run(arm, law, links, 0.0, seconds, rate, 2)], bare.conditioning)
     model = replace(bare, baseline=score(bare, clean).moving)
     loaded = np.array(links)
     mass, centre = 0.15 * links[::10].sum(), np.array([0.05, 0.02, 0.0])
@@ -177,7 +177,7 @@ def split(model: ReconstructedModel, log: MotionLog) -> list[tuple[str, float]]:
 def rival(model: ReconstructedModel, log: MotionLog) -> tuple[float, int]:
     """Seconds of one pass of refits by `numpy.linalg.lstsq`, and how many there were."""
     start = time.perf_counter()
-    samples = condition([log], model.conditioning)
+    samples = preprocess([log], model.conditioning)
     listed = hypotheses(model.arm)
     context = model.context(samples.motion, listed)
     left = samples.tau - smooth(samples, model.predict(samples.motion))

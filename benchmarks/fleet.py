@@ -30,7 +30,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from operation import healthy_model  # noqa: E402
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis  # noqa: E402
 
-from armloop.log import read_log, write_log  # noqa: E402
+from armloop.data.log import read_log, write_log  # noqa: E402
 
 MOTIONS, WORN, FROM = 25, 5, 30
 #: Runs the command and prints the peak memory of the process and of its workers, MB, and their processor time, s.

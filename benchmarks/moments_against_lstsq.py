@@ -24,12 +24,12 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.library.angle_sums import AngleSums
-from armloop.library.double_feature_set import DoubleFeatureSet
-from armloop.library.wave_moments import WaveProducts
-from armloop.motion import Motion
-from armloop.regression.refined import refined
+from armloop.data.motion import Motion
+from armloop.features.angle_sums import AngleSums
+from armloop.features.double_feature_set import DoubleFeatureSet
+from armloop.features.wave_moments import WaveProducts
 from armloop.reports.tables import table
+from armloop_paper.refined import refined
 
 Array = np.ndarray
 CONDITIONS = ("static", "constant_velocity", "varying")
@@ -111,8 +111,8 @@ def child(contender: str, task: str, data: Path, quick: bool) -> dict:
 
 def write_data(path: Path) -> None:
     """Samples to fit (seed 1) and held-out ones (seed 2), written for the contenders."""
-    from armloop.drake_systems.scenarios import load_plant
-    from armloop.sampling import inverse_dynamics_samples
+    from armloop.drake.experiments.scenarios import load_plant
+    from armloop.experiment.sampling import inverse_dynamics_samples
 
     plant = load_plant("three_axis")
     arrays = {}

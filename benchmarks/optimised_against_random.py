@@ -11,17 +11,17 @@ import time
 
 import numpy as np
 
-from armloop.components import RigidBody
-from armloop.design import Excitation, Settings, amount_needed, excite, random_references
-from armloop.drake_systems.collection import measure_run
-from armloop.drake_systems.scenarios import Plant, load_plant
-from armloop.excitation import Reference
-from armloop.kinematics import nominal_parameters
-from armloop.library.rigid_body import BaseParameters
-from armloop.log import MotionLog
-from armloop.reconstruction import reconstruct
+from armloop.data.log import MotionLog
+from armloop.drake.experiments.collection import measure_run
+from armloop.drake.experiments.scenarios import Plant, load_plant
+from armloop.experiment.design import Excitation, Settings, amount_needed, excite, random_references
+from armloop.experiment.excitation import Reference
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction import reconstruct
+from armloop.model.components import RigidBody
 from armloop.reports.tables import table
 from armloop.reports.words import number
+from armloop.robot.kinematics import nominal_parameters
 
 ARMS = ("three_axis", "scara")
 CRITERIA = ("variance", "logdet", "condition")

@@ -11,12 +11,12 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from armloop.drake_systems.scenarios import load_plant
-from armloop.library.double_feature_set import DoubleFeatureSet
-from armloop.log import MotionLog
-from armloop.motion import Motion
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.drake.experiments.scenarios import load_plant
+from armloop.experiment.sampling import inverse_dynamics_samples
+from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.reports.tables import table
-from armloop.sampling import inverse_dynamics_samples
 
 STEPS = (("static", 1, 0, "none"), ("constant_velocity", 1, 2, "velocity"), ("varying", 1, 1, "acceleration"))
 REPEATS = 5

@@ -22,16 +22,16 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.arm import Arm, load_arm
-from armloop.functions import NUMPY
-from armloop.kinematics import nominal_parameters
-from armloop.log import MotionLog
-from armloop.newton_euler import inverse_dynamics
-from armloop.pieces import PIECE
-from armloop.reconstruction import LIBRARIES, reconstruct
+from armloop.data.log import MotionLog
+from armloop.data.pieces import PIECE
+from armloop.data.signals import Conditioning
+from armloop.identification.reconstruction import LIBRARIES, reconstruct
 from armloop.reports.tables import table
-from armloop.signals import Conditioning
-from armloop.workers import Processes
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.functions import NUMPY
+from armloop.util.workers import Processes
 
 LOWER, UPPER = np.array([-1.5, -1.0, -3.1]), np.array([1.5, 1.0, 3.1])
 COULOMB, VISCOUS = np.array([0.557, 0.757, 0.585]), np.array([2.65, 1.82, 3.14])

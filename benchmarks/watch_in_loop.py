@@ -14,13 +14,13 @@ from __future__ import annotations
 import numpy as np
 
 from armloop.diagnosis import diagnose
-from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.pickup import run_pickup
-from armloop.drake_systems.scenarios import load_tracking
-from armloop.drake_systems.tracking import TrackingResult
-from armloop.drake_systems.watched_run import run_watched
-from armloop.loop.tracking import models_for
-from armloop.progress import silent
+from armloop.drake.experiments.pickup import run_pickup
+from armloop.drake.experiments.scenarios import load_tracking
+from armloop.drake.experiments.tracking import TrackingResult
+from armloop.drake.experiments.watched_run import run_watched
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.util.progress import silent
+from armloop.workflows.tracking import models_for
 
 
 def eta(result: TrackingResult | None) -> str:

@@ -38,18 +38,18 @@ from watch_promise import (  # noqa: E402  # noqa: E402
     false_alarms_header,
 )
 
-from armloop.arm import load_arm  # noqa: E402
-from armloop.errors import InputError  # noqa: E402
-from armloop.kinematics import regressor  # noqa: E402
-from armloop.log import MotionLog, read_log  # noqa: E402
+from armloop.data.log import MotionLog, read_log  # noqa: E402
+from armloop.data.motion import Motion  # noqa: E402
+from armloop.data.signals import preprocess  # noqa: E402
+from armloop.identification.reconstruction import reconstruct  # noqa: E402
 from armloop.model import ReconstructedModel  # noqa: E402
 from armloop.monitoring.alarms import find_alarms  # noqa: E402
 from armloop.monitoring.naming import Normal  # noqa: E402
 from armloop.monitoring.sums import log_sums  # noqa: E402
 from armloop.monitoring.units import Units, scores, streams  # noqa: E402
-from armloop.motion import Motion  # noqa: E402
-from armloop.reconstruction import reconstruct  # noqa: E402
-from armloop.signals import condition  # noqa: E402
+from armloop.robot.arm import load_arm  # noqa: E402
+from armloop.robot.kinematics import regressor  # noqa: E402
+from armloop.util.errors import InputError  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def read(folder: Path, patterns: tuple[str, ...], gains: tuple[float, ...] | Non
 
 def with_torque(model: ReconstructedModel, log: MotionLog, law: Law, level: float) -> MotionLog:
     """A log as it would be with a further torque along the same motion."""
-    motion = condition([log], model.conditioning).motion
+    motion = preprocess([log], model.conditioning).motion
     more = level * law(model, motion)
     return replace(
         log, tau=log.tau + np.column_stack([np.interp(log.time, motion.time, column) for column in more.T])

@@ -15,7 +15,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import armloop
-from armloop.resources import scenario_names, scenario_path, urdf_names, urdf_path
+import armloop_paper
+from armloop.util.resources import scenario_names, scenario_path, urdf_names, urdf_path
 
 DOCS = Path(__file__).resolve().parent
 GALLERY, REPORTS, TUTORIALS = DOCS / "gallery.md", DOCS / "reports", DOCS / "tutorials"
@@ -83,7 +84,8 @@ def _key() -> str:
 def _sources() -> Iterator[Path]:
     yield GALLERY
     yield from sorted(TUTORIALS.glob("*.py"))
-    yield from sorted(Path(armloop.__file__).parent.rglob("*.py"))
+    for package in (armloop, armloop_paper):
+        yield from sorted(Path(package.__file__).parent.rglob("*.py"))
     yield from (*map(urdf_path, urdf_names()), *map(scenario_path, scenario_names()))
 
 

@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
-from armloop.drake_systems.scenario_schema import FILES
 from armloop.schemas.checking import checked
+from armloop.schemas.published import FILES
 
 
 def answered(text: str, name: str) -> dict[str, Any]:

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from synthetic import three_axis
 
-from armloop.arm import Arm
-from armloop.effects import Context, Effect, Estimate
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.motion import Motion
+from armloop.data.motion import Motion
+from armloop.laws.effects import Context, Effect, Estimate
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 PAYLOAD = {"mass": 0.6, "com": [0.04, -0.02, 0.05], "own_inertia": 2e-3}
 TILT = {"roll": 0.05, "pitch": -0.03}

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 
-from armloop.arm import Arm
-from armloop.drake_systems.effects import UndeclaredEffect, realise
-from armloop.drake_systems.friction import JointFriction
-from armloop.drake_systems.plant import add_links
-from armloop.library.friction import KINDS
+from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
+from armloop.drake.plant.friction import JointFriction
+from armloop.drake.plant.plant import add_links
+from armloop.laws.friction import KINDS
+from armloop.robot.arm import Arm
 
 Array = NDArray[np.float64]
 

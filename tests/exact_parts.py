@@ -8,20 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, three_axis
 
-from armloop.arm import Arm, load_arm
-from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
-from armloop.effects import Estimate, effect
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.export.consistent import pseudo_inertias
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.double_feature_set import DoubleFeatureSet
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.library.lagrangian import candidates
-from armloop.library.rigid_body import BaseParameters
-from armloop.log import MotionLog
+from armloop.features.double_feature_set import DoubleFeatureSet
+from armloop.features.lagrangian import candidates
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.scoring import score
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import Component, Lagrangian, RigidBody, SparseTerms
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 Array = NDArray[np.float64]
 STRIBECK = (
@@ -133,7 +133,7 @@ def as_it_was(log: MotionLog | None = None) -> ReconstructedModel:
     bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(joints))
     if log is None:
         return bare
-    return replace(bare, baseline=score(bare, condition([log], bare.conditioning)).moving)
+    return replace(bare, baseline=score(bare, preprocess([log], bare.conditioning)).moving)
 
 
 def six_joints() -> Arm:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from synthetic import fourier_motion, friction, rigid_torque, three_axis
 
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
 
 NAMES = [joint.name for joint in three_axis().joints]
 

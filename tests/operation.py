@@ -18,9 +18,9 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
 from armloop.model import ReconstructedModel
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 Array = NDArray[np.float64]
 

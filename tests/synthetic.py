@@ -1,7 +1,7 @@
 """A three-axis arm with friction as plain arrays, for tests that need measured-looking data fast.
 
-Torques come from the regressor and from laws written out here; nothing is taken from the rooms under test
-(library, effects, drake_systems), and no simulator runs.
+Torques come from the regressor and from laws written out here; nothing is taken from the packages under test
+(features, laws, drake), and no simulator runs.
 """
 
 from functools import cache
@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm, load_arm
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.log import MotionLog
-from armloop.motion import Motion, Samples
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion, Samples
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 Array = NDArray[np.float64]
 

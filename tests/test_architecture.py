@@ -1,9 +1,10 @@
-"""The way through the package runs one direction: each room imports only from rooms before it.
+"""The floors of the tree: each package imports only from packages of earlier floors.
 
-A new room has to be put into `LAYERS`; if it is not clear where, the plan is wrong.
+A new package has to be put into `LAYERS`; if it is not clear where, the plan is wrong.
 """
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,49 +12,53 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "src" / "armloop"
+from armloop.moved import present_name
 
-# A room may import itself and every room of an earlier layer.
+SOURCE = Path(__file__).resolve().parents[1] / "src"
+
+# A package may import itself and every package of an earlier floor.
 LAYERS = (
+    {"moved"},
     {"__init__"},
-    {"errors", "quiet"},
-    {"functions", "motion", "outputs", "progress", "registry", "resources", "voices", "workers"},
-    {"files", "reading"},
-    {"keeping", "schemas"},
-    {"blocks", "plausibility", "regression", "tables", "urdf"},
-    {"arm", "log"},
-    {"convert", "kinematics", "newton_euler", "pieces", "signals"},
-    {"conditions", "excitation", "library"},
-    {"components", "effects", "sampling"},
-    {"wave_table"},
-    {"pointwise"},
-    {"model"},
-    {"dynamics", "goodness", "monitoring", "scoring", "uncertainty"},
-    {"design", "drake_systems", "reconstruction"},
-    {"export", "validation"},
-    {"diagnosis"},
+    {"util"},
+    {"data", "regression", "schemas"},
+    {"robot"},
+    {"convert", "features", "laws"},
+    {"experiment", "model"},
+    {"dynamics", "monitoring"},
+    {"drake", "identification"},
+    {"diagnosis", "export"},
     {"watch"},
     {"reports"},
-    {"loop", "reproduction"},
-    {"api"},
+    {"workflows"},
+    {"api", "armloop_paper"},
     {"commands"},
     {"cli"},
     {"__main__"},
 )
 RANK = {room: rank for rank, rooms in enumerate(LAYERS) for room in rooms}
 
+# The floors inside a package; files beside its folders come before all of them if they are not named.
+INSIDE = {
+    "drake": ("plant", "control", "view", "experiments", "tuning"),
+    "laws": ("effects",),
+    "experiment": ("excitation", "design", "sampling"),
+}
+
 # What the order of the layers would allow and the plan does not.
 FORBIDDEN = {
-    "regression": {"motion", "files", "resources"},  # pure numerics: arrays in, arrays out
-    "diagnosis": {"drake_systems"},  # it sees arrays, never a simulator
+    "diagnosis": {"drake"},  # it sees arrays, never a simulator
+    "identification": {"drake"},
 }
+# All that pure numerics (arrays in, arrays out) may know.
+ONLY = {"regression": {"armloop.util.arrays", "armloop.util.errors", "armloop.util.registry"}}
 
 
 def modules() -> dict[str, Path]:
-    """Return every module of the package by its dotted name."""
+    """Return every module of armloop and armloop_paper by its dotted name."""
     found = {}
-    for path in sorted(PACKAGE.rglob("*.py")):
-        parts = ["armloop", *path.relative_to(PACKAGE).with_suffix("").parts]
+    for path in sorted(SOURCE.rglob("*.py")):
+        parts = path.relative_to(SOURCE).with_suffix("").parts
         found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
     return found
 
@@ -62,8 +67,16 @@ MODULES = modules()
 
 
 def room(module: str) -> str:
-    """Return the room that a module of the package belongs to."""
+    """Return the package that a module belongs to: `armloop`'s own, or all of the paper's."""
+    if is_within(module, "armloop_paper"):
+        return "armloop_paper"
     return module.split(".")[1] if "." in module else "__init__"
+
+
+def floor(module: str, package: str) -> int:
+    """Return the floor inside a package that a module belongs to; 0 for files beside the package's folders."""
+    parts = module.split(".")
+    return INSIDE[package].index(parts[2]) + 1 if len(parts) > 2 and parts[2] in INSIDE[package] else 0
 
 
 def imports(module: str) -> Iterator[str]:
@@ -96,13 +109,65 @@ def is_within(module: str, package: str) -> bool:
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_imports_only_from_earlier_rooms(module: str) -> None:
+def test_imports_only_from_earlier_floors(module: str) -> None:
     here = room(module)
-    assert here in RANK, f"{here}: a new room; put it into LAYERS"
+    assert here in RANK, f"{here}: a new package; put it into LAYERS"
     for other in sorted({room(name) for name in own_imports(module)} - {here}):
-        assert other in RANK, f"{other}: a new room; put it into LAYERS"
+        assert other in RANK, f"{other}: a new package; put it into LAYERS"
         assert RANK[other] < RANK[here], f"{module} imports {other}, which does not come before {here}"
         assert other not in FORBIDDEN.get(here, set()), f"{module} must not import {other}"
+    for name in own_imports(module):
+        assert is_within(name, f"armloop.{here}") or name in ONLY.get(here, {name}), (
+            f"{module} must not import {name}"
+        )
+
+
+@pytest.mark.parametrize("package", INSIDE)
+def test_floors_inside_a_package_run_one_direction(package: str) -> None:
+    folder = SOURCE / "armloop" / package
+    assert {path.parent.name for path in folder.glob("*/__init__.py")} <= set(INSIDE[package])
+    for module in MODULES:
+        if is_within(module, f"armloop.{package}") and module != f"armloop.{package}":
+            for name in own_imports(module):
+                if is_within(name, f"armloop.{package}"):
+                    assert floor(name, package) <= floor(module, package), f"{module} imports {name}"
+
+
+def test_the_paper_is_known_to_its_command_alone() -> None:
+    for module in MODULES:
+        if is_within(module, "armloop") and module != "armloop.commands.reproduce":
+            for name in imports(module):
+                assert not is_within(name, "armloop_paper"), f"{module} imports {name}"
+
+
+FORMER = re.compile(r"(?<![\w.])armloop(?:\.\w+)+")
+#: What tells or tests the former names.
+TELLING = {"tests/test_moved.py", "src/armloop/moved.py", "docs/moved.md"}
+
+
+def test_nothing_here_uses_a_former_name() -> None:
+    root = SOURCE.parent
+    for path in [
+        *SOURCE.rglob("*.py"),
+        *(p for kind in ("tests", "benchmarks", "scenarios") for p in (root / kind).rglob("*.py")),
+    ]:
+        if str(path.relative_to(root)) not in TELLING:
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    names = [node.module, *(f"{node.module}.{a.name}" for a in node.names)]
+                for name in names:
+                    assert present_name(name) is None, f"{path}: {name} is now {present_name(name)}"
+    for page in [
+        root / "README.md",
+        root / "CONTRIBUTING.md",
+        *(root / "docs").rglob("*.md"),
+        *(root / "docs").rglob("*.py"),
+    ]:
+        if str(page.relative_to(root)) not in TELLING:
+            for line in page.read_text(encoding="utf-8").splitlines():
+                for name in [] if "entry-points" in line else FORMER.findall(line):
+                    assert present_name(name) is None, f"{page}: {name} is now {present_name(name)}"
 
 
 def test_no_modules_import_each_other() -> None:
@@ -121,9 +186,9 @@ def test_no_modules_import_each_other() -> None:
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_only_drake_systems_import_drake(module: str) -> None:
-    allowed = ["pydrake"] if room(module) == "drake_systems" else []
-    if module == "armloop.arm":  # reads URDFs with Drake's parser, builds no diagram
+def test_only_drake_imports_pydrake(module: str) -> None:
+    allowed = ["pydrake"] if room(module) == "drake" else []
+    if module == "armloop.robot.arm":  # reads URDFs with Drake's parser, builds no diagram
         allowed = ["pydrake.multibody", "pydrake.math", "pydrake.common"]
     if room(module) == "export":  # the consumers' parsers and a program's solvers, no diagram
         allowed = ["pydrake.multibody", "pydrake.solvers"]

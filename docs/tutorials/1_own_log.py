@@ -37,8 +37,8 @@ model
 import numpy as np
 from pydrake.all import DiagramBuilder, LogVectorOutput, Simulator
 
-from armloop.drake_systems import PidGains, add_arm_with_controller
-from armloop.excitation import paper_reference
+from armloop.drake import PidGains, add_arm_with_controller
+from armloop.experiment.excitation import paper_reference
 
 
 def tracking_error(model=None, seconds=10.0):

@@ -14,9 +14,9 @@ model = al.load_model("out/model.json")  # of the first tutorial
 # plant. The diagnosis is handed the log and the model, and nothing of this cell.
 
 # %%
-from armloop.drake_systems.collection import measure_run
-from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.scenarios import load_plant
+from armloop.drake.experiments.collection import measure_run
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.experiments.scenarios import load_plant
 
 plant = load_plant("three_axis")
 load = UndeclaredEffect("payload", None, {"mass": 0.4, "com": [0.0, 0.0, 0.0]})
@@ -49,8 +49,8 @@ for effect in found.effects:
 import numpy as np
 from pydrake.all import DiagramBuilder, LogVectorOutput, Simulator
 
-from armloop.drake_systems import PidGains, add_arm_with_controller
-from armloop.excitation import paper_reference
+from armloop.drake import PidGains, add_arm_with_controller
+from armloop.experiment.excitation import paper_reference
 
 
 def tracking_error(model, seconds=10.0):

@@ -6,7 +6,7 @@
 
 # %%
 import armloop as al
-from armloop.resources import measured_folder
+from armloop.util.resources import measured_folder
 
 data = measured_folder("ur5")
 arm = al.load_arm(data / "ur5.urdf")

@@ -11,10 +11,10 @@ from armloop.api.score import Score as Score
 from armloop.api.score import evaluate as evaluate
 from armloop.api.tracking import Tracking as Tracking
 from armloop.api.tracking import track as track
-from armloop.arm import load_arm as load_arm
-from armloop.errors import InputError as InputError
-from armloop.log import MotionLog as MotionLog
-from armloop.log import write_log as write_log
+from armloop.data.log import MotionLog as MotionLog
+from armloop.data.log import write_log as write_log
+from armloop.robot.arm import load_arm as load_arm
+from armloop.util.errors import InputError as InputError
 
 __version__: str
 __all__: list[str]

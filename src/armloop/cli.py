@@ -17,9 +17,9 @@ from importlib import import_module
 from typing import Any
 
 from armloop import __version__
-from armloop.errors import InputError
-from armloop.outputs import guarding
-from armloop.voices import listening
+from armloop.util.doubts import listening
+from armloop.util.errors import InputError
+from armloop.util.outputs import guarding
 
 #: In the order of the help. A command `name` is the module armloop.commands.name.
 COMMANDS = (

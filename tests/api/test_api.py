@@ -11,8 +11,8 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 import armloop as al
-from armloop.errors import InputError, LogError
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
+from armloop.util.errors import InputError, LogError
 
 PUBLIC = (
     "MotionLog", "diagnose", "evaluate", "excite", "load_arm", "load_model", "read_log", "read_logs", "reconstruct", "track",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict
 from math import cos
 from pathlib import Path
@@ -11,17 +12,18 @@ from typing import Any
 from arms import random_arm
 from hidden import Run, draw
 
-from armloop.arm import load_arm
-from armloop.drake_systems.collection import CollectionPlan, PlantConfig, collect, measure_run
-from armloop.drake_systems.friction import JointFriction
-from armloop.excitation import MotionRanges, fourier_reference
-from armloop.log import write_log
+from armloop.data.log import write_log
+from armloop.drake.experiments.collection import CollectionPlan, collect, measure_run
+from armloop.drake.plant.config import PlantConfig
+from armloop.drake.plant.friction import JointFriction
+from armloop.experiment.excitation import MotionRanges, fourier_reference
+from armloop.robot.arm import load_arm
 
 DURATION = 50.0
 
 
-def generate(seed: int, cases: int, plan: CollectionPlan, logs: Path, answers: Path) -> None:
-    """Write ``logs/arm_SEED/{arm.urdf,baseline_*.csv,run_*.csv}`` and ``answers/arm_SEED_run_*.json``."""
+def generate(seed: int, cases: Iterable[int], plan: CollectionPlan, logs: Path, answers: Path) -> None:
+    """Write ``logs/arm_SEED/{arm.urdf,baseline_*.csv,run_*.csv}`` and ``answers/arm_SEED_run_*.json`` of these runs."""
     drawn = random_arm(seed)
     folder = logs / f"arm_{seed}"
     folder.mkdir(parents=True)
@@ -33,7 +35,7 @@ def generate(seed: int, cases: int, plan: CollectionPlan, logs: Path, answers: P
     config = PlantConfig(tuple(friction), ranges)
     for name, log in collect(arm, config, plan, seed).items():
         write_log(folder / f"baseline_{name}.csv", log)
-    for case in range(cases):
+    for case in cases:
         number = 1000 * seed + case
         reference = fourier_reference(ranges, DURATION, number, harmonics=5)
         hidden = draw(Run.of(arm, friction, reference), number)

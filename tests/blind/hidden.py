@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from armloop.arm import Arm
-from armloop.drake_systems.effects import EFFECTS as REALISED
-from armloop.drake_systems.effects import UndeclaredEffect
-from armloop.drake_systems.friction import JointFriction
-from armloop.effects import EFFECTS, Context, effect
-from armloop.excitation import Reference
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.motion import Motion
+from armloop.data.motion import Motion
+from armloop.drake.plant.fault_injection import EFFECTS as REALISED
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.friction import JointFriction
+from armloop.experiment.excitation import Reference
+from armloop.laws.effects import EFFECTS, Context, effect
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 KINDS = ("one", "one", "one", "one", "two", "clean", "unlisted")
 

@@ -20,15 +20,15 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from armloop.data.log import read_log, write_log
 from armloop.diagnosis import diagnose
-from armloop.drake_systems.collection import collect, measure_run
-from armloop.drake_systems.scenarios import load_plan, load_plant
-from armloop.keeping import Kept
-from armloop.log import read_log, write_log
-from armloop.loop.undeclared import draw
+from armloop.drake.experiments.collection import collect, measure_run
+from armloop.drake.experiments.scenarios import load_plan, load_plant
+from armloop.identification.reconstruction import reconstruct
 from armloop.model import load_model
-from armloop.reconstruction import reconstruct
 from armloop.reports.tables import table
+from armloop.util.checkpoints import Kept
+from armloop.workflows.undeclared import draw
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, JacobianWrtVariable
 from scipy.signal import butter, sosfiltfilt
 
-from armloop.log import MotionLog, read_log, write_log
+from armloop.data.log import MotionLog, read_log, write_log
 
 Array = np.ndarray
 Effect = dict[str, Any]

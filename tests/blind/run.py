@@ -30,9 +30,9 @@ from judge import print_verdicts
 from measured_generate import SOURCES, generate_measured
 from threadpoolctl import threadpool_limits
 
-from armloop.drake_systems.scenarios import load_plan
-from armloop.errors import InputError
-from armloop.keeping import Kept
+from armloop.drake.experiments.scenarios import load_plan
+from armloop.util.checkpoints import Kept
+from armloop.util.errors import InputError
 
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
@@ -50,7 +50,7 @@ def make(seed: int, cases: int, place: Path, outside: bool = False, measured: Pa
 
             generate_outside(seed, cases, place / "logs", place / "answers")
             return ""
-        generate(seed, cases, load_plan("paper"), place / "logs", place / "answers")
+        generate(seed, range(cases), load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
         return str(error)
     return ""

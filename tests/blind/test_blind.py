@@ -20,24 +20,25 @@ from generate import generate  # noqa: E402
 from judge import LARGE, Case, is_right  # noqa: E402
 from run import judge  # noqa: E402
 
-from armloop.drake_systems.scenarios import load_plan  # noqa: E402
+from armloop.drake.experiments.scenarios import load_plan  # noqa: E402
 
 
 @pytest.fixture(
     scope="module",
     params=[
-        pytest.param(((1,), 3), marks=pytest.mark.slow),
-        pytest.param(((1, 2), 6), marks=pytest.mark.long),
+        # the first run of the first arm in which nothing is hidden, and the first in which something large is
+        pytest.param(((1,), (1, 3), "quick"), marks=pytest.mark.slow),
+        pytest.param(((1, 2), range(6), "paper"), marks=pytest.mark.long),
     ],
-    ids="arms and runs {0[0]} {0[1]}".format,
+    ids="arms, runs and plan {0[0]} {0[1]} {0[2]}".format,
 )
 def cases(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Case]:
     """Verdicts on logs beside which no answer is left: those are read and removed before the first diagnosis."""
     place = tmp_path_factory.mktemp("blind")
-    arms, runs = request.param
+    arms, runs, plan = request.param
     sealed: dict[str, dict[str, Any]] = {}
     for seed in arms:
-        generate(seed, runs, load_plan("paper"), place / "logs", place / "answers")
+        generate(seed, runs, load_plan(plan), place / "logs", place / "answers")
     for path in (place / "answers").glob("*.json"):
         sealed[path.stem] = json.loads(path.read_text(encoding="utf-8"))
     shutil.rmtree(place / "answers")
@@ -87,4 +88,4 @@ def test_the_judging_process_imports_nothing_of_the_generator() -> None:
     names |= {a.name for node in ast.walk(tree) if isinstance(node, ast.Import) for a in node.names}
     own = {path.stem for path in HERE.glob("*.py")}
     assert not {str(name).split(".")[0] for name in names} & own
-    assert not any("drake_systems" in str(name) for name in names)
+    assert not any("armloop.drake" in str(name) for name in names)

@@ -12,12 +12,12 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from armloop.arm import load_arm
+from armloop.data.log import read_log
 from armloop.diagnosis import diagnose
-from armloop.errors import InputError
-from armloop.log import read_log
+from armloop.identification.reconstruction import reconstruct
 from armloop.model import load_model
-from armloop.reconstruction import reconstruct
+from armloop.robot.arm import load_arm
+from armloop.util.errors import InputError
 
 
 def verdicts(folder: Path) -> dict[str, dict[str, Any]]:

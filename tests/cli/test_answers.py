@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from armloop.cli import main
-from armloop.drake_systems.scenario_schema import FILES
 from armloop.schemas.checking import checked
+from armloop.schemas.published import FILES
 
 SHORT = (
     "plant: three_axis\nreference: {kind: fourier, duration: 5.0}\nscore: [1.0, 5.0]\ncontrollers: [pid]\n"

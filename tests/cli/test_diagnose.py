@@ -10,14 +10,14 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.cli import main
-from armloop.components import RigidBody
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog, write_log
+from armloop.data.log import MotionLog, write_log
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
 
 
 def log(seed: int, change: Callable[[Motion, np.ndarray], np.ndarray] | None = None) -> MotionLog:
@@ -43,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     law = tuple((FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0)) for _ in range(3))
     body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
     bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(law))
-    baseline = score(bare, condition([log(9)], bare.conditioning)).moving
+    baseline = score(bare, preprocess([log(9)], bare.conditioning)).moving
     replace(bare, baseline=baseline).save(folder / "model.json")
     write_log(folder / "gain.csv", log(1, gain))
     write_log(folder / "drag.csv", log(1, drag))

@@ -7,8 +7,8 @@ import pytest
 from answers import answered
 
 from armloop.cli import main
-from armloop.excitation import read_reference
-from armloop.resources import urdf_path
+from armloop.experiment.excitation import read_reference
+from armloop.util.resources import urdf_path
 
 QUICK = ["--library", "rigid-body", "--duration", "6", "--starts", "1", "--random", "4"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
-from armloop import workers
 from armloop.cli import main
-from armloop.log import write_log
+from armloop.data.log import write_log
+from armloop.util import workers
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from synthetic import three_axis
 from armloop.cli import main
 from armloop.convert import Answers, convert, read_map
 from armloop.convert.headers import suggest
-from armloop.errors import InputError
-from armloop.log import MotionLog, read_log
+from armloop.data.log import MotionLog, read_log
+from armloop.util.errors import InputError
 
 TORQUE = Answers(tau_unit="N*m")
 

@@ -3,7 +3,7 @@
 import pytest
 
 from armloop.diagnosis.alternatives import why_alike
-from armloop.effects import effect
+from armloop.laws.effects import effect
 
 
 @pytest.mark.parametrize(

@@ -14,15 +14,15 @@ from synthetic import (
     three_axis,
 )
 
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.diagnosis import close, diagnose
-from armloop.effects import Estimate, effect
-from armloop.errors import InputError
-from armloop.kinematics import regressor, tool_jacobian
-from armloop.log import MotionLog
+from armloop.identification.scoring import score
+from armloop.laws.effects import Estimate, effect
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.robot.kinematics import regressor, tool_jacobian
+from armloop.util.errors import InputError
 
 Law = Callable[[Motion], np.ndarray]
 
@@ -107,7 +107,7 @@ PUSH = ("external_contact", None, {"start": 5.0, "end": 6.0, "force": [6.0, 0.0,
 
 
 def test_the_controller_adds_the_effects_torque(model: ReconstructedModel) -> None:
-    samples = condition([run(seed=3, seconds=20.0)], model.conditioning)
+    samples = preprocess([run(seed=3, seconds=20.0)], model.conditioning)
     after = with_effects(model, ("viscous_friction", 1, {"coefficient": 0.6}), PUSH)
     change = close(model, after, samples).feedforward
     v = samples.motion.v[change.rows]
@@ -119,7 +119,7 @@ def test_the_controller_adds_the_effects_torque(model: ReconstructedModel) -> No
 
 
 def test_the_controller_adds_a_load_at_rest_too(model: ReconstructedModel) -> None:
-    samples = condition([run(seed=3, seconds=20.0)], model.conditioning)
+    samples = preprocess([run(seed=3, seconds=20.0)], model.conditioning)
     body = {"mass": 0.45, "com": [0.0, 0.0, 0.0], "own_inertia": 0.0}
     after = with_effects(model, ("payload", None, body))
     change = close(model, after, samples).feedforward
@@ -128,7 +128,7 @@ def test_the_controller_adds_a_load_at_rest_too(model: ReconstructedModel) -> No
 
 
 def test_a_fault_and_an_event_add_nothing(model: ReconstructedModel) -> None:
-    samples = condition([run(seed=3, seconds=20.0)], model.conditioning)
+    samples = preprocess([run(seed=3, seconds=20.0)], model.conditioning)
     after = with_effects(
         model,
         ("torque_gain", 1, {"gain": 1.1}),
@@ -142,7 +142,7 @@ def test_a_fault_and_an_event_add_nothing(model: ReconstructedModel) -> None:
 
 def test_whole_runs_kept_apart_are_scored_without_the_events_of_the_run(model: ReconstructedModel) -> None:
     fitted, apart = run(drag, seed=3, seconds=20.0), run(drag, seed=4, seconds=20.0)
-    samples = condition([fitted], model.conditioning)
+    samples = preprocess([fitted], model.conditioning)
     drags = ("viscous_friction", 1, {"coefficient": 0.6})
     after = with_effects(model, drags, PUSH)
     answer = close(model, after, samples, [apart]).to_dict()
@@ -150,7 +150,7 @@ def test_whole_runs_kept_apart_are_scored_without_the_events_of_the_run(model: R
     assert scored["log"] == "run4"
     before, then = (np.array(scored["rmse"][key]) for key in ("before", "after"))
     assert before[0] > 10 * then[0]
-    alone = score(with_effects(model, drags), condition([apart], model.conditioning))
+    alone = score(with_effects(model, drags), preprocess([apart], model.conditioning))
     np.testing.assert_allclose(then, alone.moving["rmse"], rtol=1e-12)
     np.testing.assert_allclose(before[1:], then[1:])
     assert "held_out_runs" not in close(model, after, samples).to_dict()
@@ -159,6 +159,6 @@ def test_whole_runs_kept_apart_are_scored_without_the_events_of_the_run(model: R
 def test_a_run_of_another_arm_is_refused(model: ReconstructedModel) -> None:
     log = run(seed=3, seconds=20.0)
     two = MotionLog(log.time, log.q[:, :2], log.v[:, :2], log.tau[:, :2], name="two")
-    samples = condition([log], model.conditioning)
+    samples = preprocess([log], model.conditioning)
     with pytest.raises(InputError, match="two: 2 joints, but the model's arm three_axis has 3"):
         close(model, model, samples, [two])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
 from armloop.diagnosis import diagnose
-from armloop.errors import InputError
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 
 def test_a_model_of_currents_is_refused_and_one_with_drive_gains_is_not():

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque
 
-from armloop.arm import load_arm
-from armloop.components import RigidBody
+from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Shape, fit
 from armloop.diagnosis.search import search
 from armloop.diagnosis.trials import Known
-from armloop.effects import effect, hypotheses
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.friction import FrictionLaw, FrictionTerm
+from armloop.laws.effects import effect, hypotheses
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.progress import silent
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.progress import silent
 
 
 def exact(name: str) -> ReconstructedModel:
@@ -31,7 +31,7 @@ def test_a_ripples_order_for_judging_a_fold_does_not_see_that_fold():
     model = exact("three_axis")
     motion = fourier_motion(40.0, 100.0, 3)
     tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + motion.v
-    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    samples = preprocess([measured(motion, tau, 3)], model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     ripple = effect("torque_ripple", 2)
 
@@ -56,7 +56,7 @@ def slow_friction_in_one_fold(at_fold_0: float) -> tuple[Evidence, np.ndarray, n
     model = exact("three_axis")
     motion = fourier_motion(40.0, 100.0, 3)
     tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + motion.v
-    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    samples = preprocess([measured(motion, tau, 3)], model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     column = np.zeros_like(samples.tau)
     column[evidence.kept] = evidence.columns(effect("viscous_friction", 2), 0.0)[:, :, 0]
@@ -88,7 +88,7 @@ def test_a_shape_for_judging_a_fold_does_not_see_what_other_effects_are_in_it():
 def test_a_fold_is_judged_with_what_the_other_folds_showed_alone():
     model = exact("three_axis")
     motion = fourier_motion(40.0, 100.0, 3)
-    samples = condition([measured(motion, np.zeros_like(motion.q), 3)], model.conditioning)
+    samples = preprocess([measured(motion, np.zeros_like(motion.q), 3)], model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     residual = np.zeros_like(samples.tau)
     residual[evidence.fold == 0, 1] = 0.2  # there in one fold, absent in the other
@@ -124,7 +124,7 @@ def test_the_search_ends_where_what_is_added_is_taken_back(monkeypatch):
     model = exact("three_axis")
     motion = fourier_motion(40.0, 100.0, 3)
     tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + 2 * motion.v
-    samples = condition([measured(motion, tau, 3)], model.conditioning)
+    samples = preprocess([measured(motion, tau, 3)], model.conditioning)
     evidence = Evidence.of(model, samples, hypotheses(model.arm))
     asked = []
 

@@ -7,7 +7,7 @@ import numpy as np
 from armloop.diagnosis.evidence import FOLDS, Stacked
 from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import SIGNIFICANCE, lead
-from armloop.effects import Estimate, effect
+from armloop.laws.effects import Estimate, effect
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 

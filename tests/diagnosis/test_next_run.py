@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.arm import Arm
 from armloop.cli import main
-from armloop.components import RigidBody
+from armloop.data.log import MotionLog, write_log
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.diagnosis.next_run import Wish, next_run, training_ranges
-from armloop.errors import InputError
-from armloop.excitation import MotionRanges, Reference, read_reference
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog, write_log
+from armloop.experiment.excitation import MotionRanges, Reference, read_reference
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 Law = Callable[[Motion], np.ndarray]
 COULOMB, VISCOUS = 0.5, 1.5
@@ -88,7 +88,7 @@ def model() -> ReconstructedModel:
     friction = FrictionLaw(((FrictionTerm("sign", COULOMB), FrictionTerm("viscous", VISCOUS)),) * 2)
     bare = ReconstructedModel(ARM, (body,), friction, history={"range": RANGES})
     clean = log(fourier_motion(40.0, 125.0, 90, ARM), None, 90)
-    return replace(bare, baseline=score(bare, condition([clean], bare.conditioning)).moving)
+    return replace(bare, baseline=score(bare, preprocess([clean], bare.conditioning)).moving)
 
 
 def check_limits(reference: Reference, ranges: MotionRanges) -> None:
@@ -112,7 +112,7 @@ CASES: dict[str, tuple[Law, float, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ["spring", pytest.param("encoder", marks=pytest.mark.long)])
 def test_the_next_run_names_what_is_there_and_has_no_such_alternatives(model, case) -> None:
     law, size, truth = CASES[case]
     first = diagnose(model, [log(small_motion(3, size), law, 3)])

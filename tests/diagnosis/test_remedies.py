@@ -3,7 +3,7 @@
 import pytest
 
 from armloop.diagnosis.remedies import remedy
-from armloop.effects import EFFECTS, Estimate, Law, Parameter, effect
+from armloop.laws.effects import EFFECTS, Estimate, Law, Parameter, effect
 from armloop.model import AddedEffect
 
 FAULTS = {

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.reversals import turning
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.library.hysteresis import stop_operator
-from armloop.log import MotionLog
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.laws.hysteresis import stop_operator
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
 
 LEVEL, WIDTH = np.array([3.0, 4.0, 2.0]), 0.01
 
@@ -35,7 +35,7 @@ def coulomb_and_viscous(baseline: MotionLog) -> ReconstructedModel:
     body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
     law = FrictionLaw(tuple((FrictionTerm("sign", float(f)), FrictionTerm("viscous", 1.0)) for f in LEVEL))
     bare = ReconstructedModel(three_axis(), (body,), law)
-    rmse = score(bare, condition([baseline], bare.conditioning)).moving
+    rmse = score(bare, preprocess([baseline], bare.conditioning)).moving
     return replace(bare, baseline={**rmse, "worst": [2 * x for x in rmse["rmse"]]})
 
 

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody, SparseTerms
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess
 from armloop.diagnosis import contacts, diagnose
 from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import contradiction, deviations
 from armloop.diagnosis.pushes import Contact
-from armloop.effects import Estimate, effect
-from armloop.kinematics import nominal_parameters
-from armloop.library.double_feature_set import Factors
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import MotionLog
+from armloop.features.double_feature_set import Factors
+from armloop.identification.scoring import score
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.model.components import RigidBody, SparseTerms
+from armloop.robot.kinematics import nominal_parameters
 
 VISCOUS, COULOMB = (0.8, 1.0, 0.5), (0.3, 0.4, 0.2)
 
@@ -47,7 +47,7 @@ def model() -> ReconstructedModel:
     )
     body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
     bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
-    samples = condition([run(90, 60.0)], bare.conditioning)
+    samples = preprocess([run(90, 60.0)], bare.conditioning)
     motion = samples.motion
     ranges = [np.ptp(motion.q, axis=0) / 2, *(np.abs(x).max(axis=0) for x in (motion.v, motion.vdot))]
     ranges.append((motion.q.max(axis=0) + motion.q.min(axis=0)) / 2)
@@ -57,7 +57,7 @@ def model() -> ReconstructedModel:
 
 
 def events(model: ReconstructedModel, log: MotionLog) -> list:
-    evidence = Evidence.of(model, condition([log], model.conditioning), [])
+    evidence = Evidence.of(model, preprocess([log], model.conditioning), [])
     return find_contacts(evidence, evidence.residual([]))
 
 
@@ -124,7 +124,7 @@ def test_an_event_stands_out_of_all_the_rest_of_the_run(
 
 
 def test_a_joint_that_sticks_while_another_slides_shows_no_event(model: ReconstructedModel) -> None:
-    samples = condition([run(13, 10.0)], model.conditioning)
+    samples = preprocess([run(13, 10.0)], model.conditioning)
     a, b = (int(np.searchsorted(samples.motion.time, t)) for t in (4.0, 5.0))
     v = samples.motion.v.copy()
     v[a:b] = [0.0, 0.5, 0.5]  # joint 1 is held by its friction, the others go on
@@ -177,7 +177,7 @@ def test_a_model_that_contradicts_itself_is_unsure_by_as_much(model: Reconstruct
     index = np.array([[0, factors.names.index("vdot2")]], dtype=np.intp)
     terms = SparseTerms(3, index, np.array([[2.0, 0.0, 0.0]]))
     lopsided = replace(model, components=(*model.components, terms))
-    evidence = Evidence.of(lopsided, condition([run(17, 10.0)], model.conditioning), [])
+    evidence = Evidence.of(lopsided, preprocess([run(17, 10.0)], model.conditioning), [])
     unsure = np.abs(contradiction(lopsided, evidence.samples.motion))
     assert unsure.max() > 20 * evidence.scale.max()
     assert (deviations(evidence, evidence.residual([])) >= unsure - 1e-12).all()

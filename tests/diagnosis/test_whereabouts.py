@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
+from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.whereabouts import Whereabouts, whereabouts
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw
+from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.signals import condition
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
 
 
 def found(law: Callable[[Motion], np.ndarray], seed: int) -> Whereabouts:
@@ -25,7 +25,7 @@ def found(law: Callable[[Motion], np.ndarray], seed: int) -> Whereabouts:
     motion = fourier_motion(60.0, 100.0, seed)
     tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot)
     tau[:, 1] += law(motion)
-    samples = condition([measured(motion, tau, seed, noise=0.001)], model.conditioning)
+    samples = preprocess([measured(motion, tau, seed, noise=0.001)], model.conditioning)
     evidence = Evidence.of(model, samples, [])
     return whereabouts(evidence, fit(evidence, evidence.residual([]), [], []), 1)
 

@@ -8,12 +8,12 @@ from exact_parts import energies, model_of, random_motion, rigid_body, scara_ter
 from numpy.testing import assert_allclose
 from pydrake.multibody.plant import MultibodyPlant
 
-from armloop.arm import Arm, load_arm
-from armloop.components import SparseTerms
-from armloop.drake_systems.plant import add_links
+from armloop.drake.plant.plant import add_links
 from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix, with_mass_matrix
-from armloop.errors import ModelError
-from armloop.library.friction import FrictionTerm
+from armloop.laws.friction import FrictionTerm
+from armloop.model.components import SparseTerms
+from armloop.robot.arm import Arm, load_arm
+from armloop.util.errors import ModelError
 
 ARMS = {name: load_arm(name) for name in ("three_axis", "scara")}
 KINDS = {

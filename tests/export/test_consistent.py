@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from exact_parts import ARMS, disguised, energies, model_of, random_motion
 
-from armloop.arm import Arm
-from armloop.components import RigidBody
 from armloop.export import export
 from armloop.export.consistent import ConsistentInertia, consistent_inertia, pseudo_inertias
-from armloop.export.said import rigid_parameters, said
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.library.rigid_body import full_columns
+from armloop.export.expressible import rigid_parameters, said
+from armloop.features.rigid_body import full_columns
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 FRICTION = (FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0))
 

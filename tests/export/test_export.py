@@ -9,16 +9,16 @@ import pytest
 from answers import answered
 from exact_parts import ARMS, disguised, energies, model_of, rigid_body, scara_terms
 
-from armloop.arm import load_arm
 from armloop.cli import main
-from armloop.effects import Estimate, effect
-from armloop.errors import ModelError
+from armloop.data.motion import Motion
 from armloop.export import export
 from armloop.export.c_code import c_source
 from armloop.export.reading_c import CompiledTorque, compiler
-from armloop.library.friction import FrictionTerm
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Motion
+from armloop.robot.arm import load_arm
+from armloop.util.errors import ModelError
 
 PLAIN = (FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0))
 RICH = (

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
-from armloop.components import RigidBody
-from armloop.effects import Estimate, effect
-from armloop.kinematics import nominal_parameters
-from armloop.library.friction import FrictionLaw, FrictionTerm
-from armloop.log import write_log
+from armloop.data.log import write_log
+from armloop.laws.effects import Estimate, effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.resources import urdf_path
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.resources import urdf_path
 
 #: A number of more digits than any reader takes.
 LONG = "9" * 400

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from armloop.errors import InputError, ModelError
-from armloop.files import strict
 from armloop.model import load_model
-from armloop.reading import read_json, read_yaml
+from armloop.util.errors import InputError, ModelError
+from armloop.util.files import strict
+from armloop.util.reading import read_json, read_yaml
 
 JSON = st.recursive(
     st.none()

@@ -38,10 +38,10 @@ TIMED = ("loop.json", "report.html", "reproduction.json", "replay.html", ".armlo
 DRIVER = """
 import json, os, random, shutil, signal, sys, time
 from pathlib import Path
-import armloop.commands.shared, armloop.diagnosis, armloop.drake_systems.scenarios, armloop.reports.diagnosis_report
-import armloop.loop, armloop.reconstruction, matplotlib.figure
+import armloop.commands.shared, armloop.diagnosis, armloop.drake.experiments.scenarios, armloop.reports.diagnosis_report
+import armloop.workflows, armloop.identification.reconstruction, matplotlib.figure
 from armloop.cli import main
-from armloop.keeping import FOLDER
+from armloop.util.checkpoints import FOLDER
 
 kills, words, out = int(sys.argv[1]), sys.argv[2:], Path("out")
 

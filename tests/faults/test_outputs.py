@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from faults.conftest import contents
 
-from armloop import outputs
 from armloop.cli import main
-from armloop.errors import InputError
-from armloop.files import replacing, strict, write_json, write_text
 from armloop.model import load_model
+from armloop.util import outputs
+from armloop.util.errors import InputError
+from armloop.util.files import replacing, strict, write_json, write_text
 
 Place = Path
 RECONSTRUCT = "reconstruct run.csv --arm arm.urdf --library rigid-body"

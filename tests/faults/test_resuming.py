@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from armloop.cli import main
-from armloop.keeping import FOLDER, Kept
 from armloop.reports.html import Picture, Section, render
 from armloop.reports.tables import make_table
-from armloop.reproduction import Outcome
+from armloop.util.checkpoints import FOLDER, Kept
+from armloop_paper import Outcome
 
 
 def test_items_are_kept_by_what_they_depend_on(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_reproduction_goes_on_where_it_was_ended(
             raise KeyboardInterrupt
         return Outcome({"x": 1.0}, {"x": len(done)}, "agrees", name, Section(name, ["text"]))
 
-    monkeypatch.setattr("armloop.reproduction.run_item", ended)
+    monkeypatch.setattr("armloop_paper.run_item", ended)
     command = ["reproduce", "table2", "fig5", "--out", str(tmp_path / "r"), "--json"]
     assert main(command) == 130
     assert not (tmp_path / "r" / "reproduction.json").exists()
@@ -96,8 +96,8 @@ wear: {samples: 2, spread: 0.3}
 def test_draws_of_the_friction_go_on_where_they_were_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from armloop.drake_systems import wear
-    from armloop.workers import Processes
+    from armloop.drake.experiments import wear
+    from armloop.util.workers import Processes
 
     (tmp_path / "s.yaml").write_text(WEAR)
     command = ["track", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "w"), "--json"]

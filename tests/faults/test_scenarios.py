@@ -7,8 +7,8 @@ import pytest
 from faults.conftest import LONG, contents, one_line
 
 from armloop.cli import main
-from armloop.errors import InputError
-from armloop.reading import read_yaml
+from armloop.util.errors import InputError
+from armloop.util.reading import read_yaml
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)

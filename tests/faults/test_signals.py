@@ -13,15 +13,15 @@ import pytest
 from faults.conftest import contents
 
 from armloop.cli import main
-from armloop.files import replacing
-from armloop.log import read_log
+from armloop.data.log import read_log
+from armloop.util.files import replacing
 
 #: A command whose two workers are at work for a minute; what it imports itself takes no time.
 WORKING = """
 import sys, time
 from armloop import cli
-from armloop.files import replacing
-from armloop.workers import Processes
+from armloop.util.files import replacing
+from armloop.util.workers import Processes
 import armloop.commands.evaluate as command
 def run(options):
     with replacing("half.csv") as draft:
@@ -97,7 +97,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
 ) -> None:
     log = read_log(place / "run.csv")
     monkeypatch.setattr(
-        "armloop.loop.collect_logs", lambda *_: {"static": log.select(slice(0, 50)), "varying": log}
+        "armloop.workflows.collect_logs", lambda *_: {"static": log.select(slice(0, 50)), "varying": log}
     )
     before, limit = contents(place), resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limit[1]))

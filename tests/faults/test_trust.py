@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from armloop.cli import main
-from armloop.drake_systems.scenarios import load_tracking
-from armloop.errors import ScenarioError
+from armloop.drake.experiments.scenarios import load_tracking
 from armloop.reports.html import Report, Section, render
 from armloop.reports.tables import make_table
+from armloop.util.errors import ScenarioError
 
 OWN = "own_plant:\n  arm: {}\n  friction: [{{}}, {{}}, {{}}]\nreference: {{periods: 1}}\nscore: [5, 20]\n"
 TABLE = "plant: three_axis\nreference: {{kind: csv, file: {}}}\n"

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from armloop.cli import build_parser
-from armloop.errors import InputError
+from armloop.util.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

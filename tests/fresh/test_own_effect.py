@@ -18,9 +18,9 @@ PROJECT = tomllib.loads(re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)[0])
 # the same run and model as the document's, looked at by one who has not installed the effect
 WITHOUT = """
 from armloop.diagnosis import diagnose
-from armloop.drake_systems.exact import exact_model
-from armloop.drake_systems.scenarios import load_plant
-from armloop.log import read_log
+from armloop.drake.plant.exact import exact_model
+from armloop.drake.experiments.scenarios import load_plant
+from armloop.data.log import read_log
 
 plant = load_plant("three_axis")
 found = diagnose(exact_model(plant.arm, plant.config.friction), [read_log("run.csv")])
@@ -60,7 +60,7 @@ def done(site, tmp_path_factory) -> tuple[Path, str]:
     """The folder that the document's script was run in, and what it printed."""
     folder = tmp_path_factory.mktemp("run")
     keep = (
-        "from armloop.log import write_log\nwrite_log('run.csv', log)\n"
+        "from armloop.data.log import write_log\nwrite_log('run.csv', log)\n"
         "print(diagnosis.verdict, diagnosis.errors()['after'][1], len(diagnosis.outcome.found))\n"
     )
     answer = python("-c", SCRIPT + keep, cwd=folder, installed=site)
@@ -109,4 +109,4 @@ def test_help_does_not_look_for_effects(site, tmp_path):
     for words in (["--help"], ["diagnose", "--help"]):
         answer = python("-X", "importtime", "-m", "armloop", *words, cwd=tmp_path, installed=tmp_path)
         assert answer.returncode == 0, answer.stderr
-        assert "armloop.commands.arguments" in answer.stderr and "armloop.effects" not in answer.stderr
+        assert "armloop.commands.arguments" in answer.stderr and "armloop.laws.effects" not in answer.stderr

@@ -9,8 +9,8 @@ import sys
 import pytest
 from page_commands import ROOT, armloop, blocks, commands, run
 
-from armloop.drake_systems.scenario_schema import FILES
 from armloop.schemas.checking import checked
+from armloop.schemas.published import FILES
 
 BIN = os.path.dirname(sys.executable)
 

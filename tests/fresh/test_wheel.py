@@ -9,13 +9,16 @@ import pytest
 PROGRAM = """
 import sys
 import armloop
-from armloop.resources import measured_folder, scenario_names, scenario_path, urdf_names, urdf_path
+from armloop.util.resources import measured_folder, scenario_names, scenario_path, urdf_names, urdf_path
 home = sys.argv[1]
 assert not armloop.__file__.startswith(home), armloop.__file__
 for path in [*map(urdf_path, urdf_names()), *map(scenario_path, scenario_names()), measured_folder("ur5")]:
     assert not str(path).startswith(home) and path.exists(), path
 import importlib, pkgutil
-for module in pkgutil.walk_packages(armloop.__path__, "armloop."):
+import armloop_paper
+packages = [each for package in (armloop, armloop_paper)
+            for each in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
+for module in packages:
     if not module.name.endswith("__main__"):
         importlib.import_module(module.name)
 print(*urdf_names())

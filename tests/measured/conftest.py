@@ -1,5 +1,7 @@
 """The UR10e's logs, and a model of the arm without load that several tests look at."""
 
+import fcntl
+import os
 from pathlib import Path
 
 import pytest
@@ -19,9 +21,18 @@ def ur10e(measured: Path) -> Path:
 @pytest.fixture(scope="session")
 def model(ur10e: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model of the arm without load, from all no-load logs but one."""
-    path = tmp_path_factory.mktemp("ur10e") / "model.json"
+    # one for all processes of a run of the tests: their temporary folders lie beside each other
+    base = tmp_path_factory.getbasetemp()
+    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "ur10e"
+    place.mkdir(exist_ok=True)
+    path = place / "model.json"
     logs = sorted(str(log) for log in ur10e.glob("noload_*.csv") if log.name != LEFT_OUT)
     assert len(logs) == 8
     arm = ["--arm", str(ur10e / "ur10e.urdf"), "--library", "rigid-body"]
-    assert main(["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]) == 0
+    with (place / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not path.exists():
+            assert (
+                main(["reconstruct", *logs, *arm, "--drive-gains", GAINS, "--out", str(path), "--json"]) == 0
+            )
     return path

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from armloop.arm import load_arm
-from armloop.log import MotionLog, read_log
-from armloop.reconstruction import Options, Reconstruction, reconstruct
+from armloop.data.log import MotionLog, read_log
+from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
+from armloop.robot.arm import load_arm
 
 pytestmark = pytest.mark.measured
 

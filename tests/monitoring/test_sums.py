@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from operation import Change, healthy_model, operate
 
-from armloop.errors import LogError
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, watched
 from armloop.monitoring.naming import Normal, name_change
@@ -12,6 +11,7 @@ from armloop.monitoring.sums import LogSums, log_sums
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, Units, unit_edges
 from armloop.monitoring.warmth import adjust
+from armloop.util.errors import LogError
 
 
 @pytest.fixture(scope="module")

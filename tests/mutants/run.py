@@ -1,6 +1,6 @@
 """Mutation testing: change the numerics in one place at random, and see whether the quick tests of the room fail.
 
-    python tests/mutants/run.py --rooms regression effects --mutants 40 --seed 1
+    python tests/mutants/run.py --rooms regression laws --mutants 40 --seed 1
 
 A mutant is one comparison, operator, number, sign or choice put otherwise, in a copy of the package. It is dead if the
 room's quick tests fail or take too long. Results are kept in ``out/mutants.jsonl`` by the content of the file that was
@@ -29,11 +29,11 @@ PACKAGE = Path("src/armloop")
 #: Rooms whose numerics are changed, and the tests that must see it.
 ROOMS = {
     "regression": ["tests/regression"],
-    "uncertainty": ["tests/uncertainty"],
-    "effects": ["tests/effects"],
-    "reconstruction": ["tests/reconstruction"],
+    "identification/uncertainty": ["tests/identification/uncertainty"],
+    "laws": ["tests/laws"],
+    "identification/reconstruction": ["tests/identification/reconstruction"],
     "diagnosis": ["tests/diagnosis"],
-    "drake_systems": ["tests/drake_systems"],
+    "drake": ["tests/drake"],
 }
 _COMPARE = {
     ast.Lt: "<=",

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armloop.arm import Arm, load_arm
+from armloop.data.log import read_log
 from armloop.dynamics import check_physics
 from armloop.dynamics.physics import joint_limits, mass_matrix
-from armloop.log import read_log
-from armloop.reconstruction import Options, reconstruct
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.robot.arm import Arm, load_arm
 
 pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armloop.arm import load_arm
-from armloop.kinematics import nominal_parameters, regressor
-from armloop.log import read_log
-from armloop.newton_euler import inverse_dynamics
+from armloop.data.log import read_log
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.robot.newton_euler import inverse_dynamics
 
 pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from armloop.cli import main
-from armloop.errors import InputError
 from armloop.regression.estimators import REGISTRY, Estimator, register_estimator
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
+from armloop.util.errors import InputError
 
 
 class Largest(Estimator):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from armloop.library.double_feature_set import DoubleFeatureSet
-from armloop.motion import Motion
+from armloop.data.motion import Motion
+from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
 

@@ -14,13 +14,13 @@ from synthetic import (
     three_axis,
 )
 
-from armloop.conditions import sort_samples
+from armloop.data.log import MotionLog
+from armloop.data.regimes import sort_samples
+from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
-from armloop.drake_systems.tracking import TrackingResult
-from armloop.log import MotionLog
-from armloop.reconstruction import Reconstruction, StepReport
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.drake.experiments.tracking import TrackingResult
+from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.scoring import score
 
 SPRING = {"stiffness": 1.5, "rest": 0.3}
 
@@ -59,7 +59,7 @@ def tracked(controller: str, size: float) -> TrackingResult:
 def reconstructed(log: MotionLog) -> Reconstruction:
     """The arm's own parameters as if a reconstruction had found them, scored on a log."""
     model = as_it_was()
-    held_out = score(model, condition([log], model.conditioning))
+    held_out = score(model, preprocess([log], model.conditioning))
     model = replace(model, baseline=held_out.moving)
     reports = [
         StepReport(
@@ -81,9 +81,9 @@ def loop() -> SimpleNamespace:
         seed=7,
         arm=three_axis(),
         logs=logs,
-        clusters=sort_samples(condition(list(logs.values()), made.model.conditioning).motion),
+        clusters=sort_samples(preprocess(list(logs.values()), made.model.conditioning).motion),
         reconstruction=made,
-        baseline=made,
+        reference=made,
         tracking={name: tracked(name, size) for name, size in sizes.items()},
         diagnosis=diagnosis,
         undeclared={"effect": "joint_spring", "joint": 2, "parameters": SPRING},

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from armloop.reports.coefficients import coefficients_table, stribeck_table
-from armloop.uncertainty.simulated import true_model
+from armloop_paper.simulated import true_model
 
 
 def entry(error, freedom=20.0):

@@ -10,15 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from synthetic import friction
 
+from armloop.data.motion import Motion
+from armloop.data.signals import smooth
 from armloop.diagnosis import Diagnosis, close
-from armloop.files import write_figure
-from armloop.motion import Motion
 from armloop.reports import plots
 from armloop.reports.html import svg
 from armloop.reports.plots import style
 from armloop.reports.plots.style import thin, with_gaps
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
-from armloop.signals import smooth
+from armloop.util.files import write_figure
 
 
 def drawn(figure: Figure) -> Figure:
@@ -51,7 +51,7 @@ def test_eta_bars_are_the_etas(loop: SimpleNamespace) -> None:
 def test_reconstruction_figures(loop: SimpleNamespace) -> None:
     assert len(drawn(plots.clusters_figure(loop.clusters)).axes) == 2
     assert plots.has_trials(loop.reconstruction.reports)
-    drawn(plots.orders_figure(loop.reconstruction.reports, loop.baseline.reports))
+    drawn(plots.orders_figure(loop.reconstruction.reports, loop.reference.reports))
 
 
 def test_a_residual_lies_under_every_torque(loop: SimpleNamespace) -> None:

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from armloop.diagnosis import Diagnosis, close
-from armloop.effects import effect
+from armloop.laws.effects import effect
 from armloop.model import AddedEffect
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.reports.findings import nothing_to_supply

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from operation import Change, healthy_model, operate
 
-from armloop.log import write_log
+from armloop.data.log import write_log
 
 #: Logs of each arm, and the first one after a change.
 LOGS, CHANGED = 40, 26

@@ -10,8 +10,8 @@ from answers import answered
 from operation import contents
 
 from armloop.cli import main
-from armloop.log import read_log, write_log
-from armloop.tables import write_columns
+from armloop.data.log import read_log, write_log
+from armloop.data.tables import write_columns
 from armloop.watch import Options, watch
 from armloop.watch.sources import find_logs, recorded_at
 from armloop.watch.store import Store

@@ -10,15 +10,15 @@ from armloop.api.model import Model
 from armloop.api.reading import as_logs
 from armloop.api.score import logs_for
 from armloop.api.shown import displayed, page
+from armloop.data.log import MotionLog
 from armloop.diagnosis import Diagnosis as Found
 from armloop.diagnosis import close
 from armloop.diagnosis import diagnose as run
 from armloop.diagnosis.closing import Closing
-from armloop.files import write_json, write_text
-from armloop.log import MotionLog
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.progress import Progress, silent
 from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.util.files import write_json, write_text
+from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

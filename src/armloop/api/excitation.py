@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from armloop.api.reading import as_arm
 from armloop.api.shown import displayed, page
-from armloop.arm import Arm, load_arm
-from armloop.design import Excitation, Settings, baseline_noise
-from armloop.design import excite as run
-from armloop.errors import InputError
-from armloop.excitation import MotionRanges, ranges_with, write_reference
+from armloop.experiment.design import Excitation, Settings, baseline_noise
+from armloop.experiment.design import excite as run
+from armloop.experiment.excitation import MotionRanges, ranges_with, write_reference
+from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
 from armloop.model import ReconstructedModel
-from armloop.progress import Progress, silent
-from armloop.reconstruction.reconstruct import default_conditioning, default_library
 from armloop.reports.excitation_tables import measures_table, use_table
-from armloop.resources import urdf_names
+from armloop.robot.arm import Arm, load_arm
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress, silent
+from armloop.util.resources import urdf_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,8 +49,8 @@ class Reference:
 
     def report(self, path: str | Path) -> Path:
         """Write the page of ``armloop excite --report``, without a network."""
-        from armloop.files import write_text
         from armloop.reports.excitation_report import excitation_report
+        from armloop.util.files import write_text
 
         write_text(path, excitation_report(self.result, None))
         return Path(path)
@@ -142,6 +142,6 @@ def _plants(arm: Arm) -> MotionRanges | None:
     """The ranges of a built-in arm's plant; None for any other."""
     if arm.name not in urdf_names() or load_arm(arm.name).fingerprint() != arm.fingerprint():
         return None
-    from armloop.drake_systems.scenarios import load_plant
+    from armloop.drake.experiments.scenarios import load_plant
 
     return load_plant(arm.name).config.ranges

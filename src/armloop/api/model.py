@@ -12,21 +12,21 @@ import numpy as np
 from armloop.api.reading import as_arm, as_logs
 from armloop.api.score import Score, evaluate, samples_for
 from armloop.api.shown import displayed, page
-from armloop.arm import Arm
-from armloop.errors import InputError
+from armloop.data.log import MotionLog
+from armloop.data.signals import Conditioning
 from armloop.export import Exported, states_of
 from armloop.export import export as write_export
-from armloop.files import write_text
-from armloop.log import MotionLog
+from armloop.identification.reconstruction import Options
+from armloop.identification.reconstruction import reconstruct as run
+from armloop.identification.reconstruction.reconstruct import Reconstruction
 from armloop.model import ReconstructedModel
 from armloop.model import load_model as read_model
-from armloop.progress import Progress, silent
-from armloop.reconstruction import Options
-from armloop.reconstruction import reconstruct as run
-from armloop.reconstruction.reconstruct import Reconstruction
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import formulas, score_table, steps_table
-from armloop.signals import Conditioning
+from armloop.robot.arm import Arm
+from armloop.util.errors import InputError
+from armloop.util.files import write_text
+from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,7 +157,7 @@ def reconstruct(
     """Reconstruct a model of an arm's joint torques from its logs; the options of ``armloop reconstruct``.
 
     Args:
-        method: "stepwise" or "sindy", the one-shot baseline.
+        method: "stepwise" or "sindy", one regression of everything, the reference method.
         library: "double-feature-set" (default up to four joints), "rigid-body" (default beyond) or "lagrangian".
         estimator: how terms are chosen.
         penalty: of the Lassos, or the threshold; by held-out error if None.

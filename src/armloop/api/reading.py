@@ -6,10 +6,10 @@ import glob
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from armloop.arm import Arm, load_arm
-from armloop.errors import LogError
-from armloop.log import MotionLog
-from armloop.log import read_log as read_file
+from armloop.data.log import MotionLog
+from armloop.data.log import read_log as read_file
+from armloop.robot.arm import Arm, load_arm
+from armloop.util.errors import LogError
 
 
 def read_log(

@@ -9,15 +9,15 @@ import numpy as np
 
 from armloop.api.reading import as_logs
 from armloop.api.shown import page
-from armloop.arm import Arm
-from armloop.errors import InputError
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import preprocess
+from armloop.identification.scoring import Score as Numbers
+from armloop.identification.scoring import score
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
 from armloop.reports.tables import score_table
-from armloop.scoring import Score as Numbers
-from armloop.scoring import score
-from armloop.signals import condition
+from armloop.robot.arm import Arm
+from armloop.util.errors import InputError
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,4 +80,4 @@ def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[Motio
 
 def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples:
     """The logs conditioned as the model's training logs were."""
-    return condition(logs_for(model, logs), model.conditioning)
+    return preprocess(logs_for(model, logs), model.conditioning)

@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armloop.api.shown import displayed, page
-from armloop.arm import Arm
-from armloop.errors import InputError
 from armloop.model import ReconstructedModel
-from armloop.progress import Progress, silent
 from armloop.reports.tables import eta_table
 from armloop.reports.tracking_tables import metrics_table
+from armloop.robot.arm import Arm
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from armloop.drake_systems.tracking import TrackingResult
+    from armloop.drake.experiments.tracking import TrackingResult
 
 
 class Tracking:
@@ -48,7 +48,7 @@ class Tracking:
 
     def report(self, path: str | Path) -> Path:
         """Write the figure and the tables as a page of its own, without a network."""
-        from armloop.files import write_text
+        from armloop.util.files import write_text
 
         head = (
             '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Tracking</title></head><body>'
@@ -88,8 +88,8 @@ def track(
         InputError: the scenario is wrong or of another kind (payload_pickup, friction_wear: use the command), or the
             model is of another arm.
     """
-    from armloop.drake_systems.scenarios import load_tracking
-    from armloop.loop import run_scenario
+    from armloop.drake.experiments.scenarios import load_tracking
+    from armloop.workflows import run_scenario
 
     if isinstance(arm, Arm):
         raise InputError("track: arm must be the path of a URDF; the scenario reads it itself")

@@ -26,16 +26,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Sort the samples of logs by condition."""
     from armloop.commands.shared import TORQUE, print_json, read_logs
-    from armloop.conditions import sort_samples
-    from armloop.errors import InputError
+    from armloop.data.regimes import sort_samples
+    from armloop.data.signals import Conditioning, preprocess
     from armloop.reports.tables import table
-    from armloop.signals import Conditioning, condition
+    from armloop.util.errors import InputError
 
     logs = read_logs(options.logs, None, TORQUE)
     widths = {log.joints for log in logs}
     if len(widths) > 1:
         raise InputError(f"the logs have {sorted(widths)} joints; give logs of one arm")
-    samples = condition(logs, Conditioning())
+    samples = preprocess(logs, Conditioning())
     clusters = sort_samples(samples.motion, options.indicator, options.seed)
     if options.json:
         print_json(

@@ -26,9 +26,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Simulate a data collection."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.log import write_log
-    from armloop.loop import collect_logs
-    from armloop.sampling import CONDITIONS
+    from armloop.data.log import write_log
+    from armloop.experiment.sampling import CONDITIONS
+    from armloop.workflows import collect_logs
 
     folder = out_folder(options.out, (f"{name}.csv" for name in CONDITIONS))
     logs = collect_logs(options.arm, options.plan, options.seed, progress(options))

@@ -67,8 +67,8 @@ def run(options: argparse.Namespace) -> None:
 
     from armloop.commands.shared import arm_of, drive_gains, out_file, print_json
     from armloop.convert import Answers, convert, read_map
-    from armloop.errors import InputError
-    from armloop.tables import write_columns
+    from armloop.data.tables import write_columns
+    from armloop.util.errors import InputError
 
     arm = arm_of(options) if options.arm else None
     if options.suggest:
@@ -95,8 +95,8 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
 
     from armloop.commands.shared import out_file, print_json
     from armloop.convert import doubts, read_sources, suggested, written
-    from armloop.errors import InputError
-    from armloop.files import write_text
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_text
 
     out = None if options.out is None else Path(options.out)
     if options.map is not None:
@@ -156,9 +156,9 @@ def _answer(found: object, out: object) -> dict[str, object]:
 def _tell(found: object, out: object, arm: object) -> None:
     import numpy as np
 
-    from armloop.arm import Arm
     from armloop.convert import Converted
     from armloop.reports.tables import table
+    from armloop.robot.arm import Arm
 
     assert isinstance(found, Converted) and isinstance(arm, Arm | None)
     log = found.log

@@ -26,7 +26,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--block", type=float, default=1.0, metavar="SECONDS", help="length of a block (%(default)s)"
     )
     p.add_argument(
-        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+        "--method",
+        default="stepwise",
+        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
     )
     p.add_argument("--library", default=None, help="as of armloop reconstruct (default: by number of joints)")
     p.add_argument(
@@ -75,18 +77,18 @@ def run(options: argparse.Namespace) -> None:
         read_logs,
         recorded_as,
     )
-    from armloop.errors import InputError
-    from armloop.files import write_json
-    from armloop.keeping import Kept
-    from armloop.reconstruction import Options
+    from armloop.data.signals import Conditioning
+    from armloop.identification.reconstruction import Options
+    from armloop.identification.validation import compare_physical, crossvalidate
     from armloop.reports.crossvalidation import (
         crossvalidation_tables,
         ladder_table,
         physical_table,
     )
-    from armloop.signals import Conditioning
-    from armloop.validation import compare_physical, crossvalidate
-    from armloop.workers import Processes
+    from armloop.util.checkpoints import Kept
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_json
+    from armloop.util.workers import Processes
 
     if not 0 < options.block < float("inf"):
         raise InputError(f"--block {options.block}: give a positive number of seconds")

@@ -39,9 +39,9 @@ def run(options: argparse.Namespace) -> None:
     from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
     from armloop.diagnosis import close
     from armloop.diagnosis import diagnose as run
-    from armloop.files import write_json, write_text
     from armloop.reports.diagnosis_report import diagnosis_report
     from armloop.reports.diagnosis_tables import diagnosis_table
+    from armloop.util.files import write_json, write_text
 
     folder = out_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
     model, logs = model_and_logs(options)

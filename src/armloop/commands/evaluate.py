@@ -25,12 +25,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Score a model on logs."""
     from armloop.commands.shared import model_and_logs, print_json
+    from armloop.data.signals import preprocess
+    from armloop.identification.scoring import score
     from armloop.reports.tables import score_table
-    from armloop.scoring import score
-    from armloop.signals import condition
 
     model, logs = model_and_logs(options)
-    result = score(model, condition(logs, model.conditioning))
+    result = score(model, preprocess(logs, model.conditioning))
     if options.json:
         print_json(result.to_dict())
         return

@@ -82,14 +82,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Design an exciting reference and write it."""
     from armloop.commands.shared import arm_of, out_file, print_json, progress
-    from armloop.design import Settings, baseline_noise, excite
-    from armloop.errors import InputError
-    from armloop.excitation import write_reference
-    from armloop.files import write_text
+    from armloop.data.tables import CSV, PARQUET
+    from armloop.experiment.design import Settings, baseline_noise, excite
+    from armloop.experiment.excitation import write_reference
+    from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
     from armloop.model import load_model
-    from armloop.reconstruction.reconstruct import default_conditioning, default_library
-    from armloop.resources import urdf_names
-    from armloop.tables import CSV, PARQUET
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_text
+    from armloop.util.resources import urdf_names
 
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")

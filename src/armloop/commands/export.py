@@ -38,11 +38,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Export."""
-    from armloop.arm import load_arm
     from armloop.commands.shared import out_file, out_folder, print_json, read_logs
+    from armloop.data.signals import preprocess
     from armloop.export import export, states_of
     from armloop.model import load_model
-    from armloop.signals import condition
+    from armloop.robot.arm import load_arm
 
     if options.to == "drake":
         out_folder(options.out)
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> None:
     model = load_model(options.model, load_arm(options.arm) if options.arm else None)
     motion = None
     if options.log:
-        samples = condition(read_logs(options.log, model.arm.n, model.recorded), model.conditioning)
+        samples = preprocess(read_logs(options.log, model.arm.n, model.recorded), model.conditioning)
         motion = states_of(samples.motion, samples.moving)
     found = export(model, options.to, options.out, motion)
     if options.json:

@@ -29,7 +29,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the whole loop."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.loop import LOOP_FILES, run_loop
+    from armloop.workflows import LOOP_FILES, run_loop
 
     if options.measured:
         _measured(options)
@@ -41,9 +41,9 @@ def run(options: argparse.Namespace) -> None:
 def _measured(options: argparse.Namespace) -> None:
     """Run the measured loop and print what it found."""
     from armloop.commands.shared import out_folder, progress
-    from armloop.loop.measured import MEASURED_FILES, run_measured
     from armloop.reports.diagnosis_tables import diagnosis_table
     from armloop.reports.tables import score_table, table
+    from armloop.workflows.measured import MEASURED_FILES, run_measured
 
     folder = out_folder(options.out, MEASURED_FILES)
     found = run_measured(folder, progress(options))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
     from armloop.diagnosis.next_run import NextRun, Wish
     from armloop.model import ReconstructedModel
-    from armloop.progress import Progress
+    from armloop.util.progress import Progress
 
 #: Rows per second of the reference.
 _RATE = 500.0
@@ -42,9 +42,9 @@ def add_next_run(p: argparse.ArgumentParser) -> None:
 def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
     """What the options say of the motion; None if none is wanted. Faults are found before any work is done."""
     from armloop.commands.shared import out_file
+    from armloop.data.tables import CSV, PARQUET
     from armloop.diagnosis.next_run import Wish, training_ranges
-    from armloop.errors import InputError
-    from armloop.tables import CSV, PARQUET
+    from armloop.util.errors import InputError
 
     if options.next_run is None:
         if ranges_stated(options) or options.next_run_duration is not None:
@@ -76,7 +76,7 @@ class Planned(NamedTuple):
 
     def write(self) -> None:
         """Write the reference, if there is one."""
-        from armloop.excitation import write_reference
+        from armloop.experiment.excitation import write_reference
 
         if self.run is not None:
             write_reference(self.path, self.run.reference, _RATE)
@@ -97,7 +97,7 @@ _NOTHING = (
 def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Planned:
     """Design the motion. A diagnosis is not lost where the limits exclude any."""
     from armloop.diagnosis.next_run import next_run
-    from armloop.errors import InputError
+    from armloop.util.errors import InputError
 
     try:
         return Planned(path, next_run(diagnosis, wanted, tell))

@@ -7,8 +7,8 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armloop.arm import Arm
-    from armloop.excitation import MotionRanges
+    from armloop.experiment.excitation import MotionRanges
+    from armloop.robot.arm import Arm
 
 _NAMES = ("lower", "upper", "velocity", "acceleration")
 
@@ -56,8 +56,8 @@ def read_ranges(
     Raises:
         InputError: a range is empty, beyond the URDF's limits, or not one number per joint.
     """
-    from armloop.errors import InputError
-    from armloop.excitation import ranges_with
+    from armloop.experiment.excitation import ranges_with
+    from armloop.util.errors import InputError
 
     stated = {key: numbers(getattr(options, key), f"--{key}", arm) for key in _NAMES}
     if options.ranges is None and known is not None:
@@ -65,7 +65,7 @@ def read_ranges(
     name = options.ranges or plant
     if name == "urdf":
         return ranges_with(arm, None, **stated)
-    from armloop.drake_systems.scenarios import load_plant
+    from armloop.drake.experiments.scenarios import load_plant
 
     found = load_plant(name)
     if found.arm.n != arm.n:
@@ -75,7 +75,7 @@ def read_ranges(
 
 def numbers(text: str | None, option: str, arm: Arm) -> tuple[float, ...] | None:
     """One finite number per joint."""
-    from armloop.errors import InputError
+    from armloop.util.errors import InputError
 
     if text is None:
         return None

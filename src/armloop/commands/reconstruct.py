@@ -18,7 +18,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
     add_chain(p)
     p.add_argument("--out", required=True, help="the model file, JSON")
     p.add_argument(
-        "--method", default="stepwise", help="stepwise, or sindy: the one-shot baseline (%(default)s)"
+        "--method",
+        default="stepwise",
+        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
     )
     p.add_argument(
         "--library",
@@ -94,16 +96,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Reconstruct a model and write it."""
     from armloop.commands.shared import TORQUE, arm_of, out_file, print_json, progress, recorded_as
-    from armloop.errors import InputError
-    from armloop.files import write_text
-    from armloop.pieces import IN_MEMORY, first_samples, log_sources
-    from armloop.reconstruction import Options
-    from armloop.reconstruction import reconstruct as run
+    from armloop.data.pieces import IN_MEMORY, first_samples, log_sources
+    from armloop.data.signals import Conditioning
+    from armloop.identification.reconstruction import Options
+    from armloop.identification.reconstruction import reconstruct as run
     from armloop.regression.estimators import LISTED, REGISTRY
     from armloop.regression.sparse import Sparse
     from armloop.reports.tables import formulas, libraries_table, parts_table, score_table, steps_table
-    from armloop.signals import Conditioning
-    from armloop.workers import Cluster, Processes
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_text
+    from armloop.util.workers import Cluster, Processes
 
     if REGISTRY.find(options.estimator) is None:
         names = ", ".join([*LISTED, *REGISTRY.own_names()])
@@ -185,7 +187,7 @@ def _laws(text: str | None) -> tuple[str, ...] | None:
 
 def _snr(options: argparse.Namespace) -> tuple[float, float, float] | None:
     """The signal-to-noise ratios of q, v and vdot, or None."""
-    from armloop.errors import InputError
+    from armloop.util.errors import InputError
 
     if options.snr is None:
         return None

@@ -33,12 +33,20 @@ def run(options: argparse.Namespace) -> None:
     from functools import partial
 
     from armloop.commands.shared import out_folder, print_json, progress
-    from armloop.errors import InputError
-    from armloop.files import write_json, write_text
-    from armloop.keeping import Kept
     from armloop.reports.html import Section
-    from armloop.reports.reproduction_report import reproduction_report, terminal_text
-    from armloop.reproduction import Context, chosen, run_item
+    from armloop.util.checkpoints import Kept
+    from armloop.util.errors import InputError
+    from armloop.util.files import write_json, write_text
+
+    try:
+        from armloop_paper import Context, chosen, run_item
+        from armloop_paper.report import reproduction_report, terminal_text
+    except ModuleNotFoundError as error:
+        if error.name != "armloop_paper":
+            raise
+        raise InputError(
+            "the package armloop_paper is not installed: reinstall armloop's wheel, which has it"
+        ) from None
 
     names = chosen(options.items)
     if not 1 <= options.draws <= 1000:

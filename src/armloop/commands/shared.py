@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from armloop.arm import Arm, load_arm
-from armloop.errors import InputError, ModelError
-from armloop.files import strict
-from armloop.log import MotionLog, read_log, same_measurement
+from armloop.data.log import MotionLog, read_log, same_measurement
+from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
-from armloop.outputs import take_file, take_folder
-from armloop.progress import Progress, silent
-from armloop.signals import condition
-from armloop.voices import said
+from armloop.robot.arm import Arm, load_arm
+from armloop.util.doubts import said
+from armloop.util.errors import InputError, ModelError
+from armloop.util.files import strict
+from armloop.util.outputs import take_file, take_folder
+from armloop.util.progress import Progress, silent
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -35,12 +35,12 @@ def print_json(value: Any) -> None:
 
 
 def out_folder(path: str, names: Iterable[str] = ()) -> Path:
-    """The output folder with the files that will go into it; see :func:`armloop.outputs.take_folder`."""
+    """The output folder with the files that will go into it; see :func:`armloop.util.outputs.take_folder`."""
     return take_folder(path, names)
 
 
 def out_file(path: str | None, option: str) -> None:
-    """Check the place of an output file before any work is done; see :func:`armloop.outputs.take_file`."""
+    """Check the place of an output file before any work is done; see :func:`armloop.util.outputs.take_file`."""
     take_file(path, option)
 
 
@@ -120,5 +120,5 @@ def held_out_logs(
                     "--held-out takes runs that are not fitted"
                 )
     for log in logs:
-        condition([log], model.conditioning)  # what is wrong with a log is said before the long work
+        preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

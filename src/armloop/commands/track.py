@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from armloop.commands.arguments import add_json
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.live import LiveView
-    from armloop.drake_systems.scenarios import TrackingScenario
+    from armloop.drake.experiments.scenarios import TrackingScenario
+    from armloop.drake.view.live import LiveView
 
 HELP = "compare controllers in closed loop in Drake: mean absolute tracking error per joint"
 EXAMPLE = (
@@ -75,9 +75,9 @@ def run(options: argparse.Namespace) -> None:
     """Compare controllers in closed loop."""
     # Whatever can be wrong is told before Drake is imported, which takes a second.
     from armloop.commands.shared import out_folder, print_json, progress
-    from armloop.errors import InputError
     from armloop.model import load_model
-    from armloop.resources import find_scenario
+    from armloop.util.errors import InputError
+    from armloop.util.resources import find_scenario
 
     folder = out_folder(options.out, _FILES) if options.out else None
     find_scenario(options.scenario)
@@ -85,10 +85,10 @@ def run(options: argparse.Namespace) -> None:
         raise InputError("--rate is the pace of --meshcat; give both, or leave it out")
     paths = _paths(options.model)
     models = {name: load_model(path) for name, path in paths.items()}
-    from armloop.drake_systems.scenarios import load_tracking
-    from armloop.loop import run_pickup_scenario, run_scenario, run_wear_scenario
+    from armloop.drake.experiments.scenarios import load_tracking
     from armloop.reports.tables import eta_table
     from armloop.reports.tracking_tables import metrics_table, phases_table, spread_table
+    from armloop.workflows import run_pickup_scenario, run_scenario, run_wear_scenario
 
     scenario = load_tracking(options.scenario, options.arm)
     for name, model in models.items():
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _paths(items: list[str]) -> dict[str, str]:
     """The files of ``--model`` by their names."""
-    from armloop.errors import InputError
+    from armloop.util.errors import InputError
 
     paths: dict[str, str] = {}
     for item in items:
@@ -139,8 +139,8 @@ def _paths(items: list[str]) -> dict[str, str]:
 
 def _view(options: argparse.Namespace, scenario: TrackingScenario) -> LiveView:
     """The live view of ``--meshcat``, its address told, once a browser looks or nobody came."""
-    from armloop.drake_systems.live import LiveView
-    from armloop.errors import InputError
+    from armloop.drake.view.live import LiveView
+    from armloop.util.errors import InputError
 
     if scenario.wear is not None:
         raise InputError(f"--meshcat: {scenario.name} runs many times at once; there is nothing to look at")

@@ -37,16 +37,16 @@ def run(options: argparse.Namespace) -> None:
     from math import pi
 
     from armloop.commands.shared import out_folder, print_json, progress
-    from armloop.resources import find_scenario
+    from armloop.util.resources import find_scenario
 
     folder = (
         out_folder(options.out, ("tune.json", "report.html", "bode.png", "step.png")) if options.out else None
     )
     find_scenario(options.scenario)  # before Drake is imported
-    from armloop.drake_systems.scenarios import load_tracking
-    from armloop.loop import tune_scenario
+    from armloop.drake.experiments.scenarios import load_tracking
     from armloop.model import load_model
     from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+    from armloop.workflows import tune_scenario
 
     scenario = load_tracking(options.scenario, options.arm)
     model = load_model(options.model, scenario.plant.arm) if options.model else None

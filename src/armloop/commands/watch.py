@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
     import sys
 
     from armloop.commands.shared import out_file, print_json, progress
-    from armloop.files import write_text
+    from armloop.util.files import write_text
     from armloop.watch import Options, watch
     from armloop.watch.sources import find_logs
     from armloop.watch.store import Store as Folder

@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm
 from armloop.convert.joints import match, may_be_unordered
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording
 from armloop.convert.units import CURRENTS, FACTORS, canonical
-from armloop.errors import LogError
-from armloop.log import GAP_PERIODS, MotionLog, unchecked_log
+from armloop.data.log import GAP_PERIODS, MotionLog, unchecked_log
+from armloop.robot.arm import Arm
+from armloop.util.errors import LogError
 
 _OWN = re.compile(r"(q|v|tau|vdot)\d{1,3}|time")
 # A run that follows another starts so many sample periods later: clearly a gap.

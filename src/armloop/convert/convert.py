@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.arm import Arm
 from armloop.convert.assemble import Answers, Part, joined, part
 from armloop.convert.detect import read_source
 from armloop.convert.mapping import Mapping
 from armloop.convert.recording import Array, Recording
-from armloop.errors import LogError
-from armloop.log import MotionLog, check_log
+from armloop.data.log import MotionLog, check_log
+from armloop.robot.arm import Arm
+from armloop.util.errors import LogError
 
 
 @dataclass(eq=False)

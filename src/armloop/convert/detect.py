@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armloop.convert.recording import Recording
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 KNOWN = (
     "a ROS bag (folder, .db3, .mcap, .bag), an RTDE or libfranka CSV, a LeRobot data set, .mat, .npz, "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 
 def match(names: Sequence[str], joints: Sequence[str], where: str) -> list[int]:

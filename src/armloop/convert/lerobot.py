@@ -16,7 +16,7 @@ import numpy as np
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording, flatten
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 _TORQUES = (
     "observation.effort",

@@ -13,7 +13,7 @@ import numpy as np
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Recording
 from armloop.convert.text import read_text
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 _PREFIXES = ("state.", "")
 

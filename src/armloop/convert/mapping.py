@@ -23,10 +23,10 @@ from typing import Annotated, TypeVar
 import msgspec
 
 from armloop.convert.units import FACTORS, canonical
-from armloop.errors import InputError
-from armloop.reading import read_yaml
 from armloop.schemas.checking import Misfit, checked
 from armloop.schemas.types import MOST_JOINTS, Finite
+from armloop.util.errors import InputError
+from armloop.util.reading import read_yaml
 
 SCHEMA = "armloop/map/1"
 UNSAID = "?"

@@ -9,7 +9,7 @@ import numpy as np
 
 from armloop.convert.headers import suggest
 from armloop.convert.recording import Recording, flatten
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 
 def read_matlab(path: Path) -> Recording:

@@ -10,7 +10,7 @@ import numpy as np
 
 from armloop.convert.matlab import from_arrays
 from armloop.convert.recording import Recording
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 
 def read_npz(path: Path) -> Recording:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.convert.mapping import Mapping
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 @dataclass(eq=False)

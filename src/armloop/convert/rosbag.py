@@ -17,7 +17,7 @@ import numpy as np
 from armloop.convert.joints import match
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 JOINT_STATE = "JointState"
 # Messages of a topic that are looked at for the arm's joints; a gripper's driver may share the topic.

@@ -11,7 +11,7 @@ from pathlib import Path
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Recording
 from armloop.convert.text import read_text
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 _TORQUES = (("actual_current_as_torque", "N*m"), ("actual_joint_torque", "N*m"), ("actual_current", "A"))
 

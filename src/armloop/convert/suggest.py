@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.arm import Arm
 from armloop.convert.assemble import rate_ratio
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
 from armloop.convert.recording import Recording
 from armloop.convert.units import FACTORS, RATES, canonical
-from armloop.errors import LogError
+from armloop.robot.arm import Arm
+from armloop.util.errors import LogError
 
 _BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
 _YAML_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}

@@ -8,7 +8,7 @@ from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
 from armloop.convert.text import read_text
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 
 def read_table(path: Path) -> Recording:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from armloop.convert.recording import Array
-from armloop.errors import LogError
+from armloop.util.errors import LogError
 
 _NUMBER = re.compile(
     r"^\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*$|^\s*(nan|inf|-inf|true|false)\s*$", re.IGNORECASE

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
-from armloop.progress import Progress
-from armloop.signals import smooth
+from armloop.util.progress import Progress
 
 Array = NDArray[np.float64]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from armloop.effects import Effect
-from armloop.effects.listed import EFFECTS
+from armloop.laws.effects import Effect
+from armloop.laws.effects.listed import EFFECTS
 
 
 def why_alike(found: Effect, rival: Effect) -> str:

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import independent_rows, smooth
 from armloop.diagnosis.evidence import Evidence
-from armloop.effects import Context, Effect
-from armloop.excitation import Reference
+from armloop.experiment.excitation import Reference
+from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect
-from armloop.motion import Motion, Samples
-from armloop.signals import independent_rows, smooth
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Least singular value, relative to the largest, of columns of unit size that is more than round-off.
 _ROUND_OFF = 1e-6

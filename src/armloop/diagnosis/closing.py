@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError
-from armloop.log import MotionLog
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import preprocess
+from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
-from armloop.scoring import Score, score
-from armloop.signals import condition
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 
 #: Instants of a run at which the feedforward is compared: as many as a figure can show.
 _INSTANTS = 2000
@@ -128,7 +127,7 @@ def held_out_run(before: ReconstructedModel, after: ReconstructedModel, log: Mot
         raise InputError(
             f"{log.name}: {log.joints} joints, but the model's arm {before.arm.name} has {before.arm.n}"
         )
-    samples = condition([log], before.conditioning)
+    samples = preprocess([log], before.conditioning)
     old, new = (score(lasting(model), samples) for model in (before, after))
     return HeldOutRun(log.name, old, new)
 

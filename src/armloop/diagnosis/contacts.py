@@ -11,17 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence, creep
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
-from armloop.effects.events import during
+from armloop.laws.effects.events import during
 from armloop.model import AddedEffect
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.log import MotionLog, require_different
+from armloop.data.motion import Samples
+from armloop.data.signals import preprocess
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
@@ -20,15 +23,11 @@ from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import Found, Outcome
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
-from armloop.effects import hypotheses
-from armloop.errors import InputError
-from armloop.log import MotionLog, require_different
+from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
-from armloop.progress import Progress, silent
-from armloop.signals import condition
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress, silent
 
 SCHEMA = "armloop/diagnosis/2"
 
@@ -215,7 +214,7 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
             )
     require_different(logs)
     progress("conditioning the run like the model's training logs")
-    samples = condition(logs, model.conditioning)
+    samples = preprocess(logs, model.conditioning)
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
             raise InputError(

@@ -14,14 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers
-from armloop.effects import Context, Effect
+from armloop.data.blocks import block_numbers
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import independent_rows, smooth
+from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.motion import Motion, Samples
 from armloop.regression.moments import Moments
-from armloop.signals import independent_rows, smooth
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_sums
+from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
-from armloop.effects import Effect, Estimate
+from armloop.laws.effects import Effect, Estimate
 from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
 

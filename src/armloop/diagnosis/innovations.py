@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
 from armloop.dynamics import Dynamics
-from armloop.errors import ModelError
-from armloop.library.friction import FrictionLaw
+from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
-from armloop.signals import smooth
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import ModelError
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2

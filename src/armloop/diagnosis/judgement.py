@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_sums
+from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
 

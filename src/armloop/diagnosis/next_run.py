@@ -1,7 +1,7 @@
 """The motion to make next: one that tells what was found from what it may be mistaken for.
 
 A diagnosis lists as alternatives what its run cannot tell from what was found. Here a reference within the arm's limits
-is designed on which, whichever of the two is there, the other fits badly (`armloop.design.unexplained`). Without
+is designed on which, whichever of the two is there, the other fits badly (`armloop.experiment.design.unexplained`). Without
 alternatives it is one that measures what was found better, or, where no law was found, one that shows the joint
 over its whole range and at all speeds.
 """
@@ -13,20 +13,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.design import sampled
 from armloop.diagnosis.apart import Stage
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_ranges
 from armloop.diagnosis.rivals import Law, found_laws, lookalikes, pairs
-from armloop.effects import Effect
-from armloop.excitation import FourierReference
-from armloop.progress import Progress, silent
+from armloop.experiment.design import sampled
+from armloop.experiment.excitation import FourierReference
+from armloop.laws.effects import Effect
+from armloop.util.arrays import Array
+from armloop.util.progress import Progress, silent
 
 __all__ = ["FAR_ENOUGH", "NextRun", "Told", "Wish", "next_run", "training_ranges"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import averaged
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Innovations are looked at that often, s.
 _STEP = 0.04

@@ -7,14 +7,12 @@ of the rest of the run.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import CREEP, dry_level
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Over this many seconds the residual is averaged; bursts this close together are one, shorter ones are none.
 _WINDOW, _PAUSE, _SHORTEST = 0.15, 0.3, 0.15

@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.design import (
+from armloop.data.motion import Motion
+from armloop.diagnosis.apart import Stage, context_of
+from armloop.diagnosis.diagnose import Diagnosis
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.rivals import Law, Rivalry
+from armloop.experiment.design import (
     CRITERIA,
     Columns,
     Criterion,
@@ -22,18 +26,12 @@ from armloop.design import (
     sampled,
     unexplained,
 )
-from armloop.diagnosis.apart import Stage, context_of
-from armloop.diagnosis.diagnose import Diagnosis
-from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.rivals import Law, Rivalry
-from armloop.errors import InputError
-from armloop.excitation import FourierReference, MotionRanges
-from armloop.library.friction import FrictionTerm
+from armloop.experiment.excitation import FourierReference, MotionRanges
+from armloop.laws.friction import FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.progress import Progress
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress
 
 #: s of a period, repeated, and its harmonics: up to 0.4 Hz.
 PERIOD, _HARMONICS = 20.0, 8

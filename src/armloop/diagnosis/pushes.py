@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers
+from armloop.data.blocks import block_numbers
+from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
-from armloop.effects import Context, Effect, Estimate, effect
-from armloop.effects.events import interval
+from armloop.laws.effects import Context, Effect, Estimate, effect
+from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3

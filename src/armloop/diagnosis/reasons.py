@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside
-from armloop.goodness import Parts, merged, outside_trained_range, parts_of, witness
+from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
 from armloop.model import ReconstructedModel
-from armloop.signals import smooth
-
-Array = NDArray[np.float64]
 
 #: So many times the baseline is no baseline any more.
 MULTIPLE = 2.0

@@ -20,19 +20,17 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from scipy.stats import t
 
-from armloop.arm import Arm
-from armloop.blocks import block_sums
+from armloop.data.blocks import block_sums
+from armloop.data.motion import Motion
+from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.search import Found, Outcome
 from armloop.diagnosis.trials import Known
-from armloop.effects import Effect, hypotheses
-from armloop.motion import Motion
-from armloop.progress import Progress
-from armloop.signals import independent_rows
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from armloop.laws.effects import Effect, hypotheses
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Mask
+from armloop.util.progress import Progress
 
 #: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
 #: found at another joint, this part …

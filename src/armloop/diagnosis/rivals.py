@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from armloop.diagnosis.apart import Part, Stage, left
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.fit import Shape, fit
-from armloop.effects import Effect, hypotheses
+from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 
 #: Where several motions are looked at, no more values of a nonlinear parameter are tried than this.

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
@@ -24,11 +23,10 @@ from armloop.diagnosis.judgement import (
     simplest_of_equals,
 )
 from armloop.diagnosis.trials import Known
-from armloop.effects import Effect, hypotheses
+from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
-from armloop.progress import Progress, paced
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.progress import Progress, paced
 
 #: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
 #: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for

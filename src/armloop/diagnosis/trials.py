@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
-from armloop.effects import Effect
+from armloop.laws.effects import Effect
 from armloop.model import AddedEffect
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _REFITS = 2
 

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_sums
+from armloop.data.blocks import block_sums
+from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
-from armloop.library.angle_sums import AngleSums
-from armloop.motion import Motion
-from armloop.progress import Progress
+from armloop.features.angle_sums import AngleSums
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
+from armloop.util.progress import Progress
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: A stretch of time or a half of the motion is named where it holds this part of the energy above the baseline …
 _MOST = 0.8

@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from armloop.dynamics.model import ModelEquations
-from armloop.errors import ModelError
-from armloop.functions import MATH, NUMPY
 from armloop.model import ReconstructedModel
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import ModelError
+from armloop.util.functions import MATH, NUMPY
 
 _POSTURES = 2000
 

@@ -1,6 +1,6 @@
 """The effects' laws as equations of motion: what the drive must supply because of them, for any kind of number.
 
-A law along a direction (:mod:`armloop.effects.law`) and the bodies of a payload, a tilt or a push are written once, over
+A law along a direction (:mod:`effects.law`) and the bodies of a payload, a tilt or a push are written once, over
 functions handed in. Sensor effects act on records, not on arms, and have none. A user's own effect that is known for
 arrays alone is asked for its torque at samples (:mod:`armloop.dynamics.own_effects`).
 """
@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from armloop.arm import Arm
 from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
 from armloop.dynamics.own_effects import OwnEffectEquations
-from armloop.effects import Value, effect
-from armloop.effects.base import Body, Placed
-from armloop.errors import ModelError
-from armloop.functions import Functions
-from armloop.library.friction import Sliding, torque_along
+from armloop.laws.effects import Value, effect
+from armloop.laws.effects.base import Body, Placed
+from armloop.laws.friction import Sliding, torque_along
+from armloop.robot.arm import Arm
+from armloop.util.errors import ModelError
+from armloop.util.functions import Functions
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """The equations of motion of a model's parts, in plain arithmetic for any kind of number.
 
 Every part's torque is tau = M(q) vdot + rest(q, v). The numbers may be floats, arrays of samples, AutoDiffXd or
-symbolic Expressions (see :mod:`armloop.functions`): vectors are sequences of n numbers, matrices lists of n rows.
+symbolic Expressions (see :mod:`armloop.util.functions`): vectors are sequences of n numbers, matrices lists of n rows.
 """
 
 from __future__ import annotations
@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from math import prod
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from armloop.model.components import Lagrangian
+from armloop.robot.arm import Arm
+from armloop.robot.newton_euler import inverse_dynamics, mass_matrix
+from armloop.util.arrays import Array
+from armloop.util.functions import Functions
 
-from armloop.arm import Arm
-from armloop.components import Lagrangian
-from armloop.functions import Functions
-from armloop.newton_euler import inverse_dynamics, mass_matrix
-
-Array = NDArray[np.float64]
 Numbers = Sequence[Any]
 Rows = list[list[Any]]
 

@@ -6,15 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from armloop.arm import Arm
-from armloop.components import Component, Lagrangian, RigidBody, SparseTerms
 from armloop.dynamics.effects import effect_law
 from armloop.dynamics.equations import BodyEquations, EnergyEquations, Equations, Numbers, Rows
 from armloop.dynamics.sparse import SparseArrayEquations, SparseEquations
-from armloop.errors import ModelError
-from armloop.functions import NUMPY, Functions
-from armloop.library.friction import Acting, Direction, Sliding, torque_along
+from armloop.laws.friction import Acting, Direction, Sliding, torque_along
 from armloop.model import ReconstructedModel
+from armloop.model.components import Component, Lagrangian, RigidBody, SparseTerms
+from armloop.robot.arm import Arm
+from armloop.util.errors import ModelError
+from armloop.util.functions import NUMPY, Functions
 
 _LOAD_ROUNDS = 3
 

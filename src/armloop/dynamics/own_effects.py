@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from armloop.arm import Arm
+from armloop.data.motion import Motion
 from armloop.dynamics.equations import Array, Equations, Numbers, Rows
-from armloop.effects import Context, Effect, Value
-from armloop.errors import ModelError
-from armloop.motion import Motion
+from armloop.laws.effects import Context, Effect, Value
+from armloop.robot.arm import Arm
+from armloop.util.errors import ModelError
 
 #: Difference, relative to the torque's size, above which a torque is not linear in the acceleration.
 _ROUND_OFF = 1e-6

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.arm import Arm
-from armloop.library.lagrangian import gravity_sees_first_joint
+from armloop.data.motion import Motion
+from armloop.features.lagrangian import gravity_sees_first_joint
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 
 #: Postures drawn over the limits, how many of the worst are looked around, how often and with how many neighbours.
 _POSTURES, _WORST, _ROUNDS, _NEIGHBOURS = 1000, 8, 6, 12

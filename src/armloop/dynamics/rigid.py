@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armloop.components import RigidBody
 from armloop.dynamics.arrays import require_mass_matrix
-from armloop.errors import ModelError
-from armloop.library.rigid_body import BaseParameters
+from armloop.features.rigid_body import BaseParameters
 from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.util.errors import ModelError
 
 
 def nearest_rigid_body(model: ReconstructedModel) -> ReconstructedModel:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from armloop.components import SparseTerms
 from armloop.dynamics.equations import Equations, Numbers, Rows, is_nothing
-from armloop.errors import ModelError
-from armloop.functions import Functions
-from armloop.library.double_feature_set import product_name
-from armloop.wave_table import WaveTable
+from armloop.features.double_feature_set import product_name
+from armloop.model.components import SparseTerms
+from armloop.model.wave_table import WaveTable
+from armloop.util.errors import ModelError
+from armloop.util.functions import Functions
 
 
 class SparseEquations(Equations):

@@ -25,12 +25,11 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
-from armloop.arm import Arm
-from armloop.kinematics import LINK_PARAMETERS, nominal_parameters
-from armloop.library.rigid_body import full_columns
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.data.motion import Motion
+from armloop.features.rigid_body import full_columns
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import LINK_PARAMETERS, nominal_parameters
+from armloop.util.arrays import Array
 
 _STATES = 300
 _RANK = 1e-9

@@ -10,23 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.drake_systems.beyond_bodies import presliding_elements
+from armloop.data.motion import Motion
+from armloop.drake.plant.beyond_bodies import presliding_elements
 from armloop.dynamics import ModelEquations
-from armloop.errors import InputError
 from armloop.export.exported import Exported, rms_of, whole_torque
-from armloop.export.rereading import drake_torque
+from armloop.export.expressible import Said, friction_torques, random_motion, said
 from armloop.export.robot_xml import urdf_text
-from armloop.export.said import Said, friction_torques, random_motion, said
-from armloop.files import write_text
-from armloop.functions import MATH
+from armloop.export.round_trip import drake_torque
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-from armloop.newton_euler import mass_matrix
-from armloop.quiet import quiet
-
-Array = NDArray[np.float64]
+from armloop.robot.newton_euler import mass_matrix
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.files import write_text
+from armloop.util.functions import MATH
+from armloop.util.quiet import quiet
 
 _STEP = 1e-3
 _SMALLEST_SMOOTHING = 0.01
@@ -38,7 +36,7 @@ from pathlib import Path
 
 from pydrake.all import AddMultibodyPlantSceneGraph, DiagramBuilder, Parser, Simulator
 
-from armloop.drake_systems import add_joint_forces, friction_systems
+from armloop.drake import add_joint_forces, friction_systems
 from armloop.model import load_model
 
 here, builder = Path(__file__).parent, DiagramBuilder()

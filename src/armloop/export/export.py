@@ -7,23 +7,21 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.errors import InputError, ModelError
+from armloop.data.motion import Motion
 from armloop.export.c_code import c_source
 from armloop.export.drake_bundle import as_drake
 from armloop.export.exported import Exported, rms_of, whole_torque
+from armloop.export.expressible import Said, random_motion, said
 from armloop.export.mjcf import FEATURES as MJCF_FEATURES
 from armloop.export.mjcf import mjcf_text
 from armloop.export.reading_c import CompiledTorque, compiler
-from armloop.export.rereading import NotInstalled, drake_torque, mujoco_torque
 from armloop.export.robot_xml import SDF_FEATURES, URDF_FEATURES, sdf_text, urdf_text
-from armloop.export.said import Said, random_motion, said
-from armloop.files import write_text
+from armloop.export.round_trip import NotInstalled, drake_torque, mujoco_torque
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError, ModelError
+from armloop.util.files import write_text
 
 TARGETS = ("urdf", "sdf", "mjcf", "drake", "c")
 _SAMPLES = 400

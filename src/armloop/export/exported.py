@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _MOST = 400
 

@@ -1,4 +1,4 @@
-"""A model's inverse dynamics as formulas of traced numbers, with and without the memory of its friction."""
+"""Inverse dynamics of a model as traced formulas, with and without the memory of its friction."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armloop.arm import Arm
 from armloop.dynamics import ModelEquations
-from armloop.effects.base import number
-from armloop.effects.listed import EFFECTS
 from armloop.export.tracing import Graph, Node
-from armloop.library.friction import FrictionLaw
+from armloop.laws.effects.base import number
+from armloop.laws.effects.listed import EFFECTS
+from armloop.laws.friction import FrictionLaw
 from armloop.model import AddedEffect, ReconstructedModel
+from armloop.robot.arm import Arm
 
 #: Later than any joint has cooled down: what is left of friction that fades.
 _LATE = 1e300

@@ -5,12 +5,10 @@ from __future__ import annotations
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop import __version__
-from armloop.export.said import Said, body_of
-
-Array = NDArray[np.float64]
+from armloop.export.expressible import Said, body_of
+from armloop.util.arrays import Array
 
 FEATURES = frozenset({"damping", "dry", "spring", "gravity"})
 _UNITS = (

@@ -10,11 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.errors import InputError
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 
-Array = NDArray[np.float64]
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-O2")
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop import __version__
-from armloop.arm import Joint
-from armloop.export.said import Said, body_of
-
-Array = NDArray[np.float64]
+from armloop.export.expressible import Said, body_of
+from armloop.robot.arm import Joint
+from armloop.util.arrays import Array
 
 UNITS = (
     "SI units: kg, m, rad, s, N, N*m. damping: N*m*s/rad (N*s/m). friction: the level of dry (Coulomb) friction in N*m "

@@ -1,6 +1,6 @@
-"""Numbers that remember how they were computed: a law run on them gives its own formula, to be written as C.
+"""Symbolic tracing by operator overloading: numbers that remember how they were computed, to be written as C.
 
-The same plain arithmetic that serves floats, arrays and symbols (see :mod:`armloop.functions`) runs once on these; what
+The same plain arithmetic that serves floats, arrays and symbols (see :mod:`armloop.util.functions`) runs once on these; what
 comes out is a graph of operations in which equal ones are one (hash consing) and what multiplies zero is gone.
 Sines and cosines of whole-number combinations of the joints' angles follow from those of single joints by the
 addition theorem: an arm has few joints and a model many waves.
@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from armloop.functions import Functions
+from armloop.util.functions import Functions
 
 Key = tuple[Any, ...]
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.monitoring.ranks import scan, threshold
 from armloop.monitoring.units import Stream
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Units looked at together; a longer history is looked at in stretches that overlap by half.
 LONGEST = 512

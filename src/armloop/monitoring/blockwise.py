@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion, Samples
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
 from armloop.monitoring.naming import Normal, name_change
 from armloop.monitoring.sums import joint_sums, residual_scale
-from armloop.motion import Motion, Samples
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: What a cumulative sum lets pass per block, and where it alarms, in units of the largest healthy score: a lasting
 #: score half as large again as everything healthy alarms after a dozen blocks, one four times as large after one.

@@ -13,11 +13,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.effects import Effect, effect, hypotheses
+from armloop.data.motion import Motion, Samples
+from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.

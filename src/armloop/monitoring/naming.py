@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.arm import Arm
-from armloop.effects import Estimate
+from armloop.laws.effects import Estimate
 from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, solve
 from armloop.regression.moments import Moments
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Place = tuple[str, int | None, int | None]
 
 #: Ridge on columns of unit length: of what the model leaves on healthy units only the strong directions are taken.

@@ -13,15 +13,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.blocks import block_numbers
-from armloop.errors import LogError
-from armloop.log import MotionLog
+from armloop.data.blocks import block_numbers
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import independent_rows, preprocess, smooth
 from armloop.model import ReconstructedModel
 from armloop.monitoring.catalogue import Column, catalogue
-from armloop.motion import Samples
-from armloop.signals import condition, independent_rows, smooth
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import LogError
 
 #: Longest block, s.
 BLOCK_SECONDS = 30.0
@@ -96,7 +95,7 @@ def log_sums(
     n = model.arm.n
     if log.joints != n:
         raise LogError(f"{log.name}: {log.joints} joints; the model's arm {model.arm.name} has {n}")
-    samples = condition([log], model.conditioning)
+    samples = preprocess([log], model.conditioning)
     motion = samples.motion
     # two samples per period of the corner: what lies closer is not told apart by the filter
     kept = np.flatnonzero(independent_rows(samples))[::2]

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _DAY = 86400.0
 #: Difference of the Bayesian information criterion that decides (Kass and Raftery 1995: strong).

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.ranks import HORIZON
 from armloop.monitoring.sums import FEWEST_ROWS
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: A longer log is several units, s.
 UNIT_SECONDS = 600.0

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal, ridge
 from armloop.monitoring.units import Stream, Units
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Effects whose size follows a joint's temperature.
 FRICTION = frozenset(

@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Rows c of new constraints c·θ ≥ 0 that θ violates; empty if there is none.
 Cuts = Callable[[Array], Array]

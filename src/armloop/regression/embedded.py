@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _ITERATIONS = 30
 _RIDGE, _STRONG_RIDGE = 1e-8, 1e-3
@@ -18,7 +16,7 @@ _NOTHING = 1e-20
 
 
 class Embedding(Protocol):
-    """Coefficients that are functions of free parameters; every effect is one (:class:`armloop.effects.Effect`)."""
+    """Coefficients that are functions of free parameters; every effect is one (:class:`armloop.laws.effects.Effect`)."""
 
     def start(self, beta: Array) -> Array:
         """Free parameters (k,) nearest to unconstrained coefficients (p,)."""

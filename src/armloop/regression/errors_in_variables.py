@@ -7,10 +7,9 @@ columns, in whose every direction the signal is most of what was measured, it ta
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigh
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Least share of signal in any direction of the columns.
 _SIGNAL = 0.5

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: A column whose part outside the others is smaller than this (squared, relative) is theirs already.
 DEPENDENT = 1e-9

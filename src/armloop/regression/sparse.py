@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators import LISTED, REGISTRY, Estimator, Problem, Reduction
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from armloop.util.arrays import Array, Index
 
 ESTIMATORS = tuple(LISTED)
 

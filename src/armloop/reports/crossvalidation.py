@@ -10,7 +10,7 @@ from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, number, percent
 
 if TYPE_CHECKING:
-    from armloop.validation import CrossValidation, PhysicalComparison
+    from armloop.identification.validation import CrossValidation, PhysicalComparison
 
 
 _DEGREES = {

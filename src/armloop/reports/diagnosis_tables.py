@@ -12,8 +12,8 @@ from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
 
 if TYPE_CHECKING:
-    from armloop.arm import Arm
     from armloop.diagnosis import Closing, Diagnosis
+    from armloop.robot.arm import Arm
 
 _WIDTH = 110
 

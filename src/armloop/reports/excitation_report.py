@@ -10,7 +10,7 @@ from armloop.reports.plots.excitation import data_figure, reference_figure
 from armloop.reports.words import number
 
 if TYPE_CHECKING:
-    from armloop.design import DataRatio, Excitation
+    from armloop.experiment.design import DataRatio, Excitation
 
 _REFERENCE = (
     "One period, each quantity in parts of its limit (dashed). The motion starts and ends at rest, so that it can be "

@@ -10,7 +10,7 @@ from armloop.reports.tables import Table, make_table
 from armloop.reports.words import number
 
 if TYPE_CHECKING:
-    from armloop.design import DataRatio, Excitation
+    from armloop.experiment.design import DataRatio, Excitation
 
 _LIMITS = ("position", "velocity", "acceleration", "torque")
 

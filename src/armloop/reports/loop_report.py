@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from armloop.arm import Arm
-from armloop.conditions import Clusters
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.regimes import Clusters
+from armloop.data.signals import preprocess, smooth
 from armloop.diagnosis import Diagnosis
-from armloop.log import MotionLog
-from armloop.motion import Samples
-from armloop.reconstruction import Reconstruction
+from armloop.identification.reconstruction import Reconstruction
 from armloop.reports import paper as published
 from armloop.reports.diagnosis_report import diagnosis_sections, strongest_joint
 from armloop.reports.findings import headline
@@ -47,10 +47,10 @@ from armloop.reports.words import (
     vector,
     with_error,
 )
-from armloop.signals import condition, smooth
+from armloop.robot.arm import Arm
 
 if TYPE_CHECKING:  # the class lives among Drake's systems, which a report need not load
-    from armloop.drake_systems.tracking import TrackingResult
+    from armloop.drake.experiments.tracking import TrackingResult
 
 _SPARK_SECONDS = 12.0
 
@@ -76,7 +76,7 @@ class LoopResult(Protocol):
     @property
     def reconstruction(self) -> Reconstruction: ...
     @property
-    def baseline(self) -> Reconstruction | None: ...
+    def reference(self) -> Reconstruction | None: ...
     @property
     def tracking(self) -> Mapping[str, TrackingResult]: ...
     @property
@@ -105,7 +105,7 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
     sections = [
         _measure_section(result),
         conditions_section(result.clusters),
-        *reconstruction_sections(result.reconstruction, varying, result.baseline),
+        *reconstruction_sections(result.reconstruction, varying, result.reference),
         _control_section(result),
         *diagnosis_sections(result.diagnosis, ["the second run"]),
         _truth_section(result),
@@ -241,7 +241,7 @@ def mean_eta(result: TrackingResult) -> float:
 def _varying(result: LoopResult) -> Samples:
     """The richest log, conditioned as the model's were."""
     longest = max(result.logs.values(), key=lambda log: max(run.stop - run.start for run in log.runs()))
-    return condition([longest], result.reconstruction.model.conditioning)
+    return preprocess([longest], result.reconstruction.model.conditioning)
 
 
 def _piece(samples: Samples) -> slice:

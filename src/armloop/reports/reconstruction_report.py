@@ -7,10 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.conditions import Clusters, sort_samples
-from armloop.log import MotionLog
-from armloop.motion import Motion, Samples
-from armloop.reconstruction import Reconstruction, StepReport
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion, Samples
+from armloop.data.regimes import Clusters, sort_samples
+from armloop.data.signals import preprocess
+from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import clusters_figure, friction_figure, has_trials, orders_figure, torque_figure
@@ -24,14 +26,12 @@ from armloop.reports.tables import (
     steps_table,
 )
 from armloop.reports.words import counted, number, percent
-from armloop.scoring import Score
-from armloop.signals import condition
 
 _ORDERS = (
     "Each candidate library was fitted with some blocks of data set aside; the smallest one whose error "
     "there is within a standard error of the best was kept (ringed)."
 )
-_ORDERS_WITH_BASELINE = " The last panel is the one-shot baseline, which keeps its best."
+_ORDERS_WITH_REFERENCE = " The last panel is the one-shot reference method, which keeps its best."
 _TORQUE = (
     "Measured and predicted torque over time. Step I knows gravity and dry friction, Step II adds what "
     "depends on velocity, Step III what depends on acceleration: the last curve should lie on the measured "
@@ -72,7 +72,7 @@ def conditions_section(clusters: Clusters, title: str = "Sorting the samples") -
 def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionLog]) -> str:
     """One HTML page on a reconstruction from these logs."""
     model = reconstruction.model
-    samples = condition(logs, model.conditioning)
+    samples = preprocess(logs, model.conditioning)
     sections = reconstruction_sections(reconstruction, _longest_run(samples))
     if reconstruction.reports[0].orders is not None:
         sections.insert(0, conditions_section(sort_samples(samples.motion)))
@@ -106,19 +106,19 @@ def _longest_run(samples: Samples) -> Samples:
 def reconstruction_sections(
     reconstruction: Reconstruction,
     samples: Samples | None = None,
-    baseline: Reconstruction | None = None,
+    reference: Reconstruction | None = None,
 ) -> list[Section]:
     """How the model was reconstructed, what it says, and how well it predicts.
 
     Args:
         samples: motion to show measured and predicted torque on, conditioned like the model's logs.
-        baseline: the one-shot reconstruction of the same data, to be compared with.
+        reference: the one-shot reconstruction of the same data, to be compared with.
     """
     model, history = reconstruction.model, reconstruction.model.history
     pictures = []
     if has_trials(reconstruction.reports):
-        trials = orders_figure(reconstruction.reports, baseline.reports if baseline else ())
-        pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_BASELINE if baseline else "")))
+        trials = orders_figure(reconstruction.reports, reference.reports if reference else ())
+        pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_REFERENCE if reference else "")))
     if samples is not None:
         pictures.append(Picture(torque_figure(model, samples), _TORQUE))
         pictures.append(Picture(friction_figure(model, samples), _FRICTION))
@@ -137,9 +137,9 @@ def reconstruction_sections(
     if reconstruction.parts:
         tables.append(parts_table(reconstruction.parts, model.arm))
         text = [*(f"{warning}." for warning in reconstruction.warnings), *text, _PARTS]
-    if baseline is not None:
-        tables.append(comparison(reconstruction, baseline))
-        text.append(_against(reconstruction, baseline))
+    if reference is not None:
+        tables.append(comparison(reconstruction, reference))
+        text.append(_against(reconstruction, reference))
     folded = [("The model as formulas, one per joint", formulas(model))]
     tables += [table for table in (stribeck_table(model),) if table is not None]
     if (coefficients := coefficients_table(model, None)) is not None:
@@ -149,10 +149,10 @@ def reconstruction_sections(
     return [Section("Reconstruction", text, pictures, tables, folded, list(reconstruction.notes))]
 
 
-def comparison(ours: Reconstruction, baseline: Reconstruction) -> Table:
-    """Held-out nRMSE per joint and number of terms of the model and of the one-shot baseline."""
+def comparison(ours: Reconstruction, reference: Reconstruction) -> Table:
+    """Held-out nRMSE per joint and number of terms of the model and of the one-shot reference method."""
     rows = []
-    for name, made in (("stepwise", ours), ("one-shot SINDy", baseline)):
+    for name, made in (("stepwise", ours), ("one-shot SINDy", reference)):
         errors = [percent(x) for x in made.held_out.moving["nrmse"]]
         rows.append([name, *errors, " / ".join(map(str, _terms(made.reports)))])
     headers = ["method", *(f"joint {j + 1}" for j in range(ours.model.arm.n)), "terms per joint"]
@@ -163,8 +163,8 @@ def _terms(reports: Sequence[StepReport]) -> list[int]:
     return [int(x) for x in np.sum([report.terms for report in reports], axis=0)]
 
 
-def _against(ours: Reconstruction, baseline: Reconstruction) -> str:
-    mine, theirs = mean_nrmse(ours.held_out), mean_nrmse(baseline.held_out)
+def _against(ours: Reconstruction, reference: Reconstruction) -> str:
+    mine, theirs = mean_nrmse(ours.held_out), mean_nrmse(reference.held_out)
     if not np.isfinite(mine + theirs) or min(mine, theirs) <= 0:
         return "One-shot SINDy was run on the same data; the table compares the two."
     factor = max(mine, theirs) / min(mine, theirs)

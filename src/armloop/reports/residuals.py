@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.motion import Motion
+from armloop.data.signals import independent_rows
 from armloop.diagnosis import Diagnosis
 from armloop.diagnosis.fit import Fit
-from armloop.motion import Motion
-from armloop.signals import independent_rows
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Runs laid end to end are this far apart, as a part of all of them.
 _GAP = 0.02

@@ -19,13 +19,13 @@ from armloop.reports.words import (
 )
 
 if TYPE_CHECKING:  # what makes the results need not be loaded to print them
-    from armloop.arm import Arm
-    from armloop.drake_systems.tracking import TrackingResult
-    from armloop.goodness import Parts
+    from armloop.drake.experiments.tracking import TrackingResult
+    from armloop.identification.goodness import Parts
+    from armloop.identification.reconstruction import StepReport
+    from armloop.identification.reconstruction.libraries import Contender
+    from armloop.identification.scoring import Score
     from armloop.model import ReconstructedModel
-    from armloop.reconstruction import StepReport
-    from armloop.reconstruction.libraries import Contender
-    from armloop.scoring import Score
+    from armloop.robot.arm import Arm
 
 
 @dataclass(frozen=True)

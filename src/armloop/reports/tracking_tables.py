@@ -11,8 +11,8 @@ from armloop.reports.tables import Table, make_table
 from armloop.reports.words import controller
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.tracking import TrackingResult
-    from armloop.drake_systems.wear import WearResult
+    from armloop.drake.experiments.tracking import TrackingResult
+    from armloop.drake.experiments.wear import WearResult
 
 #: The phases of a pickup in words.
 PHASES = {

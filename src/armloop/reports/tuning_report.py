@@ -12,7 +12,7 @@ from armloop.reports.tuning_tables import gains_table, margins_table, verified_t
 from armloop.reports.words import number
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.tuned_loop import TunedLoop, Tuning
+    from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning
 
 _BODE = (
     "Open loop of each joint, cut at its drive, and its sensitivity, what feedback makes of a disturbance. Lines: gain 1, "

@@ -9,7 +9,7 @@ import numpy as np
 from armloop.reports.tables import Table, make_table, percent
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.tuned_loop import TunedLoop, Tuning
+    from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning
 
 
 def gains_table(tuning: Tuning, title: str | None = "Gains") -> Table:

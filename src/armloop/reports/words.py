@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from armloop.effects import Effect
+    from armloop.laws.effects import Effect
 
 MISSING = "–"
 

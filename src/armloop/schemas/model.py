@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from armloop.errors import ModelError
 from armloop.schemas.checking import Misfit, checked
 from armloop.schemas.types import (
     MOST_JOINTS,
@@ -26,6 +25,7 @@ from armloop.schemas.types import (
     Text,
     Vector3,
 )
+from armloop.util.errors import ModelError
 
 SCHEMA = "armloop/model/2"
 #: Hz; a filter of a lower corner would need hours of a log.
@@ -118,7 +118,7 @@ class EffectData(Struct):
 
 
 class ConditioningData(Struct, forbid_unknown_fields=True):
-    """How logs are filtered; see ``armloop.signals.Conditioning``."""
+    """How logs are filtered; see ``armloop.data.signals.Conditioning``."""
 
     cutoff_hz: Annotated[float, Meta(ge=0.0, le=1e4, description="Hz; 0 is no filter")]
     oversampling: Annotated[float, Meta(gt=1.0, le=1e4)] = 25.0

@@ -6,9 +6,9 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-from armloop.errors import InputError
 from armloop.model import ReconstructedModel, load_model
 from armloop.monitoring.catalogue import watched
+from armloop.util.errors import InputError
 
 
 def find_models(place: str | Path) -> dict[str, Path]:

@@ -16,8 +16,6 @@ from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import Units, unit_edges
 from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, order=True)
 class Head:

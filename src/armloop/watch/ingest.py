@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from armloop.errors import InputError
 from armloop.monitoring.sums import log_sums
-from armloop.progress import Progress, paced, silent
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress, paced, silent
+from armloop.util.workers import Workers
 from armloop.watch.fleet import model_and_digest, model_for
 from armloop.watch.sources import LogFile, arm_in, day_of, read_recording
 from armloop.watch.store import Store
-from armloop.workers import Workers
 
 #: Logs of one arm that a worker takes at a time, in order.
 _AT_ONCE = 16

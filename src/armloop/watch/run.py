@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from armloop.progress import Progress, paced, silent
+from armloop.util.progress import Progress, paced, silent
+from armloop.util.workers import Cluster, Processes, Serial, Workers
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.ingest import Counts, ingest
 from armloop.watch.sources import LogFile
 from armloop.watch.store import Store
 from armloop.watch.verdicts import Task, test_arm
-from armloop.workers import Cluster, Processes, Serial, Workers
 
 SCHEMA = "armloop/watch/1"
 

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 from armloop.monitoring.alarms import Alarm, Reached
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.units import Units
+from armloop.util.arrays import Array
 from armloop.watch.history import Head, History
 from armloop.watch.store import Store, lists, matrix, placing
-
-Array = NDArray[np.float64]
 
 _VECTORS = ("when", "seconds", "since_start")
 _MATRICES = ("moment", "size", "rows", "energy", "torque", "temperature")

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError, LogError
-from armloop.log import MotionLog, read_log
+from armloop.data.log import MotionLog, read_log
+from armloop.data.tables import CSV, PARQUET, read_columns, read_header
 from armloop.model import ReconstructedModel
-from armloop.tables import CSV, PARQUET, read_columns, read_header
+from armloop.util.errors import InputError, LogError
 
 Array = NDArray[np.float64]
 

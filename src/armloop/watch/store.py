@@ -26,12 +26,10 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.errors import InputError
 from armloop.monitoring.sums import LogSums
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 
 SCHEMA = "armloop/watch/1"
 PER_JOINT = ("rows", "mean", "energy", "lagged", "torque", "speed", "load", "temperature")
@@ -188,7 +186,7 @@ def placing(path: Path) -> Iterator[Path]:
     """A draft that takes its place when the block ends well.
 
     All below a store is the store's own, and its bytes must not depend on the order of writing: the marks and records
-    by which :mod:`armloop.outputs` knows a command's outputs have no place here.
+    by which :mod:`armloop.util.outputs` knows a command's outputs have no place here.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")

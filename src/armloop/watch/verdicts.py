@@ -10,11 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
-from armloop.errors import InputError
-from armloop.log import MotionLog
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
 from armloop.monitoring.catalogue import Column
@@ -23,13 +21,13 @@ from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import FRICTION, Adjusted, adjust, without_warmth
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 from armloop.watch.fleet import model_and_digest
 from armloop.watch.history import Head, History
 from armloop.watch.running import Last, Running, stored
 from armloop.watch.sources import LogFile, read_recording
 from armloop.watch.store import Store
-
-Array = NDArray[np.float64]
 
 #: Healthy units before a change whose normal equations say what was there before, and seconds of logs that are diagnosed.
 _BEFORE, _DIAGNOSED = 40, 150.0

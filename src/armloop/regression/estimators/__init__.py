@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.registry import Registry
 from armloop.regression.estimators.adaptive_lasso import adaptive_lasso
 from armloop.regression.estimators.debiased_lasso import debiased_lasso
 from armloop.regression.estimators.estimator import Estimator, check_estimator
@@ -22,6 +21,7 @@ from armloop.regression.estimators.sr3 import sr3
 from armloop.regression.estimators.stability import stability
 from armloop.regression.estimators.stlsq import stlsq
 from armloop.regression.estimators.thresholded import thresholded
+from armloop.util.registry import Registry
 
 __all__ = ["LISTED", "REGISTRY", "Estimator", "Problem", "Reduction", "register_estimator"]
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.lasso import lasso
 from armloop.regression.estimators.problem import Problem
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 def adaptive_lasso(problem: Problem) -> Array:

@@ -7,12 +7,10 @@ squares itself wherever there are more samples than columns, as there are here.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.lasso import lasso
 from armloop.regression.estimators.problem import Problem
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 def debiased_lasso(problem: Problem) -> Array:

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.errors import InputError
 from armloop.regression.estimators.problem import Problem
+from armloop.util.errors import InputError
 
 
 class Estimator:

@@ -17,14 +17,12 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.lasso import path
 from armloop.regression.estimators.problem import Problem
 from armloop.regression.moments import DEPENDENT, Moments
+from armloop.util.arrays import Array, Index
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Move = tuple[float, Index]
 
 #: Columns that an exchange considers: those that alone regain most of what the removed terms explained.

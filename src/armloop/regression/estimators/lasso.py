@@ -10,14 +10,12 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import lars_path_gram
 
 from armloop.regression.estimators.problem import Problem, halves
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: λ below which the path ends; the noise of a torque signal lies far above.
 _LAST = 1e-5

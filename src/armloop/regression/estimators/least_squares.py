@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armloop.regression.estimators.problem import Problem
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 
 def least_squares(problem: Problem) -> Array:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _RIDGE = 1e-13
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.lasso import path
 from armloop.regression.estimators.problem import Problem
 from armloop.regression.moments import Moments, total
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _PAIRS = 25
 _AGREEMENT = 0.9

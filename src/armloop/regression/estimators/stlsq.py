@@ -5,15 +5,13 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.problem import Problem
 from armloop.regression.estimators.rooted import rooted
 from armloop.regression.estimators.thresholded import THRESHOLDS
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _RIDGE = 1e-9
 _MOST_ITERATIONS = 100

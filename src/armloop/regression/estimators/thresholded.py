@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.problem import Problem
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Thresholds tried, as shares of the signal's root mean square.
 THRESHOLDS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2)

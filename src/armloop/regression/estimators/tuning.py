@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.estimators.problem import Problem, halves
 from armloop.regression.moments import Moments
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: Coefficients (p,) of moments at one value of the penalty; ArithmeticError where the solver finds none.
 Fit = Callable[[Moments, float], Array]

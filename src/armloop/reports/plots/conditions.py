@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from armloop.conditions import Clusters, Condition
+from armloop.data.regimes import Clusters, Condition
 from armloop.reports.plots.style import BLUE, CONDITIONS, INK, SURFACE, every, figure, legend, panels, polish
 from armloop.reports.words import counted
 

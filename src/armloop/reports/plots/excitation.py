@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, legend, panels, polish
 
 if TYPE_CHECKING:
-    from armloop.design import DataRatio, Excitation
+    from armloop.experiment.design import DataRatio, Excitation
 
 
 def reference_figure(result: Excitation) -> Figure:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.motion import Motion, Samples
 from armloop.reports.plots.style import BLUE, MUTED, every, figure, legend, panels, polish
 from armloop.reports.words import unit
-from armloop.signals import smooth
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 _MOST_DOTS, _COLUMNS, _SPEEDS, _POSTURES = 1500, 3, 81, 9
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armloop.reports.plots.style import BLUE, GRID, MUTED, ORANGE, figure, legend, panels, polish
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.tuned_loop import TunedLoop, Tuning
+    from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning
 
 
 def _both(tuning: Tuning) -> Iterator[tuple[str, str, TunedLoop]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from armloop.reconstruction import StepReport
+from armloop.identification.reconstruction import StepReport
 from armloop.reports.plots.style import BLUE, INK, MUTED, figure, panels, polish
 from armloop.reports.words import percent
 
@@ -19,10 +19,10 @@ def has_trials(reports: Sequence[StepReport]) -> bool:
     return any(report.trials for report in reports)
 
 
-def orders_figure(reports: Sequence[StepReport], baseline: Sequence[StepReport] = ()) -> Figure:
+def orders_figure(reports: Sequence[StepReport], reference: Sequence[StepReport] = ()) -> Figure:
     """One panel per search for orders: error on held-out blocks, the chosen order marked.
 
-    Steps regressed together share one search and one panel; ``baseline`` adds the one-shot method's.
+    Steps regressed together share one search and one panel; ``reference`` adds the one-shot method's.
     """
     searches: dict[str, tuple[str, StepReport]] = {}
     for report in reports:
@@ -34,7 +34,7 @@ def orders_figure(reports: Sequence[StepReport], baseline: Sequence[StepReport] 
                 else f"Step {_ROMAN[report.step]}"
             )
             searches[key] = (name, report)
-    shown = [*searches.values(), *(("One-shot SINDy", report) for report in baseline[:1] if report.trials)]
+    shown = [*searches.values(), *(("One-shot SINDy", report) for report in reference[:1] if report.trials)]
     made = figure(max(4.6, 3.3 * len(shown)), 3.3)
     row = panels(made, 1, len(shown), legend_row=False)[0]
     for axes, (name, report) in zip(row, shown, strict=True):

@@ -27,8 +27,8 @@ from armloop.reports.plots.style import (
 )
 from armloop.reports.residuals import held_out_residuals, joint_load, moving_joints, time_axis
 from armloop.reports.words import unit
+from armloop.util.arrays import Array
 
-Array = NDArray[np.float64]
 Series = list[tuple[Array, str, str]]
 
 _MOST_DOTS = 900

@@ -9,12 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
-from numpy.typing import NDArray
 
 from armloop.reports.plots.style import BLUE, GRID, INK, MUTED, SURFACE, thin
 from armloop.reports.words import number
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 # All lengths in inches, the figure's own unit.
 _WIDTH, _HEIGHT = 12.8, 6.9

@@ -10,7 +10,7 @@ from armloop.reports.plots.style import controller_colors, figure, panels, polis
 from armloop.reports.words import controller
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.wear import WearResult
+    from armloop.drake.experiments.wear import WearResult
 
 
 def spread_figure(result: WearResult) -> Figure:

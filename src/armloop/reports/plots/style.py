@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
+
 Grid = Literal["both", "x", "y"]
 
 INK, MUTED, GRID, SURFACE = "#1b2430", "#5d6877", "#e3e7ec", "#fefefe"

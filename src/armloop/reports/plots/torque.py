@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from armloop.data.motion import Samples
+from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.motion import Samples
 from armloop.reports.plots.style import GRID, MUTED, STEPS, figure, legend, panels, polish, thin
 from armloop.reports.words import unit
-from armloop.signals import smooth
 
 _ROMAN = {1: "I", 2: "II", 3: "III"}
 

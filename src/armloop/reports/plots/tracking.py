@@ -24,7 +24,7 @@ from armloop.reports.plots.style import (
 from armloop.reports.words import controller, number
 
 if TYPE_CHECKING:
-    from armloop.drake_systems.tracking import TrackingResult
+    from armloop.drake.experiments.tracking import TrackingResult
 
 #: From so many joints on, joints are rows instead of columns.
 _MANY_JOINTS = 5

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60

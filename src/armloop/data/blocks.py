@@ -1,0 +1,73 @@
+"""Blocks of consecutive samples: the unit in which data are held out, because residuals are autocorrelated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Motion, Samples
+
+
+def block_numbers(
+    motion: Motion, seconds: float, spans: NDArray[np.float64] | None = None
+) -> NDArray[np.intp]:
+    """(N,) number of the block each sample lies in: runs, cut into pieces of at most ``seconds``.
+
+    Args:
+        spans: (R, 2) first and last instant of what is cut, where the runs' ends were trimmed by a filter: so every
+            filter has its samples in the same blocks. The runs themselves by default.
+    """
+    numbers = np.zeros(motion.samples, dtype=np.intp)
+    following = 0
+    runs = motion.runs()
+    ends = [motion.time[[run.start, run.stop - 1]] for run in runs] if spans is None else spans
+    for run, (begin, end) in zip(runs, ends, strict=True):
+        elapsed, whole = motion.time[run] - begin, float(end - begin)
+        # A sample on the edge of two blocks lies in the later one, however the stamps are rounded.
+        rounding = max(1e-9, 4 * float(np.spacing(max(abs(begin), abs(end)))))
+        pieces = max(1, int(np.ceil((whole + rounding) / seconds)))
+        length = max(whole, 1e-12) / pieces
+        numbers[run] = following + np.minimum(((elapsed + rounding) / length).astype(int), pieces - 1)
+        following += pieces
+    return numbers
+
+
+def folds(samples: Samples, count: int, seconds: float) -> NDArray[np.intp]:
+    """(N,) fold of each sample: blocks dealt out in turn, so that every fold sees all parts of the data."""
+    return block_numbers(samples.motion, seconds, samples.spans) % count
+
+
+def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray[np.float64]:
+    """(B,) sums of values (N,) over the blocks that occur, in order."""
+    _, index = np.unique(blocks, return_inverse=True)
+    return np.asarray(np.bincount(index, weights=values), dtype=float)
+
+
+def overlapping(samples: Samples, size: int, margin: float) -> Iterator[tuple[Samples, slice, int]]:
+    """Consecutive samples, some at a time, with what lies beside them (overlap-save): what a filter mixes is complete.
+
+    Args:
+        size: samples at a time.
+        margin: seconds beside them.
+
+    Yields:
+        The samples with their margins, the part of them that counts, and the number of its first sample.
+    """
+    N = samples.motion.samples
+    beside = int(np.ceil(margin / samples.period))
+    for start in range(0, N, size):
+        stop = min(start + size, N)
+        low, high = max(0, start - beside), min(N, stop + beside)
+        yield stretch(samples, low, high), slice(start - low, stop - low), start
+
+
+def stretch(samples: Samples, low: int, high: int) -> Samples:
+    """Samples from one number up to another; spans, which belong to whole runs, are left out."""
+    motion, cut = samples.motion, slice(low, high)
+    inner = motion.starts[(motion.starts > low) & (motion.starts < high)] - low
+    part = Motion(
+        motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
+    )
+    return Samples(part, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz)

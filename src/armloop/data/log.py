@@ -1,0 +1,414 @@
+"""A motion log: what was measured on an arm, one row per sample, checked at the door.
+
+`MotionLog` checks what Python gives and `read_log` what a file gives by the same rules (`armloop.data.plausibility`).
+
+The file is CSV, or Parquet with the same columns: `time,q1..qn,v1..vn,tau1..taun`, optionally `vdot1..vdotn`;
+SI units; joints numbered from 1, base to tip. Columns of any other name are left alone.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armloop.data.plausibility import Finding, Recorded, doubts, faults
+from armloop.data.tables import place, read_columns, read_header, write_columns
+from armloop.util.doubts import warn
+from armloop.util.errors import LogError
+
+TAU_UNITS = ("N*m", "A")
+GAP_PERIODS = 10.0
+"""A pause longer than this many median sample periods starts a new run."""
+FEWEST_SAMPLES = 20
+"""Fewer rows than this are no motion: filters and derivatives need more."""
+
+_JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
+# Logs that share more of the shorter one's rows are one measurement: an arm at rest may repeat a row, a motion not.
+_SHARED_ROWS = 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionLog:
+    """What was measured on an arm of `n` joints at `N` instants.
+
+    time : (N,) seconds, strictly rising
+    q, v : (N, n) measured rad, rad/s (m, m/s for a prismatic joint)
+    tau : (N, n) measured generalized force in `tau_unit` (N*m stands for N on a prismatic joint)
+    vdot : (N, n) rad/s^2 (m/s^2), or None when the file has none
+    name : what to call the log, the file's stem
+    tau_unit : "N*m", or "A" for motor current
+    v_derived : v was not measured; it is the derivative of q (see `from_arrays`)
+
+    Lists are converted. Raises `LogError`, one line that names the log, the column and the row, for shapes that do
+    not agree, numbers that are not finite, time that does not rise and what no arm can have done: degrees, spikes,
+    a v that is not the rate of q.
+    """
+
+    time: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    vdot: NDArray[np.float64] | None = None
+    name: str = "log"
+    tau_unit: str = "N*m"
+    v_derived: bool = False
+
+    def __post_init__(self) -> None:
+        if self.tau_unit not in TAU_UNITS:
+            raise LogError(
+                f"{self.name}: tau unit {self.tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}"
+            )
+        for key in ("time", "q", "v", "tau", "vdot"):
+            if key != "vdot" or self.vdot is not None:
+                object.__setattr__(self, key, _numbers(getattr(self, key), key, self.name))
+        if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
+            raise LogError(
+                f"{self.name}: time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}"
+            )
+        if 0 in self.q.shape:
+            raise LogError(f"{self.name}: q is {self.q.shape}; a log has samples and joints")
+        for label, values in (("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
+            if values is not None and values.shape != self.q.shape:
+                raise LogError(
+                    f"{self.name}: {label} must have the shape of q, {self.q.shape}; it is {values.shape}"
+                )
+        for key in ("time", "q", "v", "tau", "vdot"):
+            values = getattr(self, key)
+            if values is not None and not np.isfinite(values).all():
+                row, *column = np.argwhere(~np.isfinite(values))[0]
+                raise LogError(
+                    f"{self.name}: {key}{f' of joint {column[0] + 1}' if column else ''}, row {row + 1}: "
+                    f"{values[row, *column]} is not a finite number; correct it or drop the row"
+                )
+        _check(self, self.name, lambda row: f"row {row + 1}")
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        v: ArrayLike | None = None,
+        vdot: ArrayLike | None = None,
+        *,
+        name: str = "log",
+        tau_unit: str = "N*m",
+    ) -> "MotionLog":
+        """Make a log of anything that can be an array; where there is no v, q is differentiated, run by run.
+
+        What is doubtful is said as `armloop.util.errors.InputWarning`. Raises `LogError` as the class does.
+        """
+        seconds, positions = _numbers(time, "time", name), _numbers(q, "q", name)
+        rates = differentiated(seconds, positions, name) if v is None else _numbers(v, "v", name)
+        log = cls(seconds, positions, rates, np.asarray(tau), vdot, name, tau_unit, v is None)  # type: ignore[arg-type]
+        _say_doubts(log)
+        return log
+
+    @classmethod
+    def from_frame(
+        cls, frame: Any, *, joints: int | None = None, name: str = "log", tau_unit: str = "N*m"
+    ) -> "MotionLog":
+        """Make a log of a data frame (pandas, polars, pyarrow) with the columns of a file: `time,q1..,v1..,tau1..`.
+
+        joints : how many joints the arm has; None takes what the frame has. v may be missing: see `from_arrays`
+
+        Raises `LogError` when columns are missing, and as the class does.
+        """
+        header = [str(column) for column in getattr(frame, "column_names", frame.columns)]
+        n, _ = _columns(Path(name), header)
+        if joints is not None and n != joints:
+            raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
+        kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
+        cells = {
+            kind: np.stack(
+                [_numbers(frame[f"{kind}{j}"], f"{kind}{j}", name) for j in range(1, n + 1)], axis=1
+            )
+            for kind in kinds
+        }
+        return cls.from_arrays(
+            _numbers(frame["time"], "time", name),
+            cells["q"],
+            cells["tau"],
+            cells.get("v"),
+            cells.get("vdot"),
+            name=name,
+            tau_unit=tau_unit,
+        )
+
+    def __repr__(self) -> str:
+        runs, seconds = len(self.runs()), float(self.time[-1] - self.time[0])
+        return (
+            f"<armloop.MotionLog {self.name}: {self.q.shape[1]} joints, {self.samples} samples in {runs} "
+            f"{'run' if runs == 1 else 'runs'}, {seconds:.4g} s, tau in {self.tau_unit}>"
+        )
+
+    @property
+    def samples(self) -> int:
+        """The number of samples N."""
+        return len(self.time)
+
+    @property
+    def joints(self) -> int:
+        """The number of joints n."""
+        return self.q.shape[1]
+
+    @property
+    def period(self) -> float:
+        """The median time between samples in seconds."""
+        return float(np.median(np.diff(self.time)))
+
+    def runs(self) -> list[slice]:
+        """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
+        return _runs(self.time)
+
+    def doubts(self) -> list[str]:
+        """Return what may be right and should be known before the log is relied on, one line each."""
+        return [f"{found.columns} {found.text}" for found in doubts(_recorded(self))]
+
+    def rows_digest(self) -> NDArray[np.uint64]:
+        """(N,) a number for each row's q, v and tau, the same for the same digits: equal rows are found by it."""
+        mixed = np.full(self.samples, 0x9E3779B97F4A7C15, dtype=np.uint64)
+        for values in (self.q, *(() if self.v_derived else (self.v,)), self.tau):
+            for column in (values + 0.0).T:  # -0.0 is 0.0
+                mixed = (mixed ^ np.ascontiguousarray(column).view(np.uint64)) * np.uint64(0xFF51AFD7ED558CCD)
+                mixed ^= mixed >> np.uint64(33)
+        return mixed
+
+    def read(self) -> "MotionLog":
+        """Return the log itself: in memory it is its own source (see `armloop.data.pieces`)."""
+        return self
+
+    def select(self, rows: slice | NDArray[np.bool_]) -> "MotionLog":
+        """Return the log of these samples only; a slice gives views."""
+        cut = {
+            key: None if getattr(self, key) is None else getattr(self, key)[rows]
+            for key in ("time", "q", "v", "tau", "vdot")
+        }
+        return unchecked_log(**cut, name=self.name, tau_unit=self.tau_unit, v_derived=self.v_derived)
+
+
+def read_log(
+    path: str | Path,
+    *,
+    joints: int | None = None,
+    tau_unit: str = "N*m",
+    drive_gains: ArrayLike | None = None,
+    rows: tuple[int, int] | None = None,
+    quiet: bool = False,
+) -> MotionLog:
+    """Read a motion log and check that it is one.
+
+    joints : how many joints the arm has; None takes what the file has
+    tau_unit : what the columns `tau` hold, "N*m" or "A"
+    drive_gains : (n,) N*m/A (N/A); `tau` is multiplied by them and the log's unit is "N*m"
+    rows : first row and the one after the last, counted from 0, of a Parquet file; None reads all
+    quiet : do not say what is doubtful (`armloop.util.errors.InputWarning`)
+
+    Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
+    """
+    path = Path(path)
+    if tau_unit not in TAU_UNITS:
+        raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
+    n, _ = check_header(path, joints)
+    gains = None if drive_gains is None else _check_gains(path, drive_gains, n)
+
+    header = read_header(path)
+    kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
+    names = ["time", *(f"{kind}{j}" for kind in kinds for j in range(1, n + 1))]
+    table = read_columns(path, names, rows)
+    stacked = {kind: np.stack([table[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in kinds}
+    time, first = table["time"], rows[0] if rows else 0
+    if len(time) < FEWEST_SAMPLES:
+        raise LogError(f"{path}: {len(time)} rows; a motion log has at least {FEWEST_SAMPLES}")
+    derived = "v" not in kinds
+    if derived:
+        _check_time(time, str(path), lambda row: place(path, first + row))
+        stacked["v"] = differentiated(time, stacked["q"], str(path))
+    log = unchecked_log(time=time, **stacked, name=path.stem, tau_unit=tau_unit, v_derived=derived)
+    check_log(path, log, first)
+    if not quiet:
+        _say_doubts(log, str(path))
+    if gains is None:
+        return log
+    return unchecked_log(**{**vars(log), "tau": log.tau * gains, "tau_unit": "N*m"})
+
+
+def write_log(path: str | Path, log: MotionLog) -> None:
+    """Write a log as CSV or Parquet, by its suffix, whole or not at all; `read_log` gives it back exactly.
+
+    Raises `LogError` for another suffix and `InputError` when the place cannot be written to.
+    """
+    columns = {"time": log.time}
+    for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
+        if values is not None and not (kind == "v" and log.v_derived):
+            columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
+    write_columns(Path(path), columns)
+
+
+def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
+    """Raise `LogError` unless the samples are a motion that an arm can have made.
+
+    path : where the samples come from, for the message
+    first : the row of the file that the first sample stands in, counted from 0
+    """
+    _check(log, str(path), lambda row: place(path, first + row))
+
+
+def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
+    """Return the number of joints of a file and whether accelerations are there, from its header alone.
+
+    joints : how many joints the arm has; None takes what the file has
+
+    Raises `LogError` when the file is missing or its columns are not those of a log.
+    """
+    n, has_vdot = _columns(path, read_header(path))
+    if joints is not None and n != joints:
+        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
+    return n, has_vdot
+
+
+def _columns(path: Path, header: Sequence[str]) -> tuple[int, bool]:
+    if len(header) == 1 and re.search(r"[;\t ]", header[0]):
+        raise LogError(f"{path}: the header is one column, {header[0][:40]!r}; put commas between the names")
+    found: dict[str, set[int]] = {"q": set(), "v": set(), "tau": set(), "vdot": set()}
+    for name in header:
+        match = _JOINT_COLUMN.fullmatch(name)
+        if match is None and name != "time":
+            continue
+        if header.count(name) > 1:
+            raise LogError(f"{path}: column {name} stands {header.count(name)} times; each must stand once")
+        if match is not None:
+            kind, number = match[1], int(match[2])
+            if name != f"{kind}{number}" or number == 0:
+                raise LogError(
+                    f"{path}: column {name}: joints are numbered {kind}1, {kind}2, ... from the base"
+                )
+            found[kind].add(number)
+    n = max((number for numbers in found.values() for number in numbers), default=1)
+    # A header without any q is none: v may be missing only where it can be differentiated.
+    kinds = [
+        "q",
+        *(["v"] if found["v"] or not found["q"] else []),
+        "tau",
+        *(["vdot"] if found["vdot"] else []),
+    ]
+    missing = [] if "time" in header else ["time"]
+    missing += [f"{kind}{j}" for kind in kinds for j in range(1, n + 1) if j not in found[kind]]
+    if missing:
+        raise LogError(
+            f"{path}: the header lacks {_listed(missing)}; "
+            "it must be time,q1..qn,v1..vn,tau1..taun (optionally vdot1..vdotn; v may be left out) with one n"
+        )
+    return n, bool(found["vdot"])
+
+
+def _listed(names: Sequence[str], most: int = 6) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float64]:
+    gains = np.asarray(drive_gains, dtype=np.float64).reshape(-1)
+    if len(gains) != n:
+        raise LogError(f"{path}: {len(gains)} drive gains for {n} joints; give one per joint, in N*m/A")
+    for j, gain in enumerate(gains, start=1):
+        if not (np.isfinite(gain) and gain > 0):
+            raise LogError(f"{path}: drive gain {j} is {gain:g}; it must be a positive number of N*m/A")
+    return gains
+
+
+def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """(N, n) rates of q by central differences within each run; a run of one sample has none.
+
+    Raises `LogError` when time and q do not fit together or time does not rise.
+    """
+    if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
+        raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
+    _check_time(time, name, lambda row: f"row {row + 1}")
+    v = np.zeros_like(q)
+    for run in _runs(time):
+        if run.stop - run.start > 1:
+            v[run] = np.gradient(q[run], time[run], axis=0)
+    return v
+
+
+def require_different(logs: Sequence[MotionLog]) -> None:
+    """Raise `LogError` where two logs hold the same measurement, whole or for the most part, whatever their times.
+
+    What is left out of a regression must not be in it under another name, and nothing counts twice.
+    """
+    digests = [np.unique(log.rows_digest()) for log in logs]
+    for k, log in enumerate(logs):
+        for j, other in enumerate(logs[:k]):
+            if _mostly_shared(digests[j], digests[k]):
+                raise LogError(
+                    f"{log.name}: holds the measurement of {other.name} once more; give each measurement once"
+                )
+
+
+def same_measurement(one: MotionLog, other: MotionLog) -> bool:
+    """Whether more than half of the shorter log's rows are in the other, to the last digit, whatever the times."""
+    return _mostly_shared(np.unique(one.rows_digest()), np.unique(other.rows_digest()))
+
+
+def _mostly_shared(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> bool:
+    shared = len(np.intersect1d(first, second, assume_unique=True))
+    return shared > _SHARED_ROWS * min(len(first), len(second))
+
+
+def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
+    """The values as an array of floating-point numbers; raises `LogError` where they are none."""
+    try:
+        numbers = np.asarray(values)
+        if numbers.dtype.kind not in "fiu":
+            raise ValueError(f"it holds {numbers.dtype}")
+        return np.asarray(numbers, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]})") from error
+
+
+def unchecked_log(**values: Any) -> MotionLog:
+    """A log of arrays that have been checked, are part of a log, or will be (`check_log`)."""
+    log = object.__new__(MotionLog)
+    for field in fields(MotionLog):
+        object.__setattr__(log, field.name, values.get(field.name, field.default))
+    return log
+
+
+def _runs(time: NDArray[np.float64]) -> list[slice]:
+    steps = np.diff(time)
+    gaps = np.flatnonzero(steps > GAP_PERIODS * np.median(steps)) if len(steps) else steps[:0]
+    edges = [0, *(int(gap) + 1 for gap in gaps), len(time)]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def _recorded(log: MotionLog) -> Recorded:
+    return Recorded(log.time, log.q, log.v, log.tau, log.vdot, log.runs(), log.v_derived)
+
+
+def _check(log: MotionLog, label: str, place: Callable[[int], str]) -> None:
+    """Raise `LogError` for time that does not rise and for the first thing that no arm can have done."""
+    _check_time(log.time, label, place)
+    found: Finding | None = next(faults(_recorded(log)), None)
+    if found is not None:
+        where = "" if found.row is None else f", {place(found.row)}"
+        raise LogError(f"{label}: {found.columns}{where} {found.text}")
+
+
+def _say_doubts(log: MotionLog, label: str | None = None) -> None:
+    for doubt in log.doubts():
+        warn(f"{label or log.name}: {doubt}")
+
+
+def _check_time(time: NDArray[np.float64], label: str, place: Callable[[int], str]) -> None:
+    late = np.flatnonzero(np.diff(time) <= 0)
+    if len(late):
+        row = int(late[0]) + 1
+        raise LogError(
+            f"{label}: column time, {place(row)}: {time[row]:.9g} follows {time[row - 1]:.9g}; "
+            "time must rise strictly from row to row"
+        )

@@ -1,0 +1,114 @@
+"""A motion and its measured forces as plain arrays: what all numerics take in.
+
+`Motion` is kinematics only and serves prediction; `Samples` adds the forces and serves regression.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Positions, velocities and accelerations of `n` joints at `N` instants, in `R` runs without gaps.
+
+    time : (N,) seconds
+    q, v, vdot : (N, n) rad, rad/s, rad/s^2 (m, m/s, m/s^2 for a prismatic joint)
+    starts : (R,) index of the first sample of each run; `starts[0] == 0`
+
+    Raises `ValueError` when the shapes do not agree.
+    """
+
+    time: NDArray[np.float64]
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+    vdot: NDArray[np.float64]
+    starts: NDArray[np.intp]
+
+    def __post_init__(self) -> None:
+        if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
+            raise ValueError(f"time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}")
+        if self.v.shape != self.q.shape or self.vdot.shape != self.q.shape:
+            raise ValueError(
+                "q, v and vdot must have one shape; "
+                f"they are {self.q.shape}, {self.v.shape}, {self.vdot.shape}"
+            )
+        if len(self.starts) == 0 or self.starts[0] != 0:
+            raise ValueError("starts must begin with 0, the first sample of the first run")
+
+    @property
+    def samples(self) -> int:
+        """The number of samples N."""
+        return len(self.time)
+
+    @property
+    def joints(self) -> int:
+        """The number of joints n."""
+        return self.q.shape[1]
+
+    @property
+    def period(self) -> float:
+        """The usual time between samples in seconds, free of the stamps' rounding; 0 for a single sample."""
+        steps = np.diff(self.time)
+        median = np.median(steps) if len(steps) else 0.0
+        usual = np.abs(steps - median) <= 1e-2 * median
+        return float(steps[usual].mean()) if usual.any() else float(median)
+
+    def elapsed(self) -> NDArray[np.float64]:
+        """(N,) seconds since the start of each sample's log.
+
+        Runs whose clock goes on belong to one log; a clock that goes back is another's.
+        """
+        steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
+        first = np.concatenate([[0], self.starts[1:][steps <= 0]]).astype(np.intp)
+        lengths = np.diff(np.append(first, self.samples))
+        return np.asarray(self.time - np.repeat(self.time[first], lengths))
+
+    def runs(self) -> list[slice]:
+        """Return the samples of each run as a slice, in order."""
+        ends = [*self.starts[1:], self.samples]
+        return [slice(int(first), int(last)) for first, last in zip(self.starts, ends, strict=True)]
+
+
+def filter_reach(cutoff_hz: float) -> float:
+    """Seconds to either side over which a low-pass of this corner smears a step: half a period of it; 0 without one.
+
+    It is the correlation time of what has passed the filter, too.
+    """
+    return 0.5 / cutoff_hz if cutoff_hz > 0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A motion with its measured generalized forces.
+
+    motion : the kinematics, N samples of n joints
+    tau : (N, n) N*m (N for a prismatic joint)
+    moving : (N, n) true where joint j slides, that is |v_j| is above the dead zone of its velocity noise
+    period : the sample period in seconds
+    cutoff_hz : corner of the low-pass that tau and the motion have passed; 0 where there was none
+    spans : (R, 2) first and last instant of the recorded run that each run of the motion was cut from; None where
+        the runs are as they were recorded
+
+    Raises `ValueError` when the shapes do not agree.
+    """
+
+    motion: Motion
+    tau: NDArray[np.float64]
+    moving: NDArray[np.bool_]
+    period: float
+    cutoff_hz: float = 0.0
+    spans: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:
+            raise ValueError(
+                f"tau and moving must have the shape of q, {self.motion.q.shape}; "
+                f"they are {self.tau.shape}, {self.moving.shape}"
+            )
+
+    @property
+    def reach(self) -> float:
+        """Seconds to either side over which the samples' low-pass smears a step."""
+        return filter_reach(self.cutoff_hz)

@@ -1,0 +1,273 @@
+"""Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter, one differentiation.
+
+Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
+motion it belongs to stay together in time; runs are treated one by one, never across a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.log import FEWEST_SAMPLES, MotionLog
+from armloop.data.motion import Motion, Samples, filter_reach
+from armloop.util.arrays import Array
+from armloop.util.errors import LogError
+
+
+@dataclass(frozen=True)
+class Conditioning:
+    """How a log is prepared; kept in the model file, so that later logs are prepared alike.
+
+    Attributes:
+        cutoff_hz: corner of the zero-phase Butterworth low-pass (order 4, run both ways); 0 leaves the
+            samples as they are (for inverse-dynamics samples that are no time series).
+        oversampling: samples kept per period of the corner frequency; where a direction reverses, friction
+            steps, and on a coarse grid the step would lie up to half a sample off.
+        dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
+        smear: periods of the corner around a standstill in which a joint does not count as moving, because
+            the filter smears the torque of the standstill that far.
+
+    Raises:
+        ValueError: a setting is no number, or out of range.
+    """
+
+    cutoff_hz: float = 10.0
+    oversampling: float = 25.0
+    dead_zone: float = 4.0
+    smear: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name, value in self.to_dict().items():
+            if not isinstance(value, int | float) or not 0 <= value < np.inf:
+                raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
+        if self.oversampling == 0:
+            raise ValueError("oversampling must be positive")
+
+    @property
+    def reach(self) -> float:
+        """Seconds to either side over which the low-pass smears a step."""
+        return filter_reach(self.cutoff_hz)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return asdict(self)
+
+
+class ShortRunError(LogError):
+    """No run of a log is long enough for the filter."""
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Zero-phase Butterworth low-pass of order 4 on a uniform grid of ``period`` seconds."""
+
+    cutoff_hz: float
+    period: float
+
+    def __call__(self, x: Array) -> Array:
+        """Filter (N, ...) along the first axis; runs shorter than the padding get a shorter padding."""
+        if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period or len(x) == 0:
+            return x
+        # Here, for scipy's signals take longer to import than a fault of the input to be told.
+        from scipy.signal import sosfilt
+
+        # As scipy's sosfiltfilt does it, to the bit, but for the initial state: that takes longer than a short run.
+        sos, state = _sections(self.cutoff_hz, self.period)
+        state = state.reshape(*state.shape, *[1] * (x.ndim - 1))
+        pad = min(len(x) - 1, at_least(1.5 / (self.cutoff_hz * self.period)))
+        before, after = 2 * x[:1] - x[pad:0:-1], 2 * x[-1:] - x[-2 : -(pad + 2) : -1]
+        y = np.concatenate([before, x, after])
+        for _ in range(2):
+            y = sosfilt(sos, y, axis=0, zi=state * y[:1])[0][::-1]
+        return np.asarray(y[pad : pad + len(x)])
+
+    def each(self, x: Array, runs: Sequence[slice]) -> Array:
+        """Filter runs of x (N, ...) one by one, those of equal length at a time; the rest of x stays as it is."""
+        if self.cutoff_hz <= 0:
+            return x
+        equal: dict[int, list[slice]] = {}
+        for run in runs:
+            equal.setdefault(run.stop - run.start, []).append(run)
+        filtered = np.array(x, dtype=float)
+        for some in equal.values():
+            together = self(np.stack([x[run] for run in some], axis=1))
+            for k, run in enumerate(some):
+                filtered[run] = together[:, k]
+        return filtered
+
+
+@lru_cache(maxsize=16)
+def _sections(cutoff_hz: float, period: float) -> tuple[Array, Array]:
+    """The filter's second-order sections (2, 6), and their state (2, 2) after a step that was always there."""
+    from scipy.signal import butter, sosfilt_zi
+
+    sos = np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
+    return sos, np.asarray(sosfilt_zi(sos))
+
+
+def uniform_period(time: Array) -> float:
+    """The mean sample period of a run of at least two samples, s.
+
+    A median of the steps would carry their rounding, which counts where stamps are seconds since 1970.
+    """
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def at_least(count: float) -> int:
+    """The whole number not below ``count``, but for rounding: periods come from stamps that were rounded."""
+    return int(np.ceil(count - 1e-6))
+
+
+def derivative(x: Array, period: float) -> Array:
+    """Central difference along the first axis (second order at the ends)."""
+    return np.gradient(x, period, axis=0, edge_order=2)
+
+
+def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
+    """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
+
+    Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
+    ``oversampling`` samples per period of the corner. Half a period of the corner is cut at both ends.
+    ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
+
+    Args:
+        noise: (n,) of :func:`velocity_noise`, where it is known from more logs than these.
+
+    Returns:
+        The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
+        the corner of any instant at which the joint is inside its dead zone.
+
+    Raises:
+        ShortRunError: no run is long enough for the filter.
+    """
+    if how.cutoff_hz <= 0:
+        return _as_they_are(logs)
+    if noise is None:
+        noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
+    parts, spans = [], []
+    for log in logs:
+        for run in log.runs():
+            part = _condition_run(log.select(run), how, how.dead_zone * noise)
+            if part is not None:
+                parts.append(part)
+                spans.append(log.time[[run.start, run.stop - 1]])
+    if not parts:
+        longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
+        raise ShortRunError(
+            f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
+            f"{how.cutoff_hz:g} Hz a run must last at least {3 / how.cutoff_hz:.3g} s"
+        )
+    starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
+    time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
+    period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
+    motion = Motion(time, q, v, vdot, starts)
+    return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
+
+
+condition = preprocess  # the name before November 2026
+
+
+def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:
+    """Instants, s, that :func:`preprocess` keeps of each run that is long enough, and (R, 2) those runs' first and last."""
+    kept, spans = [], []
+    for run in log.runs():
+        time = log.time[run]
+        grid, keep = _grid(time, how)
+        if grid is not None:
+            kept.append(time[0] + grid[keep])
+            spans.append(time[[0, -1]])
+    return kept, np.array(spans).reshape(-1, 2)
+
+
+def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
+    """(n,) standard deviation of the noise that a filter of this corner leaves in v.
+
+    It is taken to be as strong below the corner as in the octave above it, where there is hardly any
+    motion; the median over the run with the most samples keeps impacts and reversals out. It is never
+    less than what rounding the recorded v leaves.
+    """
+    run = max(log.runs(), key=lambda run: run.stop - run.start)
+    v, period = log.v[run], uniform_period(log.time[run])
+    octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
+    rough = np.median(np.abs(octave), axis=0) / 0.6745
+    steps = np.abs(np.diff(v, axis=0))
+    resolution = np.min(np.where(steps > 1e-12, steps, np.inf), axis=0)
+    rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)
+    return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
+
+
+def smooth(samples: Samples, x: Array) -> Array:
+    """Pass x (N, ...) through the filter that the samples' torque has passed, run by run.
+
+    What has steps in it (friction, and every prediction that contains it) must be smeared like the
+    measured torque before the two are compared; smooth columns are hardly changed.
+    """
+    return LowPass(samples.cutoff_hz, samples.period).each(x, samples.motion.runs())
+
+
+def independent_rows(samples: Samples) -> NDArray[np.bool_]:
+    """(N,) every so many samples that four are left per period of the corner: more carry no more information."""
+    rows = np.zeros(samples.motion.samples, dtype=bool)
+    stride = 1 if samples.cutoff_hz <= 0 else max(1, int(0.25 / (samples.cutoff_hz * samples.period) + 1e-6))
+    for run in samples.motion.runs():
+        rows[run.start : run.stop : stride] = True
+    return rows
+
+
+def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple[Array, ...] | None:
+    from scipy.interpolate import CubicSpline
+    from scipy.ndimage import binary_dilation
+
+    grid, keep = _grid(log.time, how)
+    if grid is None:
+        return None
+    period = uniform_period(log.time)
+    # From the run's start: what stamps far from zero lose to rounding must not grow along the run.
+    elapsed = log.time - log.time[0]
+    resolution = 2 * float(np.spacing(np.abs(log.time[[0, -1]]).max()))
+    even = bool(np.abs(grid - elapsed).max() < 1e-3 * period + resolution)
+
+    def on_grid(x: Array) -> Array:
+        return x if even else CubicSpline(elapsed, x)(grid)
+
+    low_pass = LowPass(how.cutoff_hz, period)
+    q, v, tau = np.split(low_pass(on_grid(np.hstack([log.q, log.v, log.tau]))), 3, axis=1)
+    vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
+    still = np.abs(v) <= dead_zone
+    reach = at_least(how.smear / (how.cutoff_hz * period))
+    smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
+    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+
+
+def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:
+    """A run's uniform grid (N,), s from its start, and which of it is kept; None for a run too short for the filter."""
+    if len(time) < FEWEST_SAMPLES:
+        return None, slice(0)
+    period = uniform_period(time)
+    trim = at_least(how.reach / period)
+    if len(time) < 6 * trim:
+        return None, slice(0)
+    # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.
+    stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period) + 1e-6))
+    return period * np.arange(len(time)), slice(trim, len(time) - trim, stride)
+
+
+def _as_they_are(logs: Sequence[MotionLog]) -> Samples:
+    for log in logs:
+        if log.vdot is None:
+            raise LogError(
+                f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}"
+            )
+    q, v, vdot, tau = (
+        np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("q", "v", "vdot", "tau")
+    )
+    # Samples that are no time series are independent: a second apart, each is a block of its own to hold out.
+    time = np.arange(float(len(q)))
+    starts = np.cumsum([0] + [len(log.time) for log in logs[:-1]])
+    return Samples(Motion(time, q, v, vdot, starts), tau, np.ones_like(q, dtype=bool), 1.0)

@@ -1,0 +1,233 @@
+"""Files of named columns of numbers, CSV or Parquet by their suffix, and where exactly one is broken.
+
+pyarrow reads; only when it refuses a CSV is the text walked through again, slowly, to name the row at fault.
+Rows are counted from 1 without the header; for a CSV the line of the file is named as well.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.util.errors import LogError
+from armloop.util.files import replacing
+
+CSV, PARQUET = ".csv", ".parquet"
+#: Rows that a Parquet file keeps together: a reader of some rows has to decode no more than these.
+ROW_GROUP = 1 << 16
+# No time, position or force in SI units is as large; squares and products of what is smaller do not overflow.
+_LARGEST = 1e12
+
+
+def read_header(path: Path) -> list[str]:
+    """Return the column names of the file, stripped of blanks.
+
+    Raises `LogError` when the suffix is unknown or the file is missing, unreadable or empty.
+    """
+    _check_suffix(path)
+    if not path.exists():
+        raise LogError(f"{path}: no such file; give the path of a CSV or Parquet motion log")
+    if not path.is_file():
+        raise LogError(f"{path}: not a file; give the path of a CSV or Parquet motion log")
+    try:
+        if path.stat().st_size == 0:
+            raise LogError(f"{path}: the file is empty; the first line must name the columns")
+        names = _parquet_header(path) if path.suffix == PARQUET else next(_csv_rows(path), (0, []))[1]
+    except OSError as error:
+        raise LogError(
+            f"{path}: cannot be read ({error.strerror or error}); check its permissions"
+        ) from error
+    return [name.strip() for name in names]
+
+
+def count_rows(path: Path) -> int | None:
+    """Return the number of rows of a Parquet file, which says it in its footer; None for a CSV.
+
+    The header must have been read. Raises `LogError` when the file is not Parquet.
+    """
+    if path.suffix == CSV:
+        return None
+    import pyarrow.parquet
+
+    return int(pyarrow.parquet.read_metadata(path).num_rows)
+
+
+def read_columns(
+    path: Path, names: Sequence[str], rows: tuple[int, int] | None = None
+) -> dict[str, NDArray[np.float64]]:
+    """Return the columns `names` of a file whose header has been read and holds each of them once.
+
+    rows : first row and the one after the last, of a Parquet file only; None reads all
+
+    Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
+    not a finite number, or the first row that has too few or too many cells.
+    """
+    table = _read_parquet(path, names, rows) if path.suffix == PARQUET else _read_csv(path, names)
+    faults = {
+        name: int(np.argmin(good))
+        for name, cells in table.items()
+        if not (good := np.abs(cells) < _LARGEST).all()
+    }
+    if faults:
+        name = min(faults, key=lambda key: faults[key])
+        row = faults[name]
+        cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
+        wrong = "too large a number" if np.isfinite(table[name][row]) else "not a finite number"
+        raise LogError(
+            f"{path}: column {name}, {place(path, row + (rows[0] if rows else 0))}: {cell!r} is {wrong}; "
+            "correct it or drop the row"
+        )
+    return table
+
+
+def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write named columns as CSV or Parquet, whole or not at all; every digit survives.
+
+    Raises `LogError` for an unknown suffix and `InputError` when the place cannot be written to.
+    """
+    import pyarrow
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    _check_suffix(path)
+    table = pyarrow.table({name: np.ascontiguousarray(cells) for name, cells in columns.items()})
+    with replacing(path) as draft:
+        if path.suffix == PARQUET:
+            pyarrow.parquet.write_table(table, draft, row_group_size=ROW_GROUP)
+        else:
+            # pyarrow would put the names between quotes; the format shows them bare
+            with draft.open("wb") as sink:
+                sink.write((",".join(columns) + "\n").encode())
+                pyarrow.csv.write_csv(table, sink, pyarrow.csv.WriteOptions(include_header=False))
+
+
+def place(path: Path, row: int) -> str:
+    """Name the data row with index `row` (from 0) as a user counts it: `row 3 (line 4)`."""
+    if path.suffix != CSV:
+        return f"row {row + 1}"
+    for index, (line, _) in enumerate(_csv_rows(path), start=-1):
+        if index == row:
+            return f"row {row + 1} (line {line})"
+    return f"row {row + 1}"
+
+
+def _check_suffix(path: Path) -> None:
+    if path.suffix not in (CSV, PARQUET):
+        raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
+
+
+def _parquet_header(path: Path) -> list[str]:
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        return list(pyarrow.parquet.read_schema(path).names)
+    except pyarrow.ArrowInvalid as error:
+        raise LogError(
+            f"{path}: not a Parquet file; write it anew, or name it {CSV} if it is text"
+        ) from error
+
+
+def _read_parquet(
+    path: Path, names: Sequence[str], rows: tuple[int, int] | None
+) -> dict[str, NDArray[np.float64]]:
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        with pyarrow.parquet.ParquetFile(path, memory_map=True) as file:
+            if rows is None:
+                table = file.read(columns=list(names))
+            else:
+                ends = np.cumsum([file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)])
+                first, last = np.searchsorted(ends, [rows[0], rows[1] - 1], side="right")
+                # In a worker's process more threads only hinder.
+                table = file.read_row_groups(range(first, last + 1), columns=list(names), use_threads=False)
+                before = int(ends[first - 1]) if first else 0
+                table = table.slice(rows[0] - before, rows[1] - rows[0])
+    except (pyarrow.ArrowException, OSError) as error:
+        raise LogError(f"{path}: the Parquet data cannot be read; write the file anew") from error
+    columns = {}
+    for name in names:
+        kind = table.schema.field(name).type
+        if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
+            raise LogError(f"{path}: column {name} holds {kind}; it must hold floating-point numbers")
+        columns[name] = table[name].to_numpy().astype(np.float64)
+    return columns
+
+
+def _read_csv(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    import pyarrow
+    import pyarrow.csv
+
+    header = read_header(path)
+    # own names for the columns, so that a name that stands twice among the columns not asked for does no harm
+    wanted = {name: str(header.index(name)) for name in names}
+    try:
+        table = pyarrow.csv.read_csv(
+            path,
+            pyarrow.csv.ReadOptions(column_names=[str(index) for index in range(len(header))], skip_rows=1),
+            convert_options=pyarrow.csv.ConvertOptions(
+                include_columns=list(wanted.values()),
+                column_types=dict.fromkeys(wanted.values(), pyarrow.float64()),
+                null_values=[""],
+            ),
+        )
+    except pyarrow.ArrowInvalid as error:
+        raise _csv_fault(path, header, names, error) from error
+    return {name: table[key].to_numpy() for name, key in wanted.items()}
+
+
+def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: Exception) -> LogError:
+    """Find the first row that makes a CSV unreadable and say what is wrong with it."""
+    rows = 0
+    for row, (line, cells) in enumerate(_csv_rows(path)):
+        rows = row
+        if row == 0:
+            continue
+        if len(cells) != len(header):
+            return LogError(
+                f"{path}: row {row} (line {line}) has {len(cells)} cells; "
+                f"it must have {len(header)}, one for each name of the header"
+            )
+        for name in names:
+            cell = cells[header.index(name)]
+            if not _is_number(cell):
+                return LogError(
+                    f"{path}: column {name}, row {row} (line {line}): {cell!r} is not a number; "
+                    "write it like -0.125 or 1e-3"
+                )
+    if rows == 0:
+        return LogError(f"{path}: there are no rows below the header; a motion log has one row per sample")
+    return LogError(f"{path}: cannot be read as CSV ({cause}); write it anew with commas between the cells")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return False
+    return "_" not in cell  # Python reads 1_000 as a number, nobody else does
+
+
+def _csv_cell(path: Path, name: str, row: int) -> str:
+    rows = _csv_rows(path)
+    header = [cell.strip() for cell in next(rows)[1]]
+    for index, (_, cells) in enumerate(rows):
+        if index == row:
+            return cells[header.index(name)]
+    raise IndexError(row)
+
+
+def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line number and the cells of each row that is not blank, the header first."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as text:
+            reader = csv.reader(text)
+            for cells in reader:
+                if cells:
+                    yield reader.line_num, cells
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise LogError(f"{path}: not a text file in UTF-8; a CSV log is plain text with commas") from error

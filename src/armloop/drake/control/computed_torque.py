@@ -1,0 +1,192 @@
+"""A reconstructed model as inverse-dynamics (computed-torque) controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, Protocol
+
+import numpy as np
+from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
+
+from armloop.drake.scalar_types import scalar_template
+from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.dynamics import ModelEquations
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+FRICTION_SOURCES = ("reference", "state", "none")
+
+
+class InverseDynamicsModel(Protocol):
+    """Anything that predicts the drive torque of one state, with friction at velocities of the caller's choice."""
+
+    def feedforward(
+        self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
+    ) -> Array:
+        """Return (n,) torques at q, v, vdot (n,), friction taken at `sliding` (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class AccelerationGains:
+    """Gains (n,) on the acceleration: kp 1/s^2, kd 1/s, ki 1/s^3 (none by default).
+
+    Raises `ValueError` when they are not finite numbers of at least 0, one per joint.
+    """
+
+    kp: Array
+    kd: Array
+    ki: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.ki is None:
+            object.__setattr__(self, "ki", np.zeros_like(np.atleast_1d(np.asarray(self.kp, dtype=float))))
+        for name in ("kp", "kd", "ki"):
+            value = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
+            object.__setattr__(self, name, value)
+            if (
+                value.ndim != 1
+                or value.shape != self.kp.shape
+                or not np.isfinite(value).all()
+                or (value < 0).any()
+            ):
+                raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
+
+    @staticmethod
+    def critical(n: int, bandwidth: float = 20.0) -> AccelerationGains:
+        """Return kp = w^2, kd = 2 w for n joints: errors decay critically damped at w = `bandwidth`, rad/s."""
+        return AccelerationGains(np.full(n, bandwidth**2), np.full(n, 2 * bandwidth))
+
+
+@scalar_template("ComputedTorque_", __name__)
+def ComputedTorque_(T: type) -> Any:
+    """Return the class for one scalar type."""
+
+    class Impl(LeafSystem_[T]):
+        """Inverse dynamics of the state, with the acceleration that a linear law wants.
+
+        tau = M(q) a + C(q, v) v + tau_g(q) + f(v_f),
+        a = vdot_ref + K_d (v_ref - v) + K_p (q_ref - q) + K_i integral(q_ref - q)
+
+        With an exact model the error obeys e'' + K_d e' + K_p e = 0 at every posture and speed.
+
+        Friction is taken at v_f = v_ref (`friction_at` "reference", the default), at the measured v ("state"), or
+        left out ("none"). The measured velocity is the wrong one near zero speed: its sign is noise there, which
+        shakes the joint, and a joint that sticks has none, so that nothing helps it to break away. The reference
+        knows where the joint is about to go; where it stands still, v_ref = 0, no friction is supplied. The
+        joint's own viscous friction then still damps the error; "state" takes it away.
+
+        Input ports: `q_ref`, `v_ref`, `vdot_ref` (n,), `state` (2n,) positions, then velocities. Output port:
+        `tau` (n,), N*m (N).
+
+        Without integral gains there is no state. With them, (n,) integrals: discrete with the given `period`
+        (forward Euler), or continuous without one. Direct feedthrough of all inputs. Scalar types float,
+        AutoDiffXd and Expression; for the last two the model must be a `ReconstructedModel`.
+
+        Precondition: M is positive definite. It is not checked, as any model will do that predicts; a joint whose
+        inertia sparse terms lack gets no feedback. `armloop.dynamics.with_mass_matrix(model)` sees to it.
+
+        Not supported: torque limits (saturate `tau` behind it), friction with memory (taken as fully slid),
+        models of a step below 3, which hold no inertia. A torque that is not finite raises `RuntimeError`.
+        """
+
+        def _construct(
+            self,
+            model: InverseDynamicsModel,
+            gains: AccelerationGains,
+            *,
+            friction_at: str = "reference",
+            period: float | None = None,
+            converter: Any = None,
+        ) -> None:
+            """model : such as one of `armloop.model.load_model`; gains : of its n joints; period : s."""
+            if friction_at not in FRICTION_SOURCES:
+                raise ValueError(f"friction_at is {friction_at!r}; it must be {', '.join(FRICTION_SOURCES)}")
+            if not isinstance(model, ReconstructedModel):
+                # Numbers alone can be neither differentiated nor written out.
+                converter = SystemScalarConverter()
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = model, gains
+            self._options: dict[str, Any] = {"friction_at": friction_at, "period": period}
+            n = self._n = len(gains.kp)
+            self._model, self._friction_at = model, friction_at
+            if T is not float:
+                assert isinstance(model, ReconstructedModel)
+                self._equations = ModelEquations(model, functions_of(T))
+            assert gains.ki is not None
+            self._gains = [gain.tolist() for gain in (gains.kp, gains.kd, gains.ki)]
+            self._integrates = bool(gains.ki.any())
+            self._discrete = period is not None
+            self._references = [
+                self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")
+            ]
+            self._state = self.DeclareVectorInputPort("state", 2 * n)
+            if self._integrates and period is not None:
+                self.DeclareDiscreteState(n)
+                self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+            elif self._integrates:
+                self.DeclareContinuousState(n)
+            # Named, or Drake would find out by writing all the formulas out.
+            sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
+            self.DeclareVectorOutputPort("tau", n, self._calc_tau, sources)
+
+        def set_model(self, model: InverseDynamicsModel) -> None:
+            """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            self._model = model
+            self._arguments = model, self._arguments[1]
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, **other._options, converter=converter)
+
+        def _calc_tau(self, context: Any, output: Any) -> None:
+            n = self._n
+            q_ref, v_ref, vdot_ref = (port.Eval(context).tolist() for port in self._references)
+            state = self._state.Eval(context).tolist()
+            q, v = state[:n], state[n:]
+            kp, kd, ki = self._gains
+            wanted = [
+                a + d * (w - y) + p * (r - x)
+                for a, d, w, y, p, r, x in zip(vdot_ref, kd, v_ref, v, kp, q_ref, q, strict=True)
+            ]
+            if self._integrates:
+                integral = self._integral(context).tolist()
+                wanted = [a + i * z for a, i, z in zip(wanted, ki, integral, strict=True)]
+            sliding = {"reference": v_ref, "state": v, "none": [0.0] * n}[self._friction_at]
+            output.SetFromVector(self._torque(q, v, wanted, sliding, context))
+
+        def _torque(self, q: list, v: list, vdot: list, sliding: list, context: Any) -> np.ndarray:
+            if T is float:
+                tau = self._model.feedforward(
+                    np.array(q), np.array(v), np.array(vdot), sliding=np.array(sliding)
+                )
+                if not isfinite(sum(tau.tolist())):
+                    time = context.get_time()
+                    raise RuntimeError(f"the model's torque is not finite at t = {time:.4f} s: {tau}")
+                return tau
+            equations = self._equations
+            load = equations.load(q, v, vdot) if equations.load_matters else None
+            friction = equations.friction(sliding, load, q=q)
+            return vector(T, [x + y for x, y in zip(equations.rigid(q, v, vdot), friction, strict=True)])
+
+        def _integral(self, context: Any) -> np.ndarray:
+            if self._discrete:
+                return context.get_discrete_state_vector().CopyToVector()
+            return context.get_continuous_state_vector().CopyToVector()
+
+        def _error(self, context: Any) -> list[Any]:
+            wanted, state = self._references[0].Eval(context), self._state.Eval(context)
+            return [r - x for r, x in zip(wanted.tolist(), state.tolist()[: self._n], strict=True)]
+
+        def _update(self, context: Any, discrete: Any) -> None:
+            integral, error = self._integral(context).tolist(), self._error(context)
+            period = self._options["period"]
+            discrete.set_value(vector(T, [z + period * e for z, e in zip(integral, error, strict=True)]))
+
+        def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+            if self._integrates and not self._discrete:
+                derivatives.get_mutable_vector().SetFromVector(vector(T, self._error(context)))
+
+    return Impl
+
+
+ComputedTorque = with_signature(ComputedTorque_[None])

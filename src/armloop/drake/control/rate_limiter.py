@@ -1,0 +1,77 @@
+"""Torque rate limit: what a drive's amplifier does to a torque that is asked for too soon."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pydrake.math as drake_math
+from numpy.typing import ArrayLike
+from pydrake.systems.framework import LeafSystem_
+
+from armloop.drake.scalar_types import scalar_template
+from armloop.drake.scalars import vector, with_signature
+
+
+@scalar_template("RateLimiter_", __name__)
+def RateLimiter_(T: type) -> Any:
+    """Return the class for one scalar type."""
+
+    class Impl(LeafSystem_[T]):
+        """Torque that changes no faster than a drive can change it, and stays within the drive's limits.
+
+        y_k = clip(clip(u_k, -effort, effort), y_k-1 - h rate, y_k-1 + h rate)
+
+        Input port: `u` (n,), the torque asked for. Output port: `tau` (n,), N*m (N). One discrete state (n,), y of the
+        last period, updated with the period h; zero at the start unless `set_torque` is called. Direct feedthrough: it
+        is meant for a discrete plant of the same period. Scalar types float, AutoDiffXd and Expression. Not supported:
+        telling the controller, whose integral goes on growing behind the limits.
+        """
+
+        def _construct(
+            self, effort: ArrayLike, rate: ArrayLike, period: float, *, converter: Any = None
+        ) -> None:
+            """effort : (n,) N*m (N); rate : (n,) N*m/s (N/s); period : s.
+
+            Raises `ValueError` when they are not above 0, or not for the same joints.
+            """
+            limits, rates = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (effort, rate))
+            if limits.shape != rates.shape or limits.ndim != 1:
+                raise ValueError(f"effort is for {limits.size} joints, rate for {rates.size}")
+            if not (np.all(limits > 0) and np.all(rates > 0) and period > 0):
+                raise ValueError("effort, rate and period must be above 0")
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = effort, rate, period
+            self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))
+            self._u = self.DeclareVectorInputPort("u", limits.size)
+            self.DeclareDiscreteState(limits.size)
+            self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+            sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
+            self.DeclareVectorOutputPort("tau", limits.size, self._calc_tau, sources)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, converter=converter)
+
+        def set_torque(self, context: Any, tau: Any) -> None:
+            """Let the drive have had the torques tau (n,) before, in this system's own context."""
+            context.SetDiscreteState(vector(T, list(tau)))
+
+        def _limited(self, context: Any) -> np.ndarray:
+            last = context.get_discrete_state_vector().CopyToVector().tolist()
+            low, high = (min, max) if T is float else (drake_math.min, drake_math.max)
+            values = []
+            for u, y, (limit, step) in zip(self._u.Eval(context).tolist(), last, self._limits, strict=True):
+                wanted = low(high(u, -limit), limit)
+                values.append(low(high(wanted, y - step), y + step))
+            return vector(T, values)
+
+        def _calc_tau(self, context: Any, output: Any) -> None:
+            output.SetFromVector(self._limited(context))
+
+        def _update(self, context: Any, discrete: Any) -> None:
+            discrete.set_value(self._limited(context))
+
+    return Impl
+
+
+RateLimiter = with_signature(RateLimiter_[None])

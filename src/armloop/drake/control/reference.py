@@ -1,0 +1,164 @@
+"""Motions as Drake sources: tables, sampled once, held over each period as a controller of that period reads them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    LeafSystem_,
+)
+from pydrake.systems.primitives import Demultiplexer
+
+from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.scalar_types import scalar_template
+from armloop.drake.scalars import vector
+from armloop.dynamics import ModelEquations
+from armloop.experiment.excitation import Reference
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+from armloop.util.errors import ModelError
+from armloop.util.functions import NUMPY
+
+_CHUNK = 1000  # rows of feedforward evaluated at once, when the first of them is needed
+
+
+class TableSource(LeafSystem):
+    """Hold a table, one row per period.
+
+    Output port `row`: (width,), row k around k periods; the last row afterwards.
+    """
+
+    def __init__(self, width: int, period: float) -> None:
+        """width : of the rows, all zero until `set_rows`; period : s."""
+        super().__init__()
+        self._rows = np.zeros((1, width))
+        self._period = period
+        self.DeclareVectorOutputPort("row", width, self._calc_row)
+
+    def set_rows(self, rows: Array) -> None:
+        """Replace the table; `rows` is (K, width). Reset the context's time afterwards."""
+        self._rows = rows
+
+    def _calc_row(self, context: Context, output: BasicVector) -> None:
+        row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)
+        output.SetFromVector(self._rows[row])
+
+
+class ReferenceSource(Diagram):
+    """Give q_ref(t), v_ref(t), vdot_ref(t) of a reference, held over each period, and a model's feedforward of it.
+
+    tau_ff = model(q_ref, v_ref, vdot_ref), as from the system `Feedforward`, but as the reference is known ahead it is
+    evaluated for a thousand periods at once: during a simulation it costs next to nothing.
+
+    Output ports: `q_ref`, `v_ref`, `vdot_ref`, (n,) each, in rad, rad/s, rad/s^2 (m, ..); `tau_ff` (n,), N*m (N),
+    zero without a model. After the reference's duration the last values are held. Scalar types float and
+    AutoDiffXd, in which they are constants; not Expression, in which a table cannot be looked up.
+    A torque that is not finite raises `RuntimeError` when its time has come.
+
+    Precondition: whoever reads it has the same period and no offset. Not supported: a model's friction with memory (as if
+    fully slid).
+    """
+
+    def __init__(
+        self, reference: Reference, period: float, model: FeedforwardModel | None = None, step: int = 3
+    ) -> None:
+        """reference : what to follow; period : s; model, step : see `Feedforward`."""
+        super().__init__()
+        self.tables = reference.evaluate(period * np.arange(round(reference.duration / period) + 1))
+        n = self.tables[0].shape[1]
+        builder = DiagramBuilder()
+        self._table = builder.AddNamedSystem("table", _ReferenceTable(self.tables, period))
+        self._table.set_model(model, step)
+        split = builder.AddNamedSystem("split", Demultiplexer([n, n, n, n]))
+        builder.Connect(self._table.get_output_port(), split.get_input_port())
+        for index, name in enumerate(("q_ref", "v_ref", "vdot_ref", "tau_ff")):
+            builder.ExportOutput(split.get_output_port(index), name)
+        builder.BuildInto(self)
+
+    def set_model(self, model: FeedforwardModel | None, step: int = 3) -> None:
+        """Take another model from the next period on; between two calls of `Simulator.AdvanceTo`."""
+        self._table.set_model(model, step)
+
+    def set_torques(self, tau: Array) -> None:
+        """Take torques (K, n) in place of a model's, one row per period, K as in `tables`."""
+        self._table.set_torques(tau)
+
+
+@scalar_template("_ReferenceTable_", __name__, [float, AutoDiffXd])
+def _ReferenceTable_(T: type) -> Any:
+    """Return the class for one scalar type."""
+
+    class Impl(LeafSystem_[T]):
+        """A table, held row by row, whose last n columns are filled in, chunk by chunk, when they are needed."""
+
+        def _construct(
+            self, tables: tuple[Array, Array, Array], period: float, *, converter: Any = None
+        ) -> None:
+            LeafSystem_[T].__init__(self, converter=converter)
+            n = self._n = tables[0].shape[1]
+            self._arguments, self._period = (tables, period), period
+            self._rows = np.hstack([*tables, np.zeros_like(tables[0])])
+            # what is constant has no derivatives: only the time is looked at
+            self.DeclareVectorOutputPort("row", 4 * n, self._calc_row, {self.time_ticket()})
+            self.set_model(None, 3)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, converter=converter)
+            self._model, self._step, self._equations = other._model, other._step, other._equations
+            self._rows, self._filled = other._rows.copy(), list(other._filled)
+
+        def set_model(self, model: FeedforwardModel | None, step: int) -> None:
+            self._model, self._step = model, step
+            self._equations = None
+            if isinstance(model, ReconstructedModel):
+                # An added effect may have a law for samples only: then each period is asked for by itself.
+                with suppress(ModelError):
+                    self._equations = ModelEquations(model, NUMPY, step=step)
+            self._rows[:, 3 * self._n :] = 0.0
+            self._filled = [model is None] * (len(self._rows) // _CHUNK + 1)
+
+        def set_torques(self, tau: Array) -> None:
+            self._rows[:, 3 * self._n :] = tau
+            self._filled = [True] * len(self._filled)
+
+        def _calc_row(self, context: Any, output: Any) -> None:
+            time = context.get_time()
+            seconds = time if T is float else time.value()
+            row = min(int(seconds / self._period + 0.5), len(self._rows) - 1)
+            if not self._filled[row // _CHUNK]:
+                self._fill(row // _CHUNK)
+            values = self._rows[row]
+            output.SetFromVector(values if T is float else vector(T, values.tolist()))
+
+        def _fill(self, chunk: int) -> None:
+            part = slice(chunk * _CHUNK, (chunk + 1) * _CHUNK)
+            rows, n = self._rows[part], self._n
+            q, v, vdot = rows[:, :n], rows[:, n : 2 * n], rows[:, 2 * n : 3 * n]
+            if self._equations is not None:
+                columns = self._equations.torque(*(list(x.T) for x in (q, v, vdot)))
+                rows[:, 3 * n :] = np.stack([np.broadcast_to(x, len(rows)) for x in columns], axis=1)
+            else:
+                assert self._model is not None
+                rows[:, 3 * n :] = [
+                    self._model.feedforward(*state, self._step) for state in zip(q, v, vdot, strict=True)
+                ]
+            wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+            if len(wrong):
+                time = self._period * (part.start + wrong[0])
+                raise RuntimeError(
+                    f"the model's torque is not finite at t = {time:.4f} s: {rows[wrong[0], 3 * n :]}"
+                )
+            self._filled[chunk] = True
+
+    return Impl
+
+
+_ReferenceTable = _ReferenceTable_[None]

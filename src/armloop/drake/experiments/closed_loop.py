@@ -1,0 +1,193 @@
+"""An arm under control, added to any diagram in one call: plant with friction, reference, model, controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+
+from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
+from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.pid import PidController, PidGains
+from armloop.drake.control.rate_limiter import RateLimiter
+from armloop.drake.control.reference import ReferenceSource
+from armloop.drake.experiments.scenarios import Plant, plant_for, plant_names
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.nearest_friction import nearest_friction
+from armloop.drake.plant.plant import ArmPlant
+from armloop.experiment.excitation import Reference
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+CONTROLLERS = ("pid", "computed_torque")
+"""The controllers that `add_arm_with_controller` knows; `add_arm_under` takes a law of your own."""
+_REFERENCE = ("q_ref", "v_ref", "vdot_ref", "tau_ff")
+
+
+@dataclass(frozen=True, eq=False)
+class ControlledArm:
+    """The systems that `add_arm_with_controller` added, to connect more to, or to log.
+
+    plant : output ports `state` (2n,), `tau_drive` (n,)
+    reference : `q_ref`, `v_ref`, `vdot_ref`, `tau_ff` (n,); `tau_ff` is zero without a model or where the
+        controller holds the model itself
+    controller : `tau` (n,)
+    drives : where torques can change at a limited rate only, between the controller and the plant: `tau` (n,)
+    followed : the motion behind `reference`
+    """
+
+    plant: ArmPlant
+    reference: ReferenceSource
+    controller: PidController | LeafSystem
+    drives: RateLimiter | None = None
+    followed: Reference | None = None
+
+    def start_on_reference(self, root_context: Context) -> None:
+        """Put the arm where the reference begins, at its velocity, inside the diagram's context."""
+        q_ref, v_ref, _ = self.reference.tables
+        self.plant.set_state(root_context, q_ref[0], v_ref[0])
+        if self.drives is not None:
+            # it was held there
+            held = self.drives.GetMyMutableContextFromRoot(root_context)
+            law = self.controller
+            asked = law.GetOutputPort("tau").Eval(law.GetMyContextFromRoot(root_context))
+            self.drives.set_torque(held, np.clip(asked, *self._efforts()))
+
+    def _efforts(self) -> tuple[Array, Array]:
+        effort = np.array([joint.effort for joint in self.plant.arm.joints])
+        return -effort, effort
+
+    def set_model(self, model: Any, step: int = 3) -> None:
+        """Exchange the model in a running simulation, between two calls of `Simulator.AdvanceTo`.
+
+        step : how much of it PID is fed; computed torque takes the whole
+        """
+        if isinstance(self.controller, PidController):
+            self.reference.set_model(model, step)
+        else:
+            self.controller.set_model(model)
+
+
+def add_arm_with_controller(
+    builder: DiagramBuilder,
+    arm: str | Path | Plant,
+    gains: PidGains | AccelerationGains,
+    reference: Reference,
+    model: FeedforwardModel | None = None,
+    step: int = 3,
+    *,
+    controller: str = "pid",
+    effects: Sequence[UndeclaredEffect] = (),
+    torque_rate: ArrayLike | None = None,
+) -> ControlledArm:
+    """Add an arm that follows a reference: a plant with sticking friction under the controller of your choice.
+
+    `"pid"`: Eqs. (35), (36), or PID alone without a model. `ReferenceSource` (with the model's feedforward) ->
+    `PidController` -> `ArmPlant` in torque mode -> back.
+    `"computed_torque"`: `ReferenceSource` -> `ComputedTorque` -> `ArmPlant` -> back; it needs a model that
+    predicts at velocities of the caller's choice, such as one of `armloop.model.load_model`.
+
+    The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
+
+    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, then with the
+        friction of a reconstructed `model` (`nearest_friction`), without one that of `scenarios.plant_for`
+    gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
+    model : by its terms up to `step` (1, 2 or 3) for `"pid"`
+    effects : what the plant has and the model may not know
+    torque_rate : (n,) N*m/s (N/s), how fast the drives can change their torques (`RateLimiter`); any by default
+
+    Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains, reference, model and controller do
+    not fit each other.
+    """
+    spec = arm if isinstance(arm, Plant) else _plant(arm, model)
+    n, config, period = spec.arm.n, spec.config, spec.config.time_step
+    _check_controller(controller, gains, model, step)
+    followed = reference.evaluate([0.0])[0].shape[1]
+    if not len(gains.kp) == followed == n:
+        raise ValueError(
+            f"{spec.arm.name} has {n} joints; the gains are for {len(gains.kp)}, the reference for {followed}"
+        )
+    law: LeafSystem
+    if isinstance(gains, PidGains):
+        law = PidController(gains, period, config.instruments.resolution(spec.arm))
+    else:
+        law = ComputedTorque(model, gains, period=period)
+    return add_arm_under(
+        builder,
+        spec,
+        law,
+        reference,
+        model,
+        step,
+        name=controller,
+        effects=effects,
+        torque_rate=torque_rate,
+    )
+
+
+def add_arm_under(
+    builder: DiagramBuilder,
+    plant: Plant,
+    law: LeafSystem,
+    reference: Reference,
+    model: FeedforwardModel | None = None,
+    step: int = 3,
+    *,
+    name: str = "controller",
+    effects: Sequence[UndeclaredEffect] = (),
+    torque_rate: ArrayLike | None = None,
+) -> ControlledArm:
+    """Add a plant that follows a reference under a control law of the caller's own; else as `add_arm_with_controller`.
+
+    law : input ports `state` and those that it wants of `q_ref`, `v_ref`, `vdot_ref` and, with a `model`, `tau_ff`;
+        output port `tau` (n,)
+
+    Raises `ValueError` when the law lacks a port, or has another one.
+    """
+    config, period = plant.config, plant.config.time_step
+    ports = [law.get_input_port(k).get_name() for k in range(law.num_input_ports())]
+    wanted = [port for port in ports if port in _REFERENCE]
+    if not law.HasOutputPort("tau") or "state" not in ports or len(wanted) + 1 < len(ports):
+        raise ValueError(
+            f"{name}: has the input ports {', '.join(ports) or 'none'}; a control law has state, those that it wants of "
+            f"{', '.join(_REFERENCE)}, and the output port tau"
+        )
+    source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
+    body = builder.AddSystem(ArmPlant(plant.arm, config.friction, effects=effects, time_step=period))
+    builder.AddNamedSystem("reference", source)
+    builder.AddNamedSystem(name, law)
+    for port in wanted:
+        builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
+    builder.Connect(body.GetOutputPort("state"), law.GetInputPort("state"))
+    drives = law
+    if torque_rate is not None:
+        effort = [joint.effort for joint in plant.arm.joints]
+        drives = builder.AddNamedSystem("drives", RateLimiter(effort, torque_rate, period))
+        builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
+    builder.Connect(drives.GetOutputPort("tau"), body.GetInputPort("tau"))
+    return ControlledArm(body, source, law, drives if drives is not law else None, reference)
+
+
+def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
+    """The plant of an arm; one of a URDF, which says nothing of dry friction, has that of its model."""
+    plant = plant_for(spec)
+    if str(spec) in plant_names() or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
+        return plant
+    return replace(plant, config=replace(plant.config, friction=nearest_friction(model)))
+
+
+def _check_controller(
+    controller: str, gains: PidGains | AccelerationGains, model: FeedforwardModel | None, step: int
+) -> None:
+    if controller not in CONTROLLERS:
+        raise ValueError(f"controller is {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    wanted = PidGains if controller == "pid" else AccelerationGains
+    if not isinstance(gains, wanted):
+        raise ValueError(f"{controller} takes {wanted.__name__}; the gains are {type(gains).__name__}")
+    if controller == "computed_torque" and (model is None or step != 3):
+        raise ValueError("computed_torque needs a model, and all three steps of it")

@@ -1,0 +1,243 @@
+"""Collect the data of a reconstruction from a simulated arm with friction, Sect. 4.3 of the paper.
+
+The drives are in speed mode (stiff servo, closed loop) and supply whatever torque the motion takes. Between
+segments the arm is put to the next start instead of being driven there: nothing of that way would be logged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import numpy as np
+
+from armloop.data.log import MotionLog
+from armloop.drake.experiments.speed_mode import Recording, SpeedModeArm
+from armloop.drake.plant.config import Instruments, PlantConfig
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.joint_loads import Law
+from armloop.experiment.excitation import (
+    Reference,
+    constant_velocity_segments,
+    fourier_reference,
+    speeds,
+    static_segments,
+)
+from armloop.robot.arm import Arm
+from armloop.util.workers import Pool
+
+Progress = Callable[[str, float], None]
+"""Called with the condition's name and the part of the whole collection that is done, 0 to 1."""
+
+
+def silent(what: str, done: float) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True)
+class CollectionPlan:
+    """How much is collected: every segment settles, then is logged.
+
+    Times in s, speeds in rad/s (`_prismatic`: m/s).
+
+    rate : Hz of the logs
+    segment_time_step : of the plant during segments of constant velocity, where nothing changes fast
+    dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
+    static_settle : long enough for the servo to take over the weight of a sliding joint
+    static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the
+        paper)
+    velocity_segments : constant velocities from `slowest` to the range's largest
+    trajectories : Fourier-series trajectories, Eq. (31), of `trajectory_duration` each
+    """
+
+    rate: float = 250.0
+    segment_time_step: float = 2e-3
+    dwell: bool = False
+    static_poses: int = 48
+    static_speed: float = float(np.deg2rad(0.1))
+    static_speed_prismatic: float = 1e-4
+    static_settle: float = 0.09
+    static_hold: float = 0.35
+    velocity_segments: int = 100
+    slowest: float = 0.01
+    slowest_prismatic: float = 1e-3
+    velocity_settle: float = 0.08
+    velocity_hold: float = 0.4
+    trajectories: int = 3
+    trajectory_duration: float = 20.0
+
+
+def collect(
+    arm: Arm,
+    config: PlantConfig,
+    plan: CollectionPlan,
+    seed: int,
+    progress: Progress = silent,
+    *,
+    processes: int = 1,
+) -> dict[str, MotionLog]:
+    """Collect `static`, `constant_velocity` and `varying` logs from the simulated arm.
+
+    Only the settled part of each segment is logged; as the time before it passes, each segment is a run of
+    its own. The same seed gives the same logs, with any number of `processes` (forked, each with its plant).
+    """
+    crew = _Crew(arm, config, plan.rate, _parts(arm, config, plan, seed))
+    # The longest first: no process is left alone with one at the end.
+    jobs = sorted(
+        (
+            (part, index)
+            for part, content in enumerate(crew.parts)
+            for index in range(len(content.references))
+        ),
+        key=lambda job: (-crew.duration(job), job),
+    )
+    total = sum(map(crew.duration, jobs))
+    recordings: dict[_Job, Recording] = {}
+    done = 0.0
+    with ExitStack() as stack:
+        record: Iterator[Recording] = map(crew.record, jobs)
+        if processes > 1:
+            record = stack.enter_context(Pool(processes, _inherit, (crew,))).map(_record_inherited, jobs)
+        for job, recording in zip(jobs, record, strict=True):
+            recordings[job] = recording
+            done += crew.duration(job)
+            progress(crew.parts[job[0]].name, done / total)
+    noise = np.random.default_rng(seed)
+    return {
+        part.name: _as_log(
+            part.name, [recordings[k, i] for i in range(len(part.references))], config.instruments, noise
+        )
+        for k, part in enumerate(crew.parts)
+        if part.references
+    }
+
+
+_Job = tuple[int, int]  # a part and one of its references
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One condition of a collection."""
+
+    name: str
+    references: Sequence[Reference]
+    settle: float
+    time_step: float
+
+
+def _parts(arm: Arm, config: PlantConfig, plan: CollectionPlan, seed: int) -> list[_Part]:
+    creep = 0.0 if plan.dwell else 1.0
+    static = static_segments(
+        config.ranges,
+        plan.static_poses,
+        creep * speeds(arm, plan.static_speed, plan.static_speed_prismatic),
+        plan.static_settle + plan.static_hold,
+        seed,
+    )
+    constant = constant_velocity_segments(
+        config.ranges,
+        plan.velocity_segments,
+        speeds(arm, plan.slowest, plan.slowest_prismatic),
+        plan.velocity_settle + plan.velocity_hold,
+        seed,
+    )
+    varying = [
+        fourier_reference(config.ranges, plan.trajectory_duration, seed * 1000 + k)
+        for k in range(plan.trajectories)
+    ]
+    return [
+        _Part("static", static, plan.static_settle, plan.segment_time_step),
+        _Part("constant_velocity", constant, plan.velocity_settle, plan.segment_time_step),
+        _Part("varying", varying, 0.0, config.time_step),
+    ]
+
+
+class _Crew:
+    """Simulated arms, one per time step, built when needed: diagrams cannot be sent to another process."""
+
+    def __init__(self, arm: Arm, config: PlantConfig, rate: float, parts: list[_Part]) -> None:
+        self.parts = parts
+        self._arm, self._config, self._rate = arm, config, rate
+        self._rigs: dict[float, SpeedModeArm] = {}
+
+    def duration(self, job: _Job) -> float:
+        return self.parts[job[0]].references[job[1]].duration
+
+    def record(self, job: _Job) -> Recording:
+        part = self.parts[job[0]]
+        rig = self._rigs.get(part.time_step)
+        if rig is None:
+            rig = SpeedModeArm(
+                self._arm,
+                self._config.friction,
+                instruments=self._config.instruments,
+                time_step=part.time_step,
+            )
+            self._rigs[part.time_step] = rig
+        return rig.follow(part.references[job[1]], rate=self._rate, settle=part.settle)
+
+
+_inherited: _Crew
+
+
+def _inherit(crew: _Crew) -> None:
+    # Handed over by the fork itself, so that nothing needs to be picklable on the way in.
+    global _inherited
+    _inherited = crew
+
+
+def _record_inherited(job: _Job) -> Recording:
+    return _inherited.record(job)
+
+
+def measure_run(
+    arm: Arm,
+    config: PlantConfig,
+    seed: int,
+    *,
+    duration: float = 50.0,
+    rate: float = 500.0,
+    effects: Sequence[UndeclaredEffect] = (),
+    reference: Reference | None = None,
+    law: Law | None = None,
+    progress: Progress = silent,
+) -> MotionLog:
+    """Measure one exciting run of the arm, with effects in the plant that the log says nothing of.
+
+    duration : s of a Fourier-series trajectory drawn from `seed`, unless a `reference` is given; rate : Hz
+    law : what no list of effects has, see `ArmPlant`
+    """
+    rig = SpeedModeArm(
+        arm,
+        config.friction,
+        effects=effects,
+        instruments=config.instruments,
+        time_step=config.time_step,
+        law=law,
+    )
+    if reference is None:
+        reference = fourier_reference(config.ranges, duration, seed, harmonics=5)
+    progress("run", 0.0)
+    recording = rig.follow(reference, rate=rate)
+    progress("run", 1.0)
+    return _as_log("run", [recording], config.instruments, np.random.default_rng(seed))
+
+
+def _as_log(
+    name: str, recordings: Sequence[Recording], instruments: Instruments, rng: np.random.Generator
+) -> MotionLog:
+    """Join recordings into one log, one run each, with the torque sensor's noise."""
+    period = float(np.median(np.diff(recordings[0].time)))
+    time, now = [], 0.0
+    for recording in recordings:
+        # At least 20 periods apart: longer than the gap that separates runs.
+        time.append(now + recording.time)
+        now = float(time[-1][-1]) + 20 * period
+    q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
+    rms = np.sqrt(np.mean(tau**2, axis=0))
+    tau = tau + instruments.torque_noise * rms * rng.standard_normal(tau.shape)
+    # No more digits than the instruments have: the files stay small.
+    return MotionLog(
+        np.concatenate(time).round(6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
+    )

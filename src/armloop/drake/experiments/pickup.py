@@ -1,0 +1,144 @@
+"""Payload pick-up: a load is grasped while the arm tracks; what is learned from the log is used from then on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder
+
+from armloop.data.log import MotionLog
+from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.pid import PidController
+from armloop.drake.experiments.scenarios import TrackingScenario
+from armloop.drake.experiments.tracking import MAIN_MODEL, RecordedArm, TrackingResult, score
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.view.live import LiveView
+from armloop.util.arrays import Array
+
+CONTROLLER = "pid_step3"
+PHASES = ("unloaded", "loaded", "augmented")
+"""Before the grasp; with the load and the model as it was; with the load and the model that knows of it."""
+_SETTLE = 0.5  # s after the grasp that are not logged
+_SAMPLE = 2  # steps per sample of the log
+
+
+@dataclass(frozen=True, eq=False)
+class PickupResult:
+    """One run in three phases.
+
+    phases : per name in `PHASES`, the whole run scored over that phase
+    log : what the diagnosis was given
+    """
+
+    phases: dict[str, TrackingResult]
+    log: MotionLog
+
+
+def run_pickup(
+    scenario: TrackingScenario,
+    model: FeedforwardModel,
+    learn: Callable[[MotionLog], FeedforwardModel],
+    view: LiveView | None = None,
+    changes: Sequence[UndeclaredEffect] | None = None,
+) -> PickupResult:
+    """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
+
+    From `pickup.at` on the last link carries the load; positions, velocities and the integrator go on as they are.
+    At `pickup.diagnose_at` the simulation halts, `learn` is given the log since the grasp (encoders, the drives'
+    torques with the sensor's noise, 1 / (2 time steps) Hz), and what it returns is the feedforward from then on. The
+    integrator is then put back to what it held at the grasp: what it has learned since is in the model now.
+
+    view : shows the run, and holds it to its rate
+    changes : what happens to the arm at `pickup.at` instead of the load
+    """
+    pickup = scenario.pickup
+    if pickup is None:
+        raise ValueError(f"{scenario.name} has no pickup")
+    free = _Run(scenario, model, (), view)
+    free.systems.start_on_reference(free.context)
+    free.advance(pickup.at)
+    loaded = _Run(scenario, model, (pickup.payload,) if changes is None else tuple(changes), view)
+    loaded.context.SetTime(free.context.get_time())
+    loaded.context.SetDiscreteState(free.context.get_discrete_state())
+    loaded.advance(pickup.diagnose_at)
+    log = _log(scenario, *loaded.recorded()[:3])
+    loaded.systems.set_model(learn(log))
+    loaded.set_integral(free.integral())
+    loaded.advance(scenario.reference.duration)
+    first, second = free.recorded(), loaded.recorded()
+    # both recorded the moment of the grasp
+    time, state, tau, asked = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
+    ends = (0.0, pickup.at, pickup.diagnose_at, scenario.reference.duration)
+    phases = {}
+    for k, name in enumerate(PHASES):
+        part = replace(scenario, score=(ends[k], ends[k + 1]))
+        phases[name] = score(part, CONTROLLER, time, free.systems.reference.tables, state, tau, asked)
+    return PickupResult(phases, log)
+
+
+class _Run:
+    """The controlled arm with loggers, and a simulator."""
+
+    def __init__(
+        self,
+        scenario: TrackingScenario,
+        model: FeedforwardModel,
+        effects: tuple[UndeclaredEffect, ...],
+        view: LiveView | None,
+    ) -> None:
+        self._arm = RecordedArm(scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
+        self.systems = self._arm.systems
+        builder = DiagramBuilder()
+        builder.AddNamedSystem(CONTROLLER, self._arm.diagram)
+        if view is not None:
+            view.add_to(builder, {CONTROLLER: self._arm.diagram})
+        self._simulator = Simulator(builder.Build())
+        if view is not None:
+            view.pace(self._simulator)
+        self._started = False
+        self.context = self._simulator.get_mutable_context()
+
+    def advance(self, until: float) -> None:
+        if not self._started:
+            self._simulator.Initialize()
+            self._started = True
+        # real time goes on from here, however long the diagnosis took
+        self._simulator.ResetStatistics()
+        self._simulator.AdvanceTo(until)
+
+    def integral(self) -> Array:
+        """Return what PID's integrator holds, (n,)."""
+        return np.asarray(self._integrator().get_discrete_state_vector().CopyToVector())
+
+    def set_integral(self, value: Array) -> None:
+        self._integrator().SetDiscreteState(value)
+
+    def _integrator(self) -> Context:
+        controller = self.systems.controller
+        assert isinstance(controller, PidController)
+        return controller.GetSubsystemByName("integral").GetMyMutableContextFromRoot(self.context)
+
+    def recorded(self) -> tuple[Array, Array, Array, Array]:
+        """Return time (N,), state (N, 2n), the drives' torques (N, n) and those that the controller asked for."""
+        return self._arm.recorded(self.context)
+
+
+def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> MotionLog:
+    """Return what the arm's own instruments say, as `SpeedModeArm.follow` records it."""
+    arm, config = scenario.plant.arm, scenario.plant.config
+    instruments, n = config.instruments, arm.n
+    half = max(1, round(instruments.velocity_half_window / config.time_step))
+    first = max(half, round(_SETTLE / config.time_step))
+    rows = np.arange(first, len(time) - half, _SAMPLE)
+    q = instruments.encode(arm, state[:, :n])
+    v = (q[rows + half] - q[rows - half]) / (2 * half * config.time_step)
+    # a torque is held over the step that follows: the mean of both steps is centred on the sample
+    measured = 0.5 * (tau[rows - 1] + tau[rows])
+    noise = np.random.default_rng(scenario.seed).standard_normal(measured.shape)
+    rms = np.sqrt((measured**2).mean(axis=0))
+    return MotionLog(
+        time[rows], q[rows], v, measured + instruments.torque_noise * rms * noise, name="since the grasp"
+    )

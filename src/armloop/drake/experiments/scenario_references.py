@@ -1,0 +1,81 @@
+"""References of scenario files: the paper's, Fourier series, places with rests between them, tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from armloop.drake.experiments.scenario_files import beside
+from armloop.experiment.excitation import (
+    MotionRanges,
+    Reference,
+    fourier_reference,
+    paper_reference,
+    places_reference,
+    read_reference,
+)
+from armloop.robot.arm import Arm
+from armloop.schemas.scenarios import ReferenceData
+from armloop.util.errors import LogError, ScenarioError
+
+LONGEST = 600.0  # s of a tracking run
+
+
+def reference_of(
+    data: ReferenceData, arm: Arm, ranges: MotionRanges, seed: int, path: Path, where: str
+) -> Reference:
+    """Return the reference that a scenario asks for, checked against the arm's limits.
+
+    path : of the file, from whose folder a table is looked up; where : placed before what is said of a fault
+    """
+    if data.kind == "paper":
+        if arm.n != 3:
+            raise ScenarioError(f"{where}: reference: the paper's is for 3 joints; {arm.name} has {arm.n}")
+        reference: Reference = paper_reference(data.unit, data.periods)
+    elif data.kind == "fourier":
+        reference = fourier_reference(ranges, data.duration, seed)
+    elif data.kind == "csv":
+        reference = _table(data.file, arm, path, where)
+    elif data.kind == "places":
+        reference = _places(data, arm.n, ranges, where)
+    else:
+        raise ScenarioError(
+            f"{where}: reference.kind is {data.kind!r}; it must be paper, fourier, places or csv"
+        )
+    q, _, _ = reference.evaluate(np.arange(0.0, reference.duration, 0.01))
+    for j, joint in enumerate(arm.joints):
+        if q[:, j].min() < joint.lower or q[:, j].max() > joint.upper:
+            raise ScenarioError(
+                f"{where}: reference: joint {j + 1} would go from {q[:, j].min():.3g} to {q[:, j].max():.3g}; "
+                f"its limits are {joint.lower:.3g} to {joint.upper:.3g}"
+            )
+    return reference
+
+
+def _table(file: str, arm: Arm, path: Path, where: str) -> Reference:
+    if not file:
+        raise ScenarioError(f"{where}: reference.file is missing; a csv reference needs the path of its file")
+    try:
+        reference = read_reference(beside(path, file, f"{where}: reference.file"), arm.n)
+    except LogError as error:
+        raise ScenarioError(f"{where}: reference.file: {error}") from error
+    if not reference.duration <= LONGEST:
+        raise ScenarioError(
+            f"{where}: reference.file lasts {reference.duration:g} s; it must be at most {LONGEST:g} s"
+        )
+    return reference
+
+
+def _places(data: ReferenceData, n: int, ranges: MotionRanges, where: str) -> Reference:
+    if len(data.places) < 2 or any(len(place) != n for place in data.places):
+        raise ScenarioError(f"{where}: reference.places must be two or more places of {n} numbers each")
+    try:
+        reference = places_reference(data.places, ranges, dwell=data.dwell, pace=data.pace)
+    except ValueError as error:
+        raise ScenarioError(f"{where}: reference.places: {error}") from error
+    if not reference.duration <= LONGEST:
+        raise ScenarioError(
+            f"{where}: reference.places last {reference.duration:g} s; they may take {LONGEST:g} s at most"
+        )
+    return reference

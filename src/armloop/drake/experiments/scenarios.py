@@ -1,0 +1,219 @@
+"""Scenarios: plants, collection plans and tracking experiments as YAML data, checked at the door.
+
+Files are read into the descriptions of `scenario_data`, checked against each other and the arm, and turned into the
+frozen types of the simulation. Whatever is wrong raises `ScenarioError`, one line that names the file and the field.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import asdict, replace
+
+from armloop.drake.control.controllers import LISTED, REGISTRY
+from armloop.drake.control.pid import PidGains
+from armloop.drake.control.scenario_types import Pickup, Plant, TrackingScenario, Wear
+from armloop.drake.experiments.collection import CollectionPlan
+from armloop.drake.experiments.scenario_files import beside, entry, per_joint, read, scenario_entry
+from armloop.drake.experiments.scenario_references import reference_of
+from armloop.drake.plant.config import Instruments, PlantConfig
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.friction import JointFriction
+from armloop.experiment.excitation import MotionRanges, Reference
+from armloop.robot.arm import Arm, load_arm
+from armloop.schemas.scenarios import (
+    LimitsData,
+    PickupData,
+    PlanData,
+    PlantData,
+    TrackingData,
+    WearData,
+)
+from armloop.util.errors import ArmError, ScenarioError
+from armloop.util.resources import scenario_path, urdf_names
+
+__all__ = [
+    "Pickup",
+    "Plant",
+    "TrackingScenario",
+    "Wear",
+    "load_plan",
+    "load_plant",
+    "load_tracking",
+    "plant_for",
+    "plant_names",
+]
+
+_LEAST_LOG = 14.0  # s, what a diagnosis needs and a little more
+
+
+def plant_names() -> list[str]:
+    """Return the names of the plants in plants.yaml."""
+    return sorted(read(scenario_path("plants")))
+
+
+def load_plant(name: str) -> Plant:
+    """Return a plant of plants.yaml; raises `ScenarioError` when there is none of that name."""
+    path = scenario_path("plants")
+    return _plant(name, entry(path, name, PlantData), path, str(path), name)
+
+
+def plant_for(spec: str | Path) -> Plant:
+    """Return the plant of an arm by its built-in name, or of any URDF by its path.
+
+    A URDF says nothing of dry friction; its joints get f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for
+    prismatic ones) and the ranges that its limits allow.
+    """
+    if str(spec) in plant_names():
+        return load_plant(str(spec))
+    arm = load_arm(spec)
+    turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
+    friction = tuple(turning if turns else sliding for turns in arm.revolute)
+    return Plant(arm.name, arm, PlantConfig(friction, MotionRanges.of(arm)))
+
+
+def load_plan(name: str) -> CollectionPlan:
+    """Return a plan of collection.yaml; raises `ScenarioError` when there is none of that name."""
+    path = scenario_path("collection")
+    data = entry(path, name, PlanData)
+    where = f"{path}: {name}"
+    for key in ("static_settle", "velocity_settle"):
+        if getattr(data, key) <= 10.0 / data.rate:
+            raise ScenarioError(f"{where}: {key} must be above 10 sample periods, {10.0 / data.rate} s")
+    return CollectionPlan(**asdict(data))
+
+
+def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingScenario:
+    """Return a tracking scenario by its built-in name or the path of its YAML file.
+
+    spec : of a file with several scenarios, FILE:NAME, or FILE for the first or the one named as the file
+    arm : in place of the arm of the scenario's own plant: a built-in name or the path of a URDF
+
+    Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
+    """
+    path, name, where, data = scenario_entry(spec, TrackingData)
+    plant, rate, used = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
+    n, period = plant.arm.n, plant.config.time_step
+    reference = reference_of(data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where)
+    gains = [per_joint(getattr(data, key), n, f"{where}: {key}") for key in ("kp", "ki", "kd")]
+    if any(np.any(gain < 0) for gain in gains):
+        raise ScenarioError(f"{where}: kp, ki and kd must not be negative")
+    unknown = [name for name in data.controllers if REGISTRY.find(name) is None]
+    if unknown or not data.controllers:
+        given = ", ".join(unknown) or "empty"
+        raise ScenarioError(
+            f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}"
+        )
+    score = data.score or [0.0, reference.duration]
+    if len(score) != 2 or not 0 <= score[0] < score[1] <= reference.duration + 1e-9:
+        raise ScenarioError(
+            f"{where}: score is {score}; it must be a start and an end in 0 to {reference.duration:g} s"
+        )
+    if data.bandwidth is not None and not 0 < data.bandwidth <= 1 / period:
+        raise ScenarioError(
+            f"{where}: bandwidth is {data.bandwidth}; it must be above 0 and at most {1 / period:g} rad/s"
+        )
+    return TrackingScenario(
+        name,
+        plant,
+        PidGains(*gains),
+        reference,
+        (score[0], score[1]),
+        tuple(dict.fromkeys(data.controllers)),
+        data.random_seed,
+        data.bandwidth,
+        _pickup(data.pickup, plant.arm, reference, where),
+        _wear(data.wear, where),
+        rate,
+        used,
+    )
+
+
+def _limited(data: LimitsData | None, plant: Plant, where: str) -> tuple[Plant, np.ndarray | None, float]:
+    """Return the plant with the drives' limits of torque, those of its rate, and what of both may be planned with."""
+    arm = plant.arm
+    if data is None:
+        return plant, None, LimitsData().used
+    if not data.effort and not data.rate:
+        raise ScenarioError(f"{where}: limits needs an effort or a rate")
+    if data.effort:
+        effort = per_joint(data.effort, arm.n, f"{where}: limits.effort")
+        joints = tuple(
+            dataclasses.replace(joint, effort=float(e)) for joint, e in zip(arm.joints, effort, strict=True)
+        )
+        plant = dataclasses.replace(plant, arm=dataclasses.replace(arm, joints=joints))
+    rate = per_joint(data.rate, arm.n, f"{where}: limits.rate") if data.rate else None
+    return plant, rate, data.used
+
+
+def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:
+    if data is None:
+        return None
+    if not 0 < data.at <= data.diagnose_at - _LEAST_LOG or not data.diagnose_at < reference.duration:
+        raise ScenarioError(
+            f"{where}: pickup: at {data.at} and diagnose_at {data.diagnose_at} must lie within 0 and "
+            f"{reference.duration:g} s, {_LEAST_LOG:g} s or more between them"
+        )
+    payload = UndeclaredEffect("payload", None, {"mass": data.mass, "com": list(data.com)})
+    return Pickup(data.at, data.diagnose_at, payload)
+
+
+def _wear(data: WearData | None, where: str) -> Wear | None:
+    if data is None:
+        return None
+    return Wear(data.samples, data.spread)
+
+
+def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | Path | None) -> Plant:
+    if bool(data.plant) == (data.own_plant is not None):
+        raise ScenarioError(f"{where}: plant: give either the name of a plant in plants.yaml or own_plant")
+    if data.own_plant is None:
+        if arm is not None:
+            raise ScenarioError(f"{where}: plant: it is {data.plant}; --arm is for scenarios with own_plant")
+        if data.plant not in plant_names():
+            raise ScenarioError(
+                f"{where}: plant: {data.plant!r} is unknown; there are: {', '.join(plant_names())}"
+            )
+        return load_plant(data.plant)
+    own = data.own_plant
+    if arm is None and own.arm and own.arm not in urdf_names():
+        own = replace(own, arm=str(beside(path, own.arm, f"{where}: own_plant: arm")))
+    if arm is not None:
+        # a path from where the user stands, not from the scenario's folder
+        given = Path(arm)
+        own = replace(own, arm=str(given.resolve() if given.exists() else arm))
+    return _plant(name, own, path, where, "own_plant")
+
+
+def _plant(name: str, data: PlantData, path: Path, file: str, field: str) -> Plant:
+    where = f"{file}: {field}"
+    if not data.arm:
+        raise ScenarioError(
+            f"{where}: arm is missing; give a built-in name or the path of a URDF here, or by --arm"
+        )
+    try:
+        arm = load_arm(data.arm)
+    except ArmError as error:
+        raise ScenarioError(f"{where}: arm: {error}") from error
+    if len(data.friction) != arm.n:
+        raise ScenarioError(f"{where}: friction has {len(data.friction)} joints; {arm.name} has {arm.n}")
+    friction = []
+    for j, values in enumerate(data.friction):
+        try:
+            friction.append(JointFriction(**asdict(values)))
+        except ValueError as error:
+            raise ScenarioError(f"{where}: friction of joint {j + 1}: {error}") from error
+    ranges = MotionRanges.of(arm)
+    if data.ranges is not None:
+        stated = {
+            key: per_joint(value, arm.n, f"{where}: ranges.{key}", spread=False)
+            for key, value in asdict(data.ranges).items()
+        }
+        try:
+            ranges = MotionRanges(**stated)
+        except ValueError as error:
+            raise ScenarioError(f"{where}: ranges: {error}") from error
+    instruments = Instruments(data.encoder_counts, data.prismatic_lead, data.torque_noise)
+    return Plant(name, arm, PlantConfig(tuple(friction), ranges, instruments, data.time_step))

@@ -1,0 +1,251 @@
+"""Closed-loop tracking with and without a model: Eqs. (35), (36) and Fig. 15 of the paper, and computed torque."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from armloop.drake.control.bounded_feedforward import BoundedReference
+from armloop.drake.control.controllers import MAIN_MODEL, Exact, controller_named, controller_of
+from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.experiments.closed_loop import ControlledArm, add_arm_under
+from armloop.drake.experiments.metrics import Metrics, measure
+from armloop.drake.experiments.scenarios import TrackingScenario
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.view.live import LiveView
+from armloop.util.arrays import Array
+from armloop.util.workers import Pool
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingResult:
+    """How one controller tracked.
+
+    time (N,); q_ref, q, tau (N, n) over the whole run, q the true positions, tau the drives' torques
+    scored : the samples that eta, rms and largest, (n,) each in `unit`, are of: mean absolute, root mean
+        square and largest absolute error; unit : per joint, "deg" or "mm"
+    metrics : effort, time in stick, settling; of a run that was simulated
+    """
+
+    controller: str
+    time: Array
+    q_ref: Array
+    q: Array
+    tau: Array
+    scored: slice
+    eta: Array
+    rms: Array
+    largest: Array
+    unit: tuple[str, ...]
+    metrics: Metrics | None = None
+
+
+def needs_model(controller: str) -> bool:
+    """Tell whether a controller of a scenario runs only with a model that somebody gives."""
+    return bool(controller_named(controller).models)
+
+
+def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
+    """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
+    names = [name for name in scenario.controllers if controller_named(name).served_by(models)]
+    own = [controller_of(name) for name in models if name not in (MAIN_MODEL, Exact.name)]
+    return list(dict.fromkeys([*names, *own]))
+
+
+def run_tracking(
+    scenario: TrackingScenario,
+    models: Mapping[str, FeedforwardModel],
+    effects: Sequence[UndeclaredEffect] = (),
+    *,
+    processes: int = 2,
+) -> dict[str, TrackingResult]:
+    """Track the scenario's reference once per controller.
+
+    models : `"model"` serves `pid_step1` (Eq. 35), `pid_step2`, `pid_step3` (Eq. 36) and `computed_torque`;
+        `"step1"`, `"step2"`, `"step3"` and `"computed_torque"` serve one of them each and come first; any other
+        NAME adds a controller `pid_NAME`, that model's third step. Controllers of the scenario that have no
+        model do not run; `pid` needs none, and `exact` is PID with the plant's own inverse dynamics.
+    effects : what the plant has and the models may not know
+    processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
+    """
+    names = controllers_for(scenario, models)
+    if processes <= 1 or len(names) == 1:
+        return {name: track(scenario, name, models, effects) for name in names}
+    # Arguments of the initializer are inherited by the fork: nothing needs to be picklable on the way in.
+    with Pool(min(processes, len(names)), _inherit, (scenario, models, effects)) as pool:
+        return dict(zip(names, pool.map(_track_inherited, names), strict=True))
+
+
+_inherited: tuple[TrackingScenario, Mapping[str, FeedforwardModel], Sequence[UndeclaredEffect]]
+
+
+def _inherit(
+    scenario: TrackingScenario,
+    models: Mapping[str, FeedforwardModel],
+    effects: Sequence[UndeclaredEffect],
+) -> None:
+    global _inherited
+    gc.freeze()  # what was inherited will not become garbage: do not walk it during the simulation
+    _inherited = (scenario, models, effects)
+
+
+def _track_inherited(controller: str) -> TrackingResult:
+    scenario, models, effects = _inherited
+    return track(scenario, controller, models, effects)
+
+
+def track(
+    scenario: TrackingScenario,
+    controller: str,
+    models: Mapping[str, FeedforwardModel],
+    effects: Sequence[UndeclaredEffect] = (),
+) -> TrackingResult:
+    """Run one controller over the scenario's reference, starting on it.
+
+    The diagram is that of `add_arm_with_controller`, with loggers. Raises `ValueError` when `models` has none
+    for the controller.
+    """
+    run = RecordedArm(scenario, controller, models, effects)
+    simulator = Simulator(run.diagram)
+    run.systems.start_on_reference(simulator.get_mutable_context())
+    simulator.Initialize()
+    simulator.AdvanceTo(scenario.reference.duration)
+    return run.result(simulator.get_context())
+
+
+def track_in_view(
+    scenario: TrackingScenario,
+    models: Mapping[str, FeedforwardModel],
+    view: LiveView,
+    effects: Sequence[UndeclaredEffect] = (),
+) -> dict[str, TrackingResult]:
+    """Do as `run_tracking`, all controllers at once in one simulation that a live view shows and holds to its rate."""
+    builder = DiagramBuilder()
+    runs = {name: RecordedArm(scenario, name, models, effects) for name in controllers_for(scenario, models)}
+    for name, run in runs.items():
+        builder.AddNamedSystem(name, run.diagram)
+    view.add_to(builder, {name: run.diagram for name, run in runs.items()})
+    simulator = Simulator(builder.Build())
+    for run in runs.values():
+        run.systems.start_on_reference(simulator.get_mutable_context())
+    view.pace(simulator)
+    simulator.Initialize()
+    simulator.AdvanceTo(scenario.reference.duration)
+    return {name: run.result(simulator.get_context()) for name, run in runs.items()}
+
+
+class RecordedArm:
+    """One controller's diagram with loggers, to simulate by itself or in a diagram around it.
+
+    Attributes:
+        diagram: output ports `state` (2n,) and `q_ref` (n,).
+        systems: see `ControlledArm`.
+    """
+
+    def __init__(
+        self,
+        scenario: TrackingScenario,
+        controller: str,
+        models: Mapping[str, FeedforwardModel],
+        effects: Sequence[UndeclaredEffect] = (),
+    ) -> None:
+        """See `track`."""
+        self._scenario, self._controller = scenario, controller
+        builder, period = DiagramBuilder(), scenario.plant.config.time_step
+        self.systems = add_controlled_arm(builder, scenario, controller, models, effects)
+        plant, reference = self.systems.plant, self.systems.reference
+        controller_torque = self.systems.controller.GetOutputPort("tau")
+        ports = (plant.GetOutputPort("state"), plant.GetOutputPort("tau_drive"), controller_torque)
+        self._logs = [LogVectorOutput(port, builder, period) for port in ports]
+        builder.ExportOutput(plant.GetOutputPort("state"), "state")
+        builder.ExportOutput(reference.GetOutputPort("q_ref"), "q_ref")
+        self.diagram = builder.Build()
+
+    def recorded(self, root_context: Context) -> tuple[Array, Array, Array, Array]:
+        """Return time (N,), state (N, 2n), the drives' torques (N, n) and those that the controller asked for."""
+        state, tau, asked = (log.FindLog(root_context) for log in self._logs)
+        return state.sample_times().copy(), *(x.data().T.copy() for x in (state, tau, asked))
+
+    def result(self, root_context: Context) -> TrackingResult:
+        """Return what the run came to so far."""
+        time, state, tau, asked = self.recorded(root_context)
+        # whatever motion it follows, it is judged by the one that was asked for
+        tables, asked_for = self.systems.reference.tables, self._scenario.reference
+        if self.systems.followed is not asked_for:
+            tables = asked_for.evaluate(time)
+        return score(self._scenario, self._controller, time, tables, state, tau, asked)
+
+
+def add_controlled_arm(
+    builder: DiagramBuilder,
+    scenario: TrackingScenario,
+    controller: str,
+    models: Mapping[str, FeedforwardModel],
+    effects: Sequence[UndeclaredEffect] = (),
+) -> ControlledArm:
+    """Add a scenario's plant, reference and one of its controllers, as `track` runs them.
+
+    Raises `ValueError` when `models` has none for the controller.
+    """
+    kind = controller_named(controller)
+    model = kind.model(scenario, models, effects)
+    reference = kind.reference(scenario, model)
+    arm = add_arm_under(
+        builder,
+        scenario.plant,
+        kind.law(scenario, model),
+        reference,
+        model,
+        kind.step,
+        name=controller,
+        effects=effects,
+        torque_rate=scenario.rate,
+    )
+    if isinstance(reference, BoundedReference):
+        period = scenario.plant.config.time_step
+        arm.reference.set_torques(reference.torque(period * np.arange(len(arm.reference.tables[0]))))
+    return arm
+
+
+def score(
+    scenario: TrackingScenario,
+    controller: str,
+    time: Array,
+    tables: tuple[Array, Array, Array],
+    state: Array,
+    tau: Array,
+    asked: Array,
+) -> TrackingResult:
+    """Return what a run came to over the scenario's interval.
+
+    time : (N,) s; tables : q, v, vdot (K, n) of the reference, K >= N; state : (N, 2n)
+    tau, asked : (N, n) N*m (N), the drives' torques and those that the controller asked for
+    """
+    arm, steps = scenario.plant.arm, len(time)
+    q, v = state[:, : arm.n], state[:, arm.n :]
+    q_ref, v_ref = tables[0][:steps], tables[1][:steps]
+    first, last = np.searchsorted(time, np.asarray(scenario.score) - 1e-9)
+    scored = slice(int(first), int(last))
+    scale = np.where(arm.revolute, np.rad2deg(1.0), 1e3)
+    error = np.abs(q_ref[scored] - q[scored]) * scale
+    return TrackingResult(
+        controller,
+        time,
+        q_ref,
+        q,
+        tau,
+        scored,
+        eta=error.mean(axis=0),
+        rms=np.sqrt((error**2).mean(axis=0)),
+        largest=error.max(axis=0),
+        unit=tuple("deg" if turns else "mm" for turns in arm.revolute),
+        metrics=measure(
+            scenario.plant.config.time_step, error, v[scored], v_ref[scored], tau[scored], asked[scored]
+        ),
+    )

@@ -1,0 +1,51 @@
+"""The configuration of a simulated arm: its joints' friction, its instruments, and the ranges it may move in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from armloop.drake.plant.friction import JointFriction
+from armloop.experiment.excitation import MotionRanges
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What the arm is measured with.
+
+    encoder_counts : per revolution, and per `prismatic_lead` metres of a sliding joint (its screw); 0 for
+        ideal ones
+    torque_noise : standard deviation of white noise on the torque, as a part of each joint's RMS in the log
+    velocity_half_window : s; v is the central difference of the recorded q over this time to both sides
+    """
+
+    encoder_counts: int = 2**19
+    prismatic_lead: float = 0.02
+    torque_noise: float = 0.01
+    velocity_half_window: float = 0.006
+
+    def resolution(self, arm: Arm) -> Array:
+        """Return (n,) rad (m) per count, 0 for ideal encoders."""
+        travel = np.where(arm.revolute, 2 * np.pi, self.prismatic_lead)
+        return travel / self.encoder_counts if self.encoder_counts else 0.0 * travel
+
+    def encode(self, arm: Arm, q: Array) -> Array:
+        """Return positions (N, n) as the encoders read them."""
+        step = self.resolution(arm)
+        return np.round(q / step) * step if self.encoder_counts else q
+
+
+@dataclass(frozen=True, eq=False)
+class PlantConfig:
+    """A simulated arm's friction, instruments and the ranges its data are collected in.
+
+    friction : one per joint; ranges : Tables 1 and 3; time_step : s
+    """
+
+    friction: tuple[JointFriction, ...]
+    ranges: MotionRanges
+    instruments: Instruments = field(default_factory=Instruments)
+    time_step: float = 1e-3

@@ -1,0 +1,138 @@
+"""A physical effect as a system, to insert into a diagram or take out of it again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, LeafSystem_, System
+from pydrake.systems.primitives import Adder
+
+from armloop.drake.scalar_types import scalar_template
+from armloop.drake.scalars import functions_of, vector, with_signature, within
+from armloop.dynamics import effect_law
+from armloop.laws.effects import Value, effect_kind
+from armloop.laws.effects.base import number
+from armloop.laws.friction import Sliding, torque_along
+from armloop.robot.arm import Arm
+
+
+@scalar_template("EffectTorque_", __name__)
+def EffectTorque_(T: type) -> Any:
+    """Return the class for one scalar type."""
+
+    class Impl(LeafSystem_[T]):
+        """The torque of one effect, listed or a user's own: of a payload, a spring, a ripple, additional friction, ..
+
+        tau = law(q, v, vdot), what the drive must supply because of it (see `armloop.laws.effects`);
+        force = -tau, what it does to the arm.
+
+        Input ports: `state` (2n,) positions, then velocities; `vdot` (n,), only for effects whose torque depends on it, such
+        as `payload` and `rotor_inertia`. Output ports: `tau` (n,), to add to a feedforward; `force`
+        (n,), to add to a plant's applied generalized forces (`add_joint_forces`). N*m (N). Stateless; time enters where
+        the law knows it. Scalar types float, AutoDiffXd and Expression.
+
+        The sign of dry friction is smoothed as tanh(v / `smoothing`). Friction that grows with the load takes the load
+        from the input port `load` (n,), declared for it alone.
+
+        An inertia cannot be added to a plant by a force, for its acceleration would depend on itself: on a plant,
+        connect `vdot` to the reference's, to a delayed measurement, or build the plant with the effect
+        (`ArmPlant`, `ForwardDynamics` of an augmented model). Not supported: the sensors' effects, which are in
+        the record and not in the arm; `presliding_hysteresis` acts as if fully slid, `PreslidingFriction` remembers.
+        """
+
+        def _construct(
+            self,
+            arm: Arm,
+            name: str,
+            joint: int | None,
+            parameters: Mapping[str, Value],
+            *,
+            other_joint: int | None = None,
+            inertial: Any = None,
+            smoothing: float = 0.01,
+            converter: Any = None,
+        ) -> None:
+            """arm : of n joints; name, joint, other_joint (from 1), parameters : as in `diagnosis.json`, SI units;
+            inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.inertial_parameters()`).
+
+            Raises `ModelError` for an effect without such a law.
+            """
+            if not smoothing > 0:
+                raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = arm, name, joint, dict(parameters)
+            self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
+            self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
+            event = effect_kind(name).role == "event"
+            self._interval = (number(parameters["start"]), number(parameters["end"])) if event else None
+            n = self._n = arm.n
+            self._state = self.DeclareVectorInputPort("state", 2 * n)
+            self._vdot = self.DeclareVectorInputPort("vdot", n) if self._law.has_inertia else None
+            rubbing = self._law.friction.terms if self._law.friction else ()
+            by_load = any(t.element.by_load for t in rubbing)
+            self._load = self.DeclareVectorInputPort("load", n) if by_load else None
+            sources = {self.all_input_ports_ticket(), self.time_ticket()}
+            for port, factor in (("tau", 1.0), ("force", -1.0)):
+                self.DeclareVectorOutputPort(port, n, partial(self._calc, factor), sources)
+
+        def _construct_copy(self, other: Any, converter: Any = None) -> None:
+            Impl._construct(self, *other._arguments, **other._options, converter=converter)
+
+        def _calc(self, factor: float, context: Any, output: Any) -> None:
+            n, law = self._n, self._law
+            state = self._state.Eval(context).tolist()
+            q, v = state[:n], state[n:]
+            tau: list[Any] = [0.0] * n
+            if law.equations is not None:
+                still = [0.0] * n
+                tau = law.equations.torque(
+                    q, v, still if self._vdot is None else self._vdot.Eval(context).tolist()
+                )
+            if law.friction is not None:
+                along, terms = law.friction
+                w, functions = along.of(v), functions_of(T)
+                sign = functions.tanh(w / self._options["smoothing"])
+                load = 0.0 if self._load is None else self._load.Eval(context).tolist()[along.joint]
+                x = Sliding(along.of(q), w, sign, context.get_time())
+                along.add(tau, torque_along(terms, x, load, functions, sharp=False))
+            if self._interval is not None:
+                factor = factor * within(T, context.get_time(), *self._interval)
+            output.SetFromVector(vector(T, [factor * x for x in tau]))
+
+    return Impl
+
+
+EffectTorque = with_signature(EffectTorque_[None])
+
+
+def add_joint_forces(
+    builder: DiagramBuilder, plant: MultibodyPlant, systems: Sequence[System]
+) -> list[System]:
+    """Add friction and effects to a plant of one's own; leave one out of the list, and it is gone.
+
+    Each system's `force` is summed into the plant's applied generalized forces, and its `state` port is fed
+    the plant's state. Further ports (`vdot`, `load`) stay to be connected.
+
+    plant : finalized, in the builder, one degree of freedom per joint of the systems; its port for applied
+        generalized forces must be free
+    systems : such as `JointFrictionSystem`, `PreslidingFriction`, `EffectTorque`, not yet in the builder
+
+    Returns the systems added.
+    """
+    n = plant.num_velocities()
+    for system in systems:
+        size = system.GetInputPort("state").size()
+        if size != 2 * n:
+            raise ValueError(
+                f"{system.get_name() or type(system).__name__}: is for {size // 2} joints, the plant has {n}"
+            )
+    total = builder.AddSystem(Adder(len(systems), n))
+    for index, system in enumerate(systems):
+        builder.AddSystem(system)
+        builder.Connect(plant.get_state_output_port(), system.GetInputPort("state"))
+        builder.Connect(system.GetOutputPort("force"), total.get_input_port(index))
+    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
+    return list(systems)

@@ -1,0 +1,188 @@
+"""Fault injection: effects that a plant has and nobody declared, put into the simulated arm itself.
+
+The laws are those of the diagnosis (:mod:`armloop.laws.effects`), with its sign: what the drive must supply *in addition* (a
+spring k (q - q0) pulls on the plant with -k (q - q0)), or what the sensor says. Nothing here knows how they are found
+again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from armloop.drake.plant.own_effects import Law, own_law
+from armloop.laws.effects import EFFECTS as LISTED
+from armloop.laws.effects import REGISTRY, Effect, effect, effect_kind
+from armloop.laws.effects.base import Placed, number
+from armloop.laws.effects.external_contact import ExternalContact
+from armloop.laws.effects.gravity_tilt import GravityTilt, base_rotation
+from armloop.laws.effects.payload import Payload
+from armloop.laws.friction import KINDS
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.errors import ModelError, ScenarioError
+
+Fault = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""What a sensor makes of q and tau (N, n), recorded at times (N,)."""
+
+EFFECTS: tuple[str, ...] = tuple(name for name in LISTED if name != "external_torque")
+"""The listed effects that can be put into a plant; a user's own can, too. A torque from outside on one joint cannot."""
+
+
+@dataclass(frozen=True)
+class UndeclaredEffect:
+    """One effect in the plant.
+
+    name : one of `EFFECTS`, or an effect of the user's own (`armloop.laws.effects.register`)
+    joint : 1-based joint number; None for what belongs to the whole arm
+    other_joint : the other joint of an effect of a pair, such as `transmission_coupling`, else None
+    parameters : in SI units, those of its class in `armloop.laws.effects`, which says its law and their bounds; a payload
+        without an `own_inertia` is a steel ball, and `com` and `force` have three components
+
+    Raises `ScenarioError` for an unknown name, a joint given or missing, or wrong parameters.
+    """
+
+    name: str
+    joint: int | None
+    parameters: Mapping[str, Any]
+    other_joint: int | None = None
+
+    def __post_init__(self) -> None:
+        try:
+            kind = effect_kind(self.name)
+        except ModelError as error:
+            names = ", ".join([*EFFECTS, *REGISTRY.own_names()])
+            raise ScenarioError(f"effect {self.name!r} is unknown; the plant can have: {names}") from error
+        if self.name in LISTED and self.name not in EFFECTS:
+            raise ScenarioError(
+                f"effect {self.name}: the plant cannot have it; it can have: {', '.join(EFFECTS)}"
+            )
+        fault = _fault(kind, self)
+        if fault:
+            raise ScenarioError(f"effect {self.name}: {fault}")
+
+    def build(self) -> Effect:
+        """Return the effect whose law it is."""
+        return effect(self.name, self.joint, self.other_joint)
+
+
+def _fault(kind: type[Effect], given: UndeclaredEffect) -> str:
+    """Return what is wrong with an effect for a plant; empty if nothing is."""
+    if (given.joint is None) == kind.joint_wise:
+        needed = (
+            "a number: it is at a joint, from 1"
+            if kind.joint_wise
+            else "null: it is at no joint, but of the whole arm"
+        )
+        return f"joint must be {needed}; it is {given.joint}"
+    if (given.other_joint is not None) != kind.pair_wise:
+        return f"other_joint is {given.other_joint}; only effects of a pair of joints have one"
+    if kind.sensor and kind.falsified is Effect.falsified:
+        return "falsifies the record; the plant takes effects that are torques of q and v"
+    if kind.memory and kind.name not in LISTED and not getattr(kind, "elements", ()):
+        return "depends on the past; the plant takes effects that are torques of q and v"
+    if kind.name not in LISTED and not getattr(kind, "elements", ()):
+        return ""  # its parameters are tried by its law
+    return _wrong_parameters(kind, given.parameters)
+
+
+def _wrong_parameters(kind: type[Effect], parameters: Mapping[str, Any]) -> str:
+    names = {p.name: p for p in kind.parameters}
+    needed = {name for name, p in names.items() if p.default is None}
+    if not needed <= set(parameters) <= set(names):
+        given = ", ".join(parameters) or "none"
+        return f"parameters are {given}; they must be {', '.join(p for p in names if p in needed)}"
+    for name, value in parameters.items():
+        fault = names[name].fault(value)
+        if fault:
+            return f"{name} is {value!r}; it {fault}"
+    return kind.fault(parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Realisation:
+    """The effects as quantities of the plant, n joints.
+
+    viscous, rotor_inertia : (n,), which Drake's joints and drives take
+    laws : all other laws along a direction
+    faults : of the sensors, in the order in which they falsify a record
+    contacts : start, end and force (3,) in the base frame
+    payloads : mass, centre of mass (3,) in the last link's frame, own inertia or None for that of a steel ball
+    R_WB : (3, 3) rotation of the base in the level world
+    own : laws of the user's own effects that are known for floats alone
+    """
+
+    viscous: Array
+    rotor_inertia: Array
+    laws: tuple[Placed, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    contacts: tuple[tuple[float, float, Array], ...] = ()
+    payloads: tuple[tuple[float, Array, float | None], ...] = ()
+    R_WB: Array = field(default_factory=lambda: np.eye(3))
+    own: tuple[Law, ...] = ()
+
+
+def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
+    """Turn effects into what the plant of `arm` must be given; equal effects add up.
+
+    Raises `ScenarioError` when a joint number is not one of the arm's.
+    """
+    viscous, rotor_inertia, R_WB = np.zeros(arm.n), np.zeros(arm.n), np.eye(3)
+    laws: list[Placed] = []
+    faults: list[tuple[int, Fault]] = []
+    contacts: list[tuple[float, float, Array]] = []
+    payloads: list[tuple[float, Array, float | None]] = []
+    own: list[Law] = []
+    for given in effects:
+        for joint in (given.joint, given.other_joint):
+            if joint is not None and not 1 <= joint <= arm.n:
+                raise ScenarioError(f"effect {given.name}: joint {joint}; {arm.name} has joints 1 to {arm.n}")
+        kind, p = given.build(), given.parameters
+        law = None if kind.sensor else kind.placed(p)
+        if kind.sensor:
+            faults.append((kind.fault_order, partial(_falsified, kind, p)))
+        elif isinstance(kind, Payload):
+            com = arm.X_tool[:3, :3] @ np.asarray(p["com"], dtype=float) + arm.X_tool[:3, 3]
+            ball = p.get("own_inertia")
+            payloads.append((float(p["mass"]), com, None if ball is None else float(ball)))
+        elif isinstance(kind, GravityTilt):
+            R_WB = R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
+        elif isinstance(kind, ExternalContact):
+            contacts.append((float(p["start"]), float(p["end"]), np.asarray(p["force"], dtype=float)))
+        elif law is None:
+            own.append(own_law(arm, kind, p))
+        else:
+            # what the joints of Drake's plant have by themselves is left to them
+            simple = {"inertia": rotor_inertia, "viscous": viscous} if not law.along.ratio else {}
+            rest = []
+            for term in law.terms:
+                name = "viscous" if term.element is KINDS["viscous"] else term.element.part
+                if name in simple:
+                    simple[name][law.along.joint] += term.coefficient
+                else:
+                    rest.append(term)
+            if rest:
+                laws.append(Placed(law.along, tuple(rest)))
+    in_order = tuple(fault for _, fault in sorted(faults, key=lambda item: item[0]))
+    return Realisation(
+        viscous,
+        rotor_inertia,
+        tuple(laws),
+        in_order,
+        tuple(contacts),
+        tuple(payloads),
+        R_WB,
+        tuple(own),
+    )
+
+
+def _falsified(
+    kind: Effect, parameters: Mapping[str, Any], time: Array, q: Array, tau: Array
+) -> tuple[Array, Array]:
+    found = kind.falsified(time, q, tau, parameters)
+    assert found is not None
+    return found

@@ -1,0 +1,55 @@
+"""Dry and viscous friction of a joint: the Stribeck law, Eq. (34) of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armloop.laws.friction import stribeck_fall
+from armloop.util.functions import NUMPY, Functions
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """Parameters of f(v) = [f_c + (f_s - f_c) exp(-(v/v_s)^2)] sign(v) + f_v v.
+
+    static, coulomb : f_s >= f_c >= 0 in N*m (N for a prismatic joint)
+    stribeck_velocity : v_s > 0 in rad/s (m/s)
+    viscous : f_v >= 0 in N*m*s/rad (N*s/m)
+
+    Raises `ValueError` for a value outside these ranges.
+    """
+
+    static: float = 0.0
+    coulomb: float = 0.0
+    stribeck_velocity: float = 0.1
+    viscous: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = (self.static, self.coulomb, self.stribeck_velocity, self.viscous)
+        if not all(np.isfinite(values)):
+            raise ValueError(f"friction parameters must be finite numbers; they are {values}")
+        if self.coulomb < 0 or self.viscous < 0:
+            raise ValueError(f"coulomb {self.coulomb} and viscous {self.viscous} must not be negative")
+        if self.static < self.coulomb:
+            raise ValueError(f"static {self.static} must be at least coulomb {self.coulomb}")
+        if self.stribeck_velocity <= 0:
+            raise ValueError(f"stribeck_velocity {self.stribeck_velocity} must be above 0")
+
+    def level(self, v: Any, functions: Functions = NUMPY) -> Any:
+        """Return the level of the dry part at `v`, a number of any kind."""
+        return self.coulomb + (self.static - self.coulomb) * stribeck_fall(
+            v, self.stribeck_velocity, functions
+        )
+
+    def dry(self, v: ArrayLike) -> NDArray[np.float64]:
+        """Return the part with sign(v) at `v` (any shape); 0 at rest, where it is not determined."""
+        v = np.asarray(v, dtype=float)
+        return np.asarray(self.level(v) * np.sign(v))
+
+    def force(self, v: ArrayLike) -> NDArray[np.float64]:
+        """Return f(v), what the drive must supply to keep sliding at `v` (any shape)."""
+        return self.dry(v) + self.viscous * np.asarray(v, dtype=float)

@@ -1,0 +1,71 @@
+"""Stribeck friction, Eq. (34), fitted to that of a reconstructed model: what a simulated plant of the arm is given."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import nnls
+
+from armloop.drake.plant.friction import JointFriction
+from armloop.dynamics import ModelEquations, training_range
+from armloop.laws.friction import stribeck_fall
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+from armloop.util.functions import NUMPY
+
+_SPEEDS = 60
+_VELOCITIES = np.geomspace(0.005, 1.0, 40)  # v_s tried, as parts of the largest speed
+_EXACT = {"sign", "stribeck", "viscous"}
+_POSTURES = 20
+
+
+def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
+    """The Stribeck law of each joint, (n,), that follows from a model's friction.
+
+    A law of that form is taken as it is. Of any other the mean over both directions, over postures within the
+    training range (for friction that grows with the load) and fully slid, is fitted by variable projection: v_s from a
+    grid, the levels by non-negative least squares over speeds up to the largest of the training.
+    """
+    found: list[JointFriction] = []
+    curves: tuple[Array, Array] | None = None
+    for j, terms in enumerate(model.friction.terms):
+        effects = [a for a in model.effects if a.effect.joint == j + 1 and a.effect.name.endswith("friction")]
+        if {t.kind for t in terms} <= _EXACT and not effects:
+            p = model.friction.stribeck_parameters(j)
+            static, coulomb = max(p["static"], 0.0), max(p["coulomb"], 0.0)
+            speed = p.get("stribeck_velocity", 0.1)
+            found.append(JointFriction(max(static, coulomb), coulomb, speed, max(p.get("viscous", 0.0), 0.0)))
+            continue
+        curves = curves or _curves(model)
+        found.append(_fitted(curves[0][:, j], curves[1][:, j]))
+    return tuple(found)
+
+
+def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
+    """Speeds (K, n) and the mean friction at them, (K, n)."""
+    n = model.arm.n
+    top = np.array(model.history.get("range", [[1.0] * n] * 3), dtype=float)[1]
+    speeds = np.geomspace(1e-3, 1.0, _SPEEDS)[:, None] * np.maximum(top, 1e-2)
+    lower, upper = training_range(model)
+    q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, n))
+    equations = ModelEquations(model, NUMPY)
+    still = [np.zeros(_POSTURES)] * n
+    load = equations.load([q[:, j] for j in range(n)], still, still)
+    sizes = [np.abs(np.broadcast_to(x, (_POSTURES,))).mean() for x in load]
+    loads = [np.full(_SPEEDS, x) for x in sizes]
+    ways = []
+    for way in (1.0, -1.0):
+        friction = equations.friction([way * speeds[:, j] for j in range(n)], loads, 1e300)
+        ways.append(way * np.stack([np.broadcast_to(x, (_SPEEDS,)) for x in friction], axis=1))
+    return speeds, 0.5 * (ways[0] + ways[1])
+
+
+def _fitted(v: Array, friction: Array) -> JointFriction:
+    best: tuple[float, float, Array] | None = None
+    for part in _VELOCITIES:
+        v_s = part * v.max()
+        x, left = nnls(np.column_stack([stribeck_fall(v, v_s), np.ones_like(v), v]), friction)
+        if best is None or left < best[0]:
+            best = float(left), float(v_s), x
+    assert best is not None
+    _, v_s, (excess, coulomb, viscous) = best
+    return JointFriction(float(excess + coulomb), float(coulomb), v_s, float(viscous))

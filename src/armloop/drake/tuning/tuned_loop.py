@@ -1,0 +1,104 @@
+"""One set of PID gains looked at from all sides: margins, a small step, tracking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armloop.drake.control.pid import PidGains
+from armloop.drake.experiments.scenarios import TrackingScenario
+from armloop.drake.experiments.tracking import TrackingResult, run_tracking
+from armloop.drake.tuning.loop_analysis import (
+    LoopMargins,
+    SampledArm,
+    cut_loop,
+    posture_model,
+    sampled_margins,
+)
+from armloop.drake.tuning.step_check import linear_step, simulated_step
+from armloop.util.arrays import Array
+
+STEP = 1.0  # deg (mm), the small step
+_POSTURES = 10  # along the reference
+
+
+@dataclass(frozen=True, eq=False)
+class TunedLoop:
+    """One set of gains, looked at from all sides.
+
+    Attributes:
+        margins: per joint, in the posture where the reference begins, all loops closed.
+        worst: least phase margin in deg and largest sensitivity peak, (n,) each, over postures along the reference.
+        stable: whether every mode decays in all of these postures.
+        w, loops: rad/s (W,), and the joints' loops (W, n), the others closed.
+        time, linear, smooth, dry: s (N,), and the answers (N, n) to a small step of all joints, in deg (mm), by the linear
+            loop and by the simulated arm without and with its dry friction.
+        tracking: PID alone and PID with the exact model on the scenario's reference.
+    """
+
+    gains: PidGains
+    margins: list[LoopMargins]
+    worst: tuple[Array, Array]
+    stable: bool
+    w: Array
+    loops: Array
+    time: Array
+    linear: Array
+    smooth: Array
+    dry: Array
+    tracking: dict[str, TrackingResult]
+
+    def deviation(self) -> Array:
+        """(n,) largest difference between the linear answer and the simulated one without dry friction, part of the step."""
+        return np.asarray(np.abs(self.linear - self.smooth).max(axis=0) / STEP)
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning:
+    """The scenario's own gains and the proposed ones; bandwidth in rad/s and margin in deg as they were wanted."""
+
+    scenario: TrackingScenario
+    bandwidth: float
+    margin: float
+    present: TunedLoop
+    proposed: TunedLoop
+
+
+def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
+    """Return what a scenario's arm does with these gains, in the posture where its reference begins and along it."""
+    q0 = scenario.reference.evaluate([0.0])[0][0]
+    plant, period = scenario.plant, scenario.plant.config.time_step
+    unit = np.where(plant.arm.revolute, np.deg2rad(STEP), 1e-3 * STEP)
+    shown = np.where(plant.arm.revolute, np.rad2deg(1.0), 1e3)
+    sampled = SampledArm.of(posture_model(plant.arm, plant.config.friction, q0), period)
+    margins = sampled_margins(sampled, gains)
+    w = np.geomspace(0.1, np.pi / period, 600)
+    L = sampled.loops(gains, w)
+    postures = scenario.reference.evaluate(np.linspace(0, scenario.reference.duration, _POSTURES + 1)[:-1])[0]
+    others = [SampledArm.of(posture_model(plant.arm, plant.config.friction, q), period) for q in postures]
+    along = [sampled_margins(other, gains, points=500) for other in others]
+    # long enough for the slowest joint's loop to settle but for the integrator's tail
+    slowest = min(m.bandwidth for m in margins)
+    duration = period * round(float(np.clip(25 / slowest, 0.3, 5.0)) / period)
+    time, linear = linear_step(sampled, gains, unit, duration)
+    smooth, dry = (
+        simulated_step(plant, gains, q0, unit, duration, dry=with_dry)[1] for with_dry in (False, True)
+    )
+    tracking = run_tracking(replace(scenario, gains=gains, controllers=("pid", "exact")), {})
+    return TunedLoop(
+        gains,
+        margins,
+        (
+            np.array([[m.phase_margin for m in row] for row in along]).min(axis=0),
+            np.array([[m.sensitivity_peak for m in row] for row in along]).max(axis=0),
+        ),
+        all(other.is_stable(gains) for other in (sampled, *others)),
+        w,
+        np.stack([cut_loop(L, i) for i in range(plant.arm.n)], axis=1),
+        time,
+        linear * shown,
+        smooth * shown,
+        dry * shown,
+        tracking,
+    )

@@ -1,0 +1,1 @@
+"""Pictures of simulated arms in Meshcat: live, and as a recorded replay."""

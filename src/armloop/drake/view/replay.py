@@ -1,0 +1,59 @@
+"""A recorded replay of tracking runs as one HTML file that works offline (Meshcat)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import MeshcatVisualizer
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+
+from armloop.drake.view.scene import add_actors, local_meshcat
+from armloop.robot.arm import Arm
+from armloop.util.files import write_text
+
+
+class Recorded(Protocol):
+    """Samples of a run: time (N,) in s, positions and the reference's positions (N, n)."""
+
+    @property
+    def time(self) -> NDArray[np.float64]: ...
+    @property
+    def q(self) -> NDArray[np.float64]: ...
+    @property
+    def q_ref(self) -> NDArray[np.float64]: ...
+
+
+def write_replay(
+    path: str | Path, arm: Arm, results: Mapping[str, Recorded], *, frames_per_second: float = 25.0
+) -> None:
+    """Write a replay of tracking runs: the arms side by side, a colour per controller, each in a grey ghost.
+
+    The ghost is the reference. The Meshcat server listens on the loopback interface only and ends with this call. The
+    file is written whole or not at all; raises `InputError` when it cannot be.
+    """
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    actors = add_actors(plant, arm, list(results))
+    plant.Finalize()
+    meshcat = local_meshcat()
+    visualizer = MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    visualizer.StartRecording(set_transforms_while_recording=False)
+    time = next(iter(results.values())).time
+    for t in np.arange(time[0], time[-1], 1.0 / frames_per_second):
+        row = int(np.searchsorted(time, t))
+        context.SetTime(float(t))
+        for pair, result in zip(actors, results.values(), strict=True):
+            plant.SetPositions(plant_context, pair.arm, result.q[row])
+            plant.SetPositions(plant_context, pair.ghost, result.q_ref[row])
+        diagram.ForcedPublish(context)
+    visualizer.StopRecording()
+    visualizer.PublishRecording()
+    write_text(path, meshcat.StaticHtml())

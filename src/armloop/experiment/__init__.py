@@ -1,0 +1,1 @@
+"""Experiment design: exciting references, the ranges they keep to, and samples of states."""

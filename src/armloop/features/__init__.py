@@ -1,0 +1,1 @@
+"""Libraries of candidate functions of the joint torques, one kind a file."""

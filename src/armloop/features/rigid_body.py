@@ -1,0 +1,182 @@
+"""The rigid-body library: base parameters, the combinations of link inertias that the torques reveal.
+
+The torques of a rigid arm are linear in ten inertial parameters a link, and in one rotor inertia a joint
+(the motor's, seen through the gear: tau_i = J_i vdot_i; in geared arms it rivals the links' own). Many of
+them act only in sums. The base parameters are a smallest set of sums that determines all torques; their
+columns have full rank. They are found numerically, by QR decompositions of the regressor on random
+motion (Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic Systems
+8(4), 1991), for any chain of revolute and prismatic joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from armloop.data.motion import Motion
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import LINK_PARAMETERS, regressor
+from armloop.util.arrays import Array
+
+#: Within a link, what to keep first when one of several parameters must stand for the sum.
+_PREFERENCE = ("mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m")
+#: Columns that differ by less than this, relative to their size, are one (URDFs write pi/2 to 12 digits).
+_TOLERANCE = 1e-8
+_EXCITATION = 200
+
+
+def parameter_names(n: int, rotors: bool = False) -> list[str]:
+    """Names of the full parameters of n links, ``m1, mx1, ... Iyz1, m2, ...``, then rotors ``J1 ... Jn``."""
+    links = [f"{name}{link + 1}" for link in range(n) for name in LINK_PARAMETERS]
+    return links + [f"J{joint + 1}" for joint in range(n) if rotors]
+
+
+def full_columns(arm: Arm, motion: Motion, rotors: bool = False) -> Array:
+    """Torques per unit of every full parameter, (N, n, 10 n), or (N, n, 11 n) with rotor inertias."""
+    columns = regressor(arm, motion.q, motion.v, motion.vdot)
+    if not rotors:
+        return columns
+    return np.concatenate([columns, motion.vdot[:, :, None] * np.eye(arm.n)], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """r sums of the P full parameters that determine the torques: ``base = grouping @ full``.
+
+    Each sum is led by one kept parameter with coefficient one, and the kept parameter's column of the
+    regressor is the column of the sum: ``full_columns == full_columns[:, :, kept] @ grouping``.
+
+    Attributes:
+        kept: (r,) indices of the leading parameters among the full ones, rising.
+        grouping: (r, P) the sums.
+        rotors: whether the full parameters include the joints' rotor inertias.
+    """
+
+    kept: NDArray[np.intp]
+    grouping: Array
+    rotors: bool = False
+
+    @classmethod
+    def of_arm(cls, arm: Arm, rotors: bool = False, seed: int = 0) -> BaseParameters:
+        """The base parameters of an arm's structure, from its regressor on random motion.
+
+        Sums are led by parameters near the base: a link's mass is shared out over the links before it,
+        as is usual. Which parameters can be seen depends on ``arm.gravity`` too.
+        """
+        rng = np.random.default_rng(seed)
+        q = rng.uniform(-np.pi, np.pi, (_EXCITATION, arm.n))
+        v, vdot = rng.normal(size=(2, _EXCITATION, arm.n))
+        random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot, np.array([0]))
+        columns = full_columns(arm, random, rotors)
+        return cls._keeping(columns, _independent(_rows(columns), _usual_order(arm.n, rotors)), rotors)
+
+    @classmethod
+    def of_columns(cls, columns: Array, tolerance: float, rotors: bool = False) -> BaseParameters:
+        """The sums that one motion can tell apart, by a rank-revealing pivoted QR.
+
+        Args:
+            columns: (N, n, P) of :func:`full_columns` on that motion.
+            tolerance: a column counts as dependent if less than this part of the largest scaled pivot is
+                its own; around 1e-3 for measured motion, since what excites less is lost in the noise.
+            rotors: whether the columns include rotor inertias.
+        """
+        rows = _rows(columns)
+        scale = np.linalg.norm(rows, axis=0)
+        alive = np.flatnonzero(scale > _TOLERANCE * scale.max(initial=0.0))
+        upper, pivots = qr(rows[:, alive] / scale[alive], mode="r", pivoting=True)
+        pivot_sizes = np.abs(np.diag(upper))
+        rank = int(np.count_nonzero(pivot_sizes > tolerance * pivot_sizes.max(initial=0.0)))
+        return cls._keeping(columns, np.sort(alive[pivots[:rank]]), rotors)
+
+    @classmethod
+    def _keeping(cls, columns: Array, kept: NDArray[np.intp], rotors: bool) -> BaseParameters:
+        rows = _rows(columns)
+        grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
+        grouping[np.abs(grouping) < _TOLERANCE] = 0.0
+        grouping[:, kept] = np.eye(len(kept))
+        return cls(kept, grouping, rotors)
+
+    @property
+    def count(self) -> int:
+        """The number r of base parameters."""
+        return len(self.kept)
+
+    @property
+    def positive(self) -> NDArray[np.bool_]:
+        """(r,) sums that no arm makes negative: of masses, principal and rotor inertias, each times a positive number."""
+        links = self.grouping.shape[1] // (11 if self.rotors else 10)
+        never = [name in ("m", "Ixx", "Iyy", "Izz") for _ in range(links) for name in LINK_PARAMETERS]
+        never += [True] * (links if self.rotors else 0)
+        return np.asarray(((self.grouping == 0) | ((self.grouping > 0) & np.array(never))).all(axis=1))
+
+    @property
+    def names(self) -> list[str]:
+        """Every sum in readable form, such as ``"Izz1 + Iyy2 + 0.376 m3"`` (SI units)."""
+        labels = parameter_names(self.grouping.shape[1] // (11 if self.rotors else 10), self.rotors)
+        return [_sum(row, labels, int(lead)) for row, lead in zip(self.grouping, self.kept, strict=True)]
+
+    def columns(self, arm: Arm, motion: Motion) -> Array:
+        """(N, n, r) torques per unit of every base parameter."""
+        return full_columns(arm, motion, self.rotors)[:, :, self.kept]
+
+    def step_columns(self, arm: Arm, motion: Motion) -> tuple[Array, Array, Array]:
+        """The columns split as the stepwise method meets them; the three (N, n, r) add up to ``columns``.
+
+        Step I is gravity (at rest), step II what velocity adds to it, step III what acceleration adds.
+        """
+        rest = np.zeros_like(motion.v)
+        gravity = self.columns(arm, Motion(motion.time, motion.q, rest, rest, motion.starts))
+        coasting = self.columns(arm, Motion(motion.time, motion.q, motion.v, rest, motion.starts))
+        return gravity, coasting - gravity, self.columns(arm, motion) - coasting
+
+    def from_full(self, full: Array) -> Array:
+        """(r,) base parameters of (P,) full ones."""
+        return self.grouping @ full
+
+    def to_full(self, base: Array, nominal: Array | None = None) -> Array:
+        """The (P,) full parameters nearest to ``nominal`` (zero by default) that have these base parameters.
+
+        They give the same torques as every other choice, but a link alone need not be physical.
+        """
+        start = np.zeros(self.grouping.shape[1]) if nominal is None else np.asarray(nominal, dtype=float)
+        change = np.linalg.lstsq(self.grouping, base - self.grouping @ start, rcond=None)[0]
+        return np.asarray(start + change)
+
+
+def _rows(columns: Array) -> Array:
+    return columns.reshape(-1, columns.shape[2])
+
+
+def _usual_order(n: int, rotors: bool) -> list[int]:
+    within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
+    links = [10 * link + index for link in range(n) for index in within]
+    return links + [10 * n + joint for joint in range(n) if rotors]
+
+
+def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
+    """Indices, rising, of the columns that are not sums of those before them in ``order``."""
+    basis, kept = np.empty((len(rows), 0)), []
+    sizes = np.linalg.norm(rows, axis=0)
+    for index in order:
+        column, size = rows[:, index], sizes[index]
+        if size <= _TOLERANCE * sizes.max():  # what no torque feels is round-off, not exactly zero
+            continue
+        own = column / size
+        for _ in range(2):  # Gram-Schmidt twice is orthogonal to machine precision
+            own = own - basis @ (basis.T @ own)
+        if np.linalg.norm(own) > _TOLERANCE:
+            basis = np.column_stack([basis, own / np.linalg.norm(own)])
+            kept.append(index)
+    return np.sort(np.array(kept, dtype=np.intp))
+
+
+def _sum(row: Array, labels: list[str], lead: int) -> str:
+    text = labels[lead]
+    for index in np.flatnonzero(row):
+        if index != lead:
+            size = f"{abs(row[index]):.3g}"
+            text += (" + " if row[index] > 0 else " - ") + (size + " " if size != "1" else "") + labels[index]
+    return text

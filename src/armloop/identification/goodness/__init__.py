@@ -1,0 +1,11 @@
+"""How good a model is: the parts of the measured torque that it explains, that it could explain, and that is noise.
+
+Only motions, torques and residuals come in, so that a reconstruction and the diagnosis of any run use the same
+measure.
+"""
+
+from armloop.identification.goodness.parts import Parts, merged, parts_of
+from armloop.identification.goodness.ranges import outside_trained_range
+from armloop.identification.goodness.witness import Witness, witness
+
+__all__ = ["Parts", "Witness", "merged", "outside_trained_range", "parts_of", "witness"]

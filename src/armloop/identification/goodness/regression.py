@@ -1,0 +1,77 @@
+"""What a flexible regression predicts of a residual on data left out: ridge and boosted trees, stacked.
+
+The ridge finds weak laws that are smooth in the columns, trees those with edges and products. How much each is to be
+believed is a non-negative weight, learnt on folds that are not judged (Breiman, Stacked regressions, Machine
+Learning 24, 1996); where neither finds anything, both weights vanish, and so does the prediction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from armloop.identification.goodness.split import FOLDS, Split
+from armloop.util.arrays import Array
+
+#: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
+_PENALTIES = tuple(10.0**k for k in range(-5, 2))
+_FEWEST = 50
+
+
+def left_out(X: Array, y: Array, cut: Split) -> Array:
+    """(M,) prediction of y (M,) from X (M, p); each fold's from data that lie apart from it."""
+    made = np.zeros((len(y), 2))
+    for fold in range(FOLDS):
+        judged, fitted = cut.fold == fold, cut.fitted(fold)
+        if judged.any() and fitted.sum() >= _FEWEST:
+            made[judged, 0] = _ridge(X[fitted], y[fitted], cut.block[fitted], X[judged])
+            made[judged, 1] = _trees(X[fitted], y[fitted], X[judged])
+    stacked = np.zeros(len(y))
+    for fold in range(FOLDS):
+        judged = cut.fold == fold
+        weights = nnls(made[~judged], y[~judged])[0] if (~judged).any() else np.zeros(2)
+        stacked[judged] = made[judged] @ weights
+    return stacked
+
+
+def _ridge(X: Array, y: Array, block: NDArray[np.intp], asked: Array) -> Array:
+    """Ridge regression on standardised columns; the penalty by the error on blocks left out."""
+    mean, scale = X.mean(axis=0), X.std(axis=0)
+    used = scale > 1e-9 * np.maximum(np.abs(mean), 1e-300)
+    Z = np.column_stack([(X[:, used] - mean[used]) / scale[used], np.ones(len(X))])
+    inner = block % 4
+    parts = [(Z[inner == k], y[inner == k]) for k in range(4)]
+    G, b = [z.T @ z for z, _ in parts], [z.T @ t for z, t in parts]
+
+    def solved(A: Array, c: Array, count: int, penalty: float) -> Array:
+        return np.asarray(np.linalg.solve(A + penalty * max(count, 1) * np.eye(len(A)), c), dtype=float)
+
+    errors = []
+    for penalty in _PENALTIES:
+        error = 0.0
+        for k, (z, t) in enumerate(parts):
+            theta = solved(np.sum(G, axis=0) - G[k], np.sum(b, axis=0) - b[k], len(X) - len(z), penalty)
+            error += float(np.sum((t - z @ theta) ** 2))
+        errors.append(error)
+    theta = solved(np.sum(G, axis=0), np.sum(b, axis=0), len(X), _PENALTIES[int(np.argmin(errors))])
+    return np.column_stack([(asked[:, used] - mean[used]) / scale[used], np.ones(len(asked))]) @ theta
+
+
+def _trees(X: Array, y: Array, asked: Array) -> Array:
+    from sklearn.ensemble import HistGradientBoostingRegressor
+    from threadpoolctl import threadpool_limits
+
+    trees = HistGradientBoostingRegressor(
+        max_iter=22,
+        learning_rate=0.25,
+        max_leaf_nodes=12,
+        min_samples_leaf=20,
+        l2_regularization=1.0,
+        early_stopping=False,
+        max_bins=63,
+        random_state=0,
+    )
+    # so few rows are no work for threads, which would wait for each other on a busy machine
+    with threadpool_limits(1):
+        return np.asarray(trees.fit(X, y).predict(asked), dtype=float)

@@ -1,0 +1,107 @@
+"""Residuals beside all that they may depend on: rows to be judged, summed chunk by chunk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Samples
+from armloop.data.signals import independent_rows, smooth
+from armloop.identification.goodness.features import Scales, features
+from armloop.util.arrays import Array
+
+Rows = NDArray[np.bool_]
+
+#: Most rows of a joint, and seconds that runs of different logs lie apart.
+MOST, APART = 2500, 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class JointRows:
+    """Rows of one joint.
+
+    Attributes:
+        X: (M, p) what the residual may depend on.
+        residual, torque: (M,) N·m (N).
+        place: (M,) s, rising; runs lie far apart.
+        run: (M,) which run each lies in.
+        judged: (M,) whether the model has not been fitted on it.
+    """
+
+    X: Array
+    residual: Array
+    torque: Array
+    place: Array
+    run: NDArray[np.intp]
+    judged: Rows
+
+    def __add__(self, other: JointRows) -> JointRows:
+        after = (float(self.place[-1]) + APART if len(self.place) else 0.0) - (
+            float(other.place[0]) if len(other.place) else 0.0
+        )
+        run = other.run + (int(self.run[-1]) + 1 if len(self.run) else 0)
+        return JointRows(
+            np.concatenate([self.X, other.X]),
+            np.concatenate([self.residual, other.residual]),
+            np.concatenate([self.torque, other.torque]),
+            np.concatenate([self.place, other.place + after]),
+            np.concatenate([self.run, run]),
+            np.concatenate([self.judged, other.judged]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Rows of all joints; witnesses of different logs add."""
+
+    joints: tuple[JointRows, ...]
+
+    def __add__(self, other: Witness) -> Witness:
+        return Witness(tuple(a + b for a, b in zip(self.joints, other.joints, strict=True)))
+
+
+def witness(
+    residual: Array,
+    samples: Samples,
+    load: Array | None = None,
+    judged: Rows | None = None,
+    scales: Scales | None = None,
+    most: int = MOST,
+) -> Witness:
+    """Rows on which a residual is judged: of the joint that moves, no closer than the filter can tell apart.
+
+    Args:
+        residual: (N, n) measured minus predicted torque, N·m (N), through the samples' filter.
+        samples: the motion with the measured torque.
+        load: (N, n) torque that passes the joints, by the model.
+        judged: (N,) samples that the model has not been fitted on; all by default. The others help to find what
+            is predictable, and do not judge it.
+        scales: of all data, where these are a part of them.
+        most: rows of a joint, at most.
+    """
+    motion = samples.motion
+    scales = scales or Scales.of(motion)
+    judged = np.ones(motion.samples, dtype=bool) if judged is None else judged
+    run = np.repeat(np.arange(len(motion.starts)), [r.stop - r.start for r in motion.runs()])
+    place = (
+        np.concatenate([motion.time[r] - motion.time[r.start] for r in motion.runs()])
+        + _offsets(motion.runs(), motion.time)[run]
+    )
+    apart = independent_rows(samples)
+    found = []
+    for j in range(motion.joints):
+        rows = np.flatnonzero(apart & samples.moving[:, j])
+        rows = rows[:: max(1, int(np.ceil(len(rows) / most)))]
+        X = smooth(samples, features(motion, j, scales, load))[rows]
+        found.append(
+            JointRows(X, residual[rows, j], samples.tau[rows, j], place[rows], run[rows], judged[rows])
+        )
+    return Witness(tuple(found))
+
+
+def _offsets(runs: list[slice], time: Array) -> Array:
+    """(R,) where each run begins when all are laid out one after the other, far apart, s."""
+    lengths = [float(time[r.stop - 1] - time[r.start]) + APART for r in runs]
+    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]])

@@ -1,0 +1,241 @@
+"""Bandwidth selection: the corner of the low-pass by blocked cross-validation against one common target.
+
+Lowering the corner takes noise out of the velocities and accelerations that are regressed, and motion as well. The
+corners are compared by what rigid bodies with Coulomb and viscous friction, regressed on half of the blocks, leave on
+the other half of *one* torque, filtered at the highest corner for all of them: smoothing the torque itself gains
+nothing. Which corner is best is a property of the data, of the motion's speed and of the sensors' noise. The blocks that
+judge the model in the end (:mod:`armloop.identification.reconstruction.held_out`) take no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
+from armloop.data.pieces import LogSource
+from armloop.data.plausibility import is_time_series
+from armloop.data.signals import Conditioning, LowPass, ShortRunError, preprocess, uniform_period
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.held_out import held_out_intervals, within
+from armloop.identification.reconstruction.options import Options
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.errors import LogError
+
+#: Corners tried, as parts of the highest.
+_PARTS = (1.0, 0.71, 0.5, 0.35, 0.25)
+#: Of the corners whose error is within this factor of the least, the highest is taken: friction needs bandwidth.
+_AS_GOOD = 1.02
+#: A corner is at most so many times the sample rate; the Nyquist rate is half of it.
+_OF_RATE = 0.4
+#: Samples read, rows regressed (one a joint and instant), length of the blocks, s, and rows from which on a joint counts.
+_SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
+#: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
+_SLIDES, _FADES = 0.05, 0.01
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """The corner that was chosen, Hz, and (corner, mean nRMSE on blocks held out) of all that were tried."""
+
+    cutoff_hz: float
+    trials: tuple[tuple[float, float], ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return {"cutoff_hz": self.cutoff_hz, "trials": [list(trial) for trial in self.trials]}
+
+    def suited(self, how: Conditioning) -> Conditioning:
+        """A library's usual filter, with this corner where it is lower."""
+        return replace(how, cutoff_hz=min(how.cutoff_hz, self.cutoff_hz))
+
+    def notes(self) -> list[str]:
+        """What was chosen, and against what, where it is not the highest that was tried."""
+        if not self.trials or self.cutoff_hz == self.trials[0][0]:
+            return []
+        tried = ", ".join(f"{corner:.3g} Hz {error:.3f}" for corner, error in self.trials)
+        return [
+            f"low-pass of {self.cutoff_hz:.3g} Hz, chosen by cross-validation over blocks of one torque (nRMSE: {tried})"
+        ]
+
+
+def highest_corner(logs: Sequence[LogSource], how: Conditioning) -> float:
+    """The highest corner that is tried, Hz: at most ``how.cutoff_hz`` and at most 0.4 of the lowest sample rate."""
+    return min(how.cutoff_hz, *(round(_OF_RATE / log.period, 3) for log in even_selection(logs)))
+
+
+def choose_bandwidth(
+    logs: Sequence[LogSource],
+    arm: Arm,
+    how: Conditioning,
+    options: Options | None = None,
+    libraries: Sequence[Conditioning] = (),
+) -> Bandwidth:
+    """The corner for these logs, at most :func:`highest_corner`.
+
+    The highest corner stands where the data are too few, or do not move enough, to compare.
+
+    Args:
+        options: how the logs are dealt into blocks, of which those held out are left aside here.
+        libraries: usual filters of the libraries that are going to be regressed; ``how`` by default.
+    """
+    chosen = even_selection(logs)
+    if not all(is_time_series(log.q, log.runs()) for log in chosen):
+        return Bandwidth(how.cutoff_hz)
+    highest = highest_corner(logs, how)
+    corners = [round(part * highest, 3) for part in _PARTS]
+    corners[0] = highest
+    # every corner must see the same logs: those that are long enough for the lowest
+    long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
+    if not any(long):
+        return Bandwidth(highest)
+    filters = {Bandwidth(corner).suited(one) for corner in corners for one in (libraries or (how,))}
+    held_out = held_out_intervals(logs, sorted(filters, key=astuple), options or Options())
+    aside = [held_out[k] for k, enough in zip(_selected(logs), long, strict=True) if enough]
+    chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
+    base = BaseParameters.of_arm(arm, rotors=True)
+    tables = [table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners]
+    if any(table is None for table in tables):
+        return Bandwidth(highest)
+    made = [table for table in tables if table is not None]
+    rows = made[0].moving
+    counted = rows.sum(axis=0) >= _FEWEST
+    if not counted.any():
+        return Bandwidth(highest)
+    errors = []
+    for table in made:
+        left = _held_out(replace(table, moving=rows, tau=made[0].tau))
+        size = [root_mean_square(made[0].tau[own, j]) for j, own in enumerate(rows.T)]
+        relative = [left[j] / max(float(size[j]), 1e-300) for j in np.flatnonzero(counted)]
+        errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, 1e-12))))))
+    good = [corner for corner, error in zip(corners, errors, strict=True) if error <= _AS_GOOD * min(errors)]
+    return Bandwidth(max(good), tuple(zip(corners, errors, strict=True)))
+
+
+def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
+    """Raise `LogError` unless the corner lies below half the sample rate of the logs (a look at some of many)."""
+    for log in even_selection(logs):
+        if cutoff_hz >= (0.5 - 1e-6) / log.period:
+            raise LogError(
+                f"{log.name}: a cutoff of {cutoff_hz:g} Hz is not below {0.5 / log.period:.4g} Hz, half of the "
+                f"{1 / log.period:.4g} samples a second; give a lower one, or 0 for no filter"
+            )
+
+
+def _selected(logs: Sequence[LogSource]) -> list[int]:
+    """Some of the logs, evenly, that hold about so many samples as are looked at."""
+    total = sum(log.samples for log in logs)
+    count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
+    return [int(k) for k in np.linspace(0, len(logs) - 1, count)]
+
+
+def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
+    """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
+    picked, found = _selected(logs), []
+    for k in picked:
+        log = logs[k].read()
+        longest = max(log.runs(), key=lambda run: run.stop - run.start)
+        most = _SAMPLES // len(picked)
+        found.append(log.select(slice(longest.start, min(longest.stop, longest.start + most))))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What is regressed at one corner: columns (N, n, p), torque (N, n), blocks (N,), and which samples slide (N, n)."""
+
+    columns: Array
+    tau: Array
+    blocks: NDArray[np.intp]
+    moving: NDArray[np.bool_]
+
+
+def table_at(
+    logs: list[MotionLog],
+    arm: Arm,
+    base: BaseParameters,
+    how: Conditioning,
+    corner: float,
+    corners: list[float],
+    aside: Sequence[Array] | None = None,
+) -> Table | None:
+    """Columns at one corner, at the instants that all corners share; None where no run is long enough.
+
+    Args:
+        aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
+    """
+    parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
+    lowest, following = min(corners), 0
+    total = sum(log.samples for log in logs)
+    for k, log in enumerate(logs):
+        try:
+            samples = preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9))
+        except ShortRunError:
+            continue
+        motion, period = samples.motion, uniform_period(log.time)
+        elapsed = motion.time - log.time[0]
+        margin, length = 0.5 / lowest + period, float(log.time[-1] - log.time[0])
+        used = (elapsed > margin) & (elapsed < length - margin)
+        if aside is not None:
+            used &= ~within(motion.time, aside[k], margin)
+        inside = np.flatnonzero(used)
+        stride = max(1, total * arm.n // _ROWS)
+        # the same instants at every corner: whole numbers of periods from the log's start
+        numbers = np.rint(elapsed[inside] / period).astype(int)
+        inside = inside[numbers % stride == 0]
+        if len(inside) == 0:
+            continue
+        fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / _FADES))
+        dry = LowPass(corner, period)(fading)[inside]
+        part = Motion(
+            motion.time[inside], motion.q[inside], motion.v[inside], motion.vdot[inside], np.array([0])
+        )
+        N, n = part.q.shape
+        columns = np.zeros((N, n, base.count + 3 * n))
+        columns[:, :, : base.count] = base.columns(arm, part)
+        for j in range(n):
+            own = slice(base.count + 3 * j, base.count + 3 * j + 3)
+            columns[:, j, own] = np.column_stack([dry[:, j], part.v[:, j], np.ones(N)])
+        speed = np.abs(part.v)
+        blocks = following + ((part.time - part.time[0]) / _BLOCK).astype(np.intp)
+        following = int(blocks[-1]) + 1
+        parts.append((columns, samples.tau[inside], blocks, speed > _SLIDES * speed.max(axis=0)))
+    if not parts:
+        return None
+    columns, tau, blocks, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Table(columns, tau, blocks, moving)
+
+
+def _held_out(table: Table) -> Array:
+    """(n,) rms of what a regression on every other block leaves on the blocks between, both ways round."""
+    n = table.tau.shape[1]
+    scale = np.array([root_mean_square(table.tau[own, j]) for j, own in enumerate(table.moving.T)])
+    for _ in range(2):  # joints weigh by their torques first, then by what is left of them
+        left = np.zeros_like(table.tau)
+        for parity in (0, 1):
+            fitted = (table.blocks % 2 != parity)[:, None] & table.moving
+            X = np.concatenate([table.columns[fitted[:, j], j] / max(scale[j], 1e-12) for j in range(n)])
+            y = np.concatenate([table.tau[fitted[:, j], j] / max(scale[j], 1e-12) for j in range(n)])
+            size = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
+            X = X / size
+            theta = np.linalg.solve(X.T @ X + 1e-7 * np.eye(X.shape[1]), X.T @ y) / size
+            judged = table.blocks % 2 == parity
+            left[judged] = table.tau[judged] - table.columns[judged] @ theta
+        scale = np.array(
+            [
+                np.sqrt(np.mean(np.square(left[own, j]))) if own.any() else 1.0
+                for j, own in enumerate(table.moving.T)
+            ]
+        )
+    return scale
+
+
+def root_mean_square(x: Array) -> float:
+    """Root of the mean square; 0 where there is nothing."""
+    return float(np.sqrt(np.mean(np.square(x)))) if len(x) else 0.0

@@ -1,0 +1,266 @@
+"""Forward selection among the catalogue's laws: which of them an arm had all along, found in its training data.
+
+A law that the model lacks is half hidden, for the base parameters that were fitted without it have soaked up part of
+it: what is left looks like no law at all. So a law is judged on columns from which the model's own have been projected
+out (Frisch and Waugh 1933; Lovell 1963), which is the score test of the nested model and the same as fitting both
+together, on blocks left out. One is taken if it lowers the error there by more than chance would, among so many that
+were tried; the simplest first. Then friction is chosen anew beside it, and every law asked again whether the others
+leave it anything.
+
+Laws that the model can say already are not asked for: a rotor's inertia is a base parameter, Coulomb friction a rung
+of the friction ladder. Nor are those that depend on the time: within a run they fit, on another run they fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
+from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.projected import Projected, Trial
+from armloop.laws.effects import Context, Effect, hypotheses
+from armloop.model import AddedEffect
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.progress import Progress
+
+#: Part of the squared error of the joint it shows on most that a law must remove …
+WORTH = 0.05
+#: … and the probability by which chance alone may name any law at all.
+_CHANCE = 1e-3
+#: A simpler law that removes so much of what the best one removes is as good.
+_AS_GOOD = 0.9
+#: Part of a law's column beside all that the model can say, below which it says nothing new.
+_NEW = 2e-3
+#: What comes and goes: the arm as it was trained carries what it carries.
+_OF_A_RUN = ("payload", "friction_drift")
+_MOST = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A law of the catalogue that is fitted beside the base parameters.
+
+    Attributes:
+        shape: its nonlinear parameter.
+        size: number of its coefficients.
+        constant: joints (0-based) at which one of its columns is constant.
+        gain: part of the squared error that it removes on left-out blocks, of the joint it shows on most.
+    """
+
+    effect: Effect
+    shape: float
+    size: int
+    constant: tuple[int, ...] = ()
+    gain: float = 0.0
+
+    @staticmethod
+    def found(effect: Effect, shape: float, columns: Array, gain: float) -> Law:
+        """A law whose unfiltered columns on some motion are (N, n, p)."""
+        flat = (np.ptp(columns, axis=0) == 0) & columns.any(axis=0)
+        constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
+        return Law(effect, shape, columns.shape[2], constant, gain)
+
+    def to_dict(self) -> dict[str, object]:
+        """JSON-ready values."""
+        names = {
+            "effect": self.effect.name,
+            "joint": self.effect.joint,
+            "other_joint": self.effect.other_joint,
+        }
+        return {**names, "removes": self.gain}
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """The laws chosen, and what was tried.
+
+    Attributes:
+        tried: number of laws that could have been chosen.
+    """
+
+    chosen: list[Law] = field(default_factory=list)
+    tried: int = 0
+
+    @property
+    def count(self) -> int:
+        """Number of coefficients of all of them."""
+        return sum(law.size for law in self.chosen)
+
+    @property
+    def loading(self) -> Array:
+        """(p,) one for coefficients of laws that load the joints, else zero."""
+        return np.repeat([float(law.effect.load) for law in self.chosen], [law.size for law in self.chosen])
+
+    def raw(self, arm: Arm, motion: Motion, period: float) -> Array:
+        """(N, n, p) torque per unit of each coefficient, unfiltered."""
+        context = Context(arm, motion, period=period)
+        parts = [law.effect.full_columns(context, law.shape) for law in self.chosen]
+        return np.concatenate([np.zeros((motion.samples, arm.n, 0)), *parts], axis=2)
+
+    def columns(self, arm: Arm, samples: Samples) -> Array:
+        """(N, n, p) columns of all laws through the samples' filter."""
+        return smooth(samples, self.raw(arm, samples.motion, samples.period))
+
+    def constant_at(self) -> set[int]:
+        """Joints (0-based) at which one of the columns is constant."""
+        return {joint for law in self.chosen for joint in law.constant}
+
+    def mass(self, arm: Arm, q: Array) -> Array:
+        """(P, n, n, p) what each coefficient adds to M(q) at postures q (P, n)."""
+        n = arm.n
+        repeated, still = np.repeat(q, n, axis=0), np.zeros((len(q) * n, n))
+        pushed = np.tile(np.eye(n), (len(q), 1))
+        parts = [np.zeros((len(q), n, n, 0))]
+        for law in self.chosen:
+            if law.effect.needs_model or law.effect.memory:
+                parts.append(np.zeros((len(q), n, n, law.size)))
+                continue
+            both = []
+            for vdot in (pushed, still):
+                motion = Motion(np.arange(float(len(still))), repeated, still, vdot, np.array([0]))
+                both.append(law.effect.full_columns(Context(arm, motion), law.shape))
+            added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
+            parts.append(added.transpose(0, 2, 1, 3))
+        return np.concatenate(parts, axis=3)
+
+    def split(self, theta: Array) -> list[Array]:
+        """Each law's coefficients."""
+        return list(np.split(theta, np.cumsum([law.size for law in self.chosen])[:-1])) if self.chosen else []
+
+    def added(self, arm: Arm, theta: Array, covariance: Array) -> list[AddedEffect]:
+        """The laws as effects of a model: named parameters with their standard errors."""
+        found, start = [], 0
+        for law, x in zip(self.chosen, self.split(theta), strict=True):
+            own = slice(start, start + law.size)
+            start += law.size
+            parameters = law.effect.estimates(arm, x, covariance[own, own], law.shape)
+            found.append(AddedEffect(law.effect, parameters, "always"))
+        return found
+
+    def notes(self, effects: Sequence[AddedEffect]) -> list[str]:
+        """What was found, a line each, with the parameters of the model's effects."""
+        return [
+            f"always there: {added.effect.sentence(added.parameters)}; fitted together with the rest, it removes "
+            f"{law.gain:.0%} of the squared error of the joint it shows on most, on left-out blocks"
+            for law, added in zip(self.chosen, effects, strict=True)
+        ]
+
+
+def permanent(arm: Arm) -> list[Effect]:
+    """Laws that an arm may have had all along and that fit beside others as linear columns.
+
+    A joint's friction is none of them: it has rungs of the friction ladder, which has had its say.
+    """
+    return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
+
+
+def search(
+    arm: Arm,
+    samples: Samples,
+    bench: Callable[[Sequence[Law]], Projected],
+    options: Options,
+    progress: Progress,
+) -> Laws:
+    """Forward search over the catalogue, fitted together with the model's own columns.
+
+    Args:
+        bench: the regression with the model's own columns and some laws', from which further ones are judged.
+    """
+    listed = [effect for effect in permanent(arm) if _usable(effect)]
+    chosen: list[Law] = []
+    columns = _Columns(arm, samples)
+    tried = len(listed)
+    while len(chosen) < _MOST:
+        own = bench(chosen)
+        taken = {law.effect.place for law in chosen}
+        trials = []
+        for effect in listed:
+            if effect.place not in taken:
+                found = _best_shape(own, effect, columns)
+                if found is not None and is_worth(found[1], tried) and _plausible(arm, effect, *found):
+                    trials.append((effect, *found))
+        if not trials:
+            break
+        most = max(trial.removed for _, _, trial in trials)
+        as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
+        effect, shape, trial = min(as_good, key=lambda one: (one[0].complexity, -one[2].removed))
+        progress(
+            f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
+        )
+        chosen.append(Law.found(effect, shape, columns.raw(effect, shape), trial.share))
+    return Laws(chosen, tried)
+
+
+def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, samples: Samples) -> Laws:
+    """The laws without those to which the others, and the friction chosen beside them, leave nothing."""
+    for k in reversed(range(len(laws.chosen))):
+        others = [law for i, law in enumerate(laws.chosen) if i != k]
+        own = bench(others)
+        trial = own.trial(Laws([laws.chosen[k]]).columns(arm, samples))
+        if trial is None or not is_worth(trial, laws.tried):
+            return pruned(replace(laws, chosen=others), bench, arm, samples)
+    return laws
+
+
+def is_worth(trial: Trial, tried: int) -> bool:
+    """Whether a law removes enough, and more than chance would for the best of so many, by blocks and in every fold."""
+    enough = float(student.isf(_CHANCE / max(tried, 1), max(trial.blocks - 1, 1)))
+    return trial.share > WORTH and trial.score > enough and trial.everywhere
+
+
+def _usable(effect: Effect) -> bool:
+    """Whether its coefficients are its free parameters, so that it is one of the columns of a regression."""
+    return not effect.needs_model
+
+
+def _plausible(arm: Arm, effect: Effect, shape: float, found: Trial) -> bool:
+    return effect.plausible(arm, effect.estimates(arm, found.coefficients, found.covariance, shape))
+
+
+def _best_shape(own: Projected, effect: Effect, columns: _Columns) -> tuple[float, Trial] | None:
+    """The shape that removes most on left-out blocks; None where the effect can say nothing new."""
+    best: tuple[float, Trial] | None = None
+    shapes = list(effect.shapes(columns.context))
+    if len(shapes) > 8:
+        return None
+    for shape in shapes:
+        trial = own.trial(columns.smoothed(effect, shape), _NEW, WORTH)
+        if trial is not None and (best is None or trial.removed > best[1].removed):
+            best = shape, trial
+    return best
+
+
+class _Columns:
+    """Columns of the laws on the training motion; kept for nobody, for all of them together may be more than the log."""
+
+    def __init__(self, arm: Arm, samples: Samples) -> None:
+        self._samples = samples
+        self.context = Context(arm, samples.motion, period=samples.period)
+
+    def raw(self, effect: Effect, shape: float) -> Array:
+        """(N, n, p) unfiltered."""
+        return effect.full_columns(self.context, shape)
+
+    def smoothed(self, effect: Effect, shape: float) -> Array:
+        """(N, n, p) through the samples' filter."""
+        columns = self.raw(effect, shape)
+        acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
+        # what acts alike, or against each other, on several joints is filtered once
+        like = {j: _ratio(columns[:, j], columns[:, acts[0]]) for j in acts[1:]}
+        for j in acts:
+            ratio = like.get(j)
+            columns[:, j] = (
+                smooth(self._samples, columns[:, j]) if ratio is None else ratio * columns[:, acts[0]]
+            )
+        return columns
+
+
+def _ratio(x: Array, y: Array) -> float | None:
+    """±1 where x is ±y, else None."""
+    return next((r for r in (1.0, -1.0) if np.array_equal(x, r * y)), None)

@@ -1,0 +1,29 @@
+"""Persistency of excitation: whether samples can determine a model at all, checked before any regression."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from armloop.data.motion import Samples
+from armloop.robot.arm import Arm
+from armloop.util.errors import ExcitationError
+
+
+def check_recorded(arm: Arm, samples: Samples) -> None:
+    """Raise ``ExcitationError`` if a joint's torque is zero throughout: nobody recorded it."""
+    for j, joint in enumerate(arm.joints):
+        if not samples.tau[:, j].any():
+            raise ExcitationError(
+                f"tau{j + 1}: zero throughout; give logs that hold the torque (or current) of joint {joint.name!r}"
+            )
+
+
+def check_excitation(arm: Arm, samples: Samples) -> None:
+    """Raise ``ExcitationError`` if a joint hardly moves."""
+    for j, joint in enumerate(arm.joints):
+        q = samples.motion.q[:, j]
+        if np.ptp(q) < 1e-3 or samples.moving[:, j].sum() < 30:
+            raise ExcitationError(
+                f"q{j + 1}: joint {joint.name!r} hardly moves (range {np.ptp(q):.3g} {joint.position_unit}); "
+                "its terms cannot be determined: log runs in which every joint moves"
+            )

@@ -1,0 +1,59 @@
+"""Provenance of a regression: which samples it used, and what standard errors have to know."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from armloop.data.signals import smooth
+from armloop.identification.reconstruction.data import Chunk, Data
+from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.nearest_regime import Sorter
+from armloop.identification.reconstruction.shared import sliding_rows
+from armloop.identification.uncertainty import Fitted, standard_errors
+from armloop.model import ReconstructedModel
+
+#: Consecutive samples whose errors stand for those of all, where these are not in memory.
+_WINDOW = 150_000
+
+
+def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> dict[str, Any]:
+    """Standard errors of a model's coefficients.
+
+    Of logs that are not kept in memory a selection stands for all samples, and errors are those of a regression of it: too
+    large rather than too small.
+
+    Args:
+        found: how the model was found.
+        shared: whether its coefficients serve all joints; then the selection is of stretches of consecutive samples, for
+            friction with memory, which only such coefficients stand beside, has none of the past between others.
+    """
+    chunk = data.reference
+    if shared and not data.in_memory:
+        chunk = data.window(_WINDOW)
+    samples = chunk.samples
+    if not (shared or data.in_memory):
+        # an even selection cannot be filtered; its columns are taken as they are
+        samples = replace(samples, cutoff_hz=0.0)
+    if model.effects:
+        # taken as given, like the terms: their own errors stand beside their parameters
+        bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
+        samples = replace(samples, tau=samples.tau - smooth(samples, bare))
+    return standard_errors(model, samples, fitted_rows(chunk, found, shared))
+
+
+def fitted_rows(chunk: Chunk, found: Found, shared: bool) -> list[Fitted]:
+    """The regressions in their order, with the samples of a chunk that they used."""
+    if shared:
+        rows = sliding_rows(chunk.samples)
+        return [Fitted((1, 2, 3), rows if found.final is not None else rows & ~chunk.held_out[:, None])]
+    return step_rows(chunk, found.regressed_by)
+
+
+def step_rows(chunk: Chunk, sorter: Sorter | None) -> list[Fitted]:
+    """The stepwise method's regressions in their order, with the samples of a chunk that they use."""
+    rows = chunk.samples.moving & (chunk.independent & ~chunk.held_out)[:, None]
+    if sorter is None:
+        return [Fitted((1, 2, 3), rows)]
+    condition = sorter(chunk.samples.motion)
+    return [Fitted((step,), rows & (condition == step)[:, None]) for step in (1, 2, 3)]

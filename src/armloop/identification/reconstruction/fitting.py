@@ -1,0 +1,189 @@
+"""Laws of the catalogue beside base parameters or energies: found, fitted together with them and their friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.data.blocks import block_numbers
+from armloop.data.motion import Samples
+from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, search
+from armloop.identification.reconstruction.design import Design
+from armloop.identification.reconstruction.friction_selection import FrictionSelection, select_friction
+from armloop.identification.reconstruction.inner_folds import inner_folds
+from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.pooled import Prior, Solution
+from armloop.identification.reconstruction.projected import Projected, Rows
+from armloop.identification.reconstruction.training import Training, fitted_rows
+from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
+from armloop.util.progress import Progress
+
+#: So many rows tell laws apart as well as more do.
+_ROWS = 15_000
+#: Residuals stay correlated for a good second.
+_BLOCK_SECONDS = 1.5
+#: What a law's coefficients are drawn to nothing with, beside a prior of the others: next to nothing.
+_FREE = 1e-9
+
+
+class Fitting:
+    """A regression of shared columns with each joint's friction, to which laws of the catalogue may be added.
+
+    Laws are looked for in a window of the data (all of them where they are no more than that), and regressed on all.
+
+    Args:
+        design: the shared columns with the load by their coefficients.
+        priors: what the shared coefficients may be drawn to.
+
+    Attributes:
+        covariance: (p, p) of the laws' coefficients, robust to correlation within blocks.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        training: Training,
+        design: Design,
+        priors: dict[str, Prior],
+        options: Options,
+        progress: Progress,
+    ) -> None:
+        self.covariance = np.zeros((0, 0))
+        self._arm, self._own, self._design, self._training = arm, design, design, training
+        self._priors, self._options, self._progress = priors, options, progress
+
+    def chosen(self) -> tuple[FrictionSelection, Laws]:
+        """The laws that the training data show, and every joint's friction chosen beside them."""
+        self._progress("choosing each joint's friction on held-out data")
+        ladder, samples = self._climbed(), self._training.window.samples
+        laws = search(self._arm, samples, self._bench(ladder), self._options, self._progress)
+        while laws.chosen:
+            ladder = self._beside(laws, ladder)
+            fewer = pruned(laws, self._bench(ladder), self._arm, samples)
+            if len(fewer.chosen) == len(laws.chosen):
+                break
+            laws = fewer
+        if laws.chosen:
+            trial = self._bench(ladder)([]).trial(laws.columns(self._arm, samples))
+            assert trial is not None
+            self.covariance = trial.covariance
+        elif self._design.laws.chosen:
+            ladder = self._beside(laws, ladder)
+        return ladder, laws
+
+    def _beside(self, laws: Laws, ladder: FrictionSelection) -> FrictionSelection:
+        """Friction chosen anew beside some laws, by the load of what is solved with that of a ladder before."""
+        design = self._own.with_laws(laws)
+        self._design = design.loaded(self._window_solution(design, ladder).theta)
+        self._progress("choosing each joint's friction anew beside the laws found")
+        return without_offsets(self._climbed(), laws.constant_at())
+
+    def _climbed(self) -> FrictionSelection:
+        extra = self._design.laws.count
+        priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
+        return select_friction(self._arm, self._training, self._design, self._options, priors)
+
+    def _window_solution(self, design: Design, ladder: FrictionSelection) -> Solution:
+        """The coefficients of a design and of a ladder's friction, on the window."""
+        pooled = self._training.window_pooled(design, ladder.laws, self._options.physical)
+        return pooled.solve(pooled.everything, self._prior(ladder, design.laws.count))
+
+    def _prior(self, ladder: FrictionSelection, extra: int) -> Prior | None:
+        return None if ladder.prior is None else padded(cut(ladder.prior, self._own.count), extra)
+
+    def _bench(self, ladder: FrictionSelection) -> Callable[[Sequence[Law]], Projected]:
+        """Regressions of the shared columns and some laws', with the friction of a ladder that is not zero."""
+        chunk = self._training.window
+        samples, usable, r = chunk.samples, fitted_rows(chunk), self._own.count
+        used = np.asarray(usable.any(axis=1))
+        fold, inside = inner_folds(samples, used, self._options)
+        numbers = block_numbers(samples.motion, _BLOCK_SECONDS)
+        block = np.unique(fold * (numbers.max() + 1) + numbers, return_inverse=True)[1]
+        sample, joint = (x.astype(np.intp) for x in np.nonzero(chunk.independent[:, None] & usable))
+        every = max(1, len(sample) // _ROWS)
+        sample, joint = sample[::every], joint[::every]
+        order = np.lexsort((sample, fold[sample], joint))
+        sample, joint = sample[order], joint[order]
+        shared, friction = _picked(self._design, samples, ladder.candidates, sample, joint)
+        shared = shared[:, :r]
+
+        def stacked(columns: Array, places: list[list[int]]) -> Array:
+            """(R, p + all terms) rows of shared columns (R, p) and of some of each joint's own friction."""
+            X = np.zeros((len(sample), columns.shape[1] + sum(map(len, places))))
+            X[:, : columns.shape[1]] = columns
+            start = columns.shape[1]
+            for j, own in enumerate(places):
+                X[joint == j, start : start + len(own)] = friction[j][:, own]
+                start += len(own)
+            return X
+
+        sayable = stacked(shared, [list(range(len(terms))) for terms in ladder.candidates])
+
+        def bench(laws: Sequence[Law]) -> Projected:
+            extra = Laws(list(laws))
+            columns = np.hstack([shared, extra.columns(self._arm, samples)[sample, joint]])
+            prior = self._prior(ladder, extra.count)
+            if not laws and ladder.pooled.shared == r:
+                solution = ladder.solved()
+            else:
+                solution = self._window_solution(self._design.with_laws(extra), ladder)
+            size = columns.shape[1]
+            active, start = [], size
+            for law, terms in zip(ladder.laws, ladder.candidates, strict=True):
+                own = solution.theta[start : start + len(law)]
+                active.append([terms.index(term) for term, c in zip(law, own, strict=True) if c != 0])
+                start += len(law)
+            weight = np.sqrt(solution.weights)[joint]
+            X = stacked(columns, active) * weight[:, None]
+            precision, toward = np.zeros((X.shape[1],) * 2), np.zeros(X.shape[1])
+            if prior is not None:
+                precision[:size, :size] = prior.precision
+                toward[:size] = prior.precision @ prior.centre
+            y = samples.tau[sample, joint] * weight
+            rows = Rows(sample, joint, weight, fold[sample], block[sample], inside[sample])
+            return Projected(X, y, rows, (precision, toward), sayable * weight[:, None])
+
+        return bench
+
+
+def _picked(
+    design: Design, samples: Samples, candidates: list[list[FrictionTerm]], sample: Index, joint: Index
+) -> tuple[Array, list[Array]]:
+    """(R, r) shared columns at some samples of some joints, and per joint (R_j, terms) those of its friction there."""
+    shared = np.zeros((len(sample), design.size))
+    friction = [np.zeros((int((joint == j).sum()), len(terms))) for j, terms in enumerate(candidates)]
+    places = [np.flatnonzero(joint == j) for j in range(len(candidates))]
+    for columns in design.walk(samples, candidates):
+        j, M, size = columns.joint, len(columns.X), design.size
+        own = np.flatnonzero((sample[places[j]] >= columns.first) & (sample[places[j]] < columns.first + M))
+        rows = columns.X[sample[places[j][own]] - columns.first]
+        acting = columns.where < size
+        shared[np.ix_(places[j][own], columns.where[acting])] = rows[:, acting]
+        friction[j][own] = rows[:, ~acting]
+    return shared, friction
+
+
+def without_offsets(ladder: FrictionSelection, joints: Collection[int]) -> FrictionSelection:
+    """The ladder without the constant torque of joints (0-based) where a law brings one: the two cannot be told apart."""
+
+    def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
+        return [[t for t in own if j not in joints or t.kind != "offset"] for j, own in enumerate(terms)]
+
+    return replace(ladder, laws=rest(ladder.laws), candidates=rest(ladder.candidates))
+
+
+def padded(prior: Prior, more: int) -> Prior:
+    """The prior where so many coefficients follow of which nothing is known."""
+    r = len(prior.centre)
+    precision = _FREE * np.eye(r + more)
+    precision[:r, :r] = prior.precision
+    return Prior(precision, np.concatenate([prior.centre, np.zeros(more)]))
+
+
+def cut(prior: Prior, count: int) -> Prior:
+    """The prior of the first coefficients alone."""
+    return Prior(prior.precision[:count, :count], prior.centre[:count])

@@ -1,0 +1,303 @@
+"""Nested model selection of friction: each larger law must earn its place on held-out data; then backward elimination.
+
+The rungs go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
+Coulomb level it makes levels that differ with the direction), the Stribeck fall, nonlinear viscous friction,
+viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with memory
+before the joint slides, with and without load. A rung brings a row of elements (widths, speeds, powers), of which a
+passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
+scatter over the folds; else for the joints alone for which it falls by more than twice that. At the end, each joint
+hands back the rungs it does not miss.
+
+Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
+
+A user may restrict the ladder to some laws, by the names in :data:`armloop.laws.friction.FRICTION_LAWS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.identification.reconstruction.design import Design
+from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, Solution
+from armloop.identification.reconstruction.training import Training
+from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+
+#: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
+_WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
+#: Part of a joint's squared error that a rung must be worth for the joint to keep it.
+_KEEP = 0.002
+#: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
+_FADES = (0.003, 0.01, 0.03, 0.1)
+_WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
+#: The slowest motion is this quantile of the speeds; it is so much faster than the fade that reaches down to it.
+_CREEP, _SHARPER = 0.005, 4.0
+#: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
+_STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What the larger of two nested friction laws adds: its name, and the elements it brings for each joint."""
+
+    name: str
+    elements: list[list[FrictionTerm]]
+
+
+@dataclass
+class Comparison:
+    """What the comparison of two nested laws came to.
+
+    Attributes:
+        rung: its name.
+        before, after: held-out nRMSE, mean over the joints.
+        refused: held-out nRMSE that it would have led to, where it was not taken.
+        joints: those that took it (0-based), or, of the last entry, that dropped extensions.
+    """
+
+    rung: str
+    before: float
+    after: float
+    refused: float | None
+    joints: list[int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values; joints count from 1."""
+        return {**vars(self), "joints": [joint + 1 for joint in self.joints]}
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionSelection:
+    """The laws chosen, the prior of the shared coefficients, what each rung brought, all candidates, and the sums."""
+
+    laws: list[list[FrictionTerm]]
+    prior: Prior | None
+    comparisons: list[Comparison]
+    notes: list[str]
+    candidates: list[list[FrictionTerm]]
+    pooled: Pooled
+
+    def solved(self, held_out: bool = False) -> Solution:
+        """Coefficients of the shared columns and of the laws chosen."""
+        return self.pooled.solve(self.pooled.choice(self.laws), self.prior, held_out)
+
+    def errors(self, theta: Array) -> Array:
+        """(n,) nRMSE of such coefficients on the blocks that judge the model; NaN where a joint does not slide there."""
+        return self.pooled.relative_errors(theta, self.pooled.choice(self.laws))
+
+
+def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Extension]:
+    """The nested friction laws of an arm; the Stribeck speeds follow each joint's fastest speed.
+
+    Where a joint creeps, slower than the speed over which the direction fades in fastest, one more speed, for every
+    joint, keeps the Coulomb level there.
+
+    Args:
+        slowest: (n,) speeds of the slowest motion that is regressed; None for none so slow.
+    """
+    units = np.where(arm.revolute, 1.0, 0.1)
+    fastest = np.quantile(np.abs(motion.v), 0.995, axis=0)
+    stribeck = [
+        np.geomspace(low, max(_PART * v, 2 * low), _STRIBECK)
+        for low, v in zip(units * _SLOWEST, fastest, strict=True)
+    ]
+    sharp = units * _FADES[0]
+    creep = sharp if slowest is None else np.minimum(sharp, slowest)
+    fades = [
+        ([c / _SHARPER] if (creep < sharp).any() else []) + [unit * size for size in _FADES]
+        for unit, c in zip(units, creep, strict=True)
+    ]
+
+    def same(law: str) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind) for kind in FRICTION_LAWS[law]] for _ in units]
+
+    def scaled(kind: str, sizes: tuple[float, ...]) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind, parameter=float(unit * size)) for size in sizes] for unit in units]
+
+    def fading(kind: str) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind, parameter=float(f"{v:.2g}")) for v in own] for own in fades]
+
+    coulomb = [[*own, FrictionTerm("viscous")] for own in fading("smooth_sign")]
+    falls = [[FrictionTerm("stribeck_peak", parameter=float(f"{v:.2g}")) for v in own] for own in stribeck]
+    return [
+        Extension("Coulomb and viscous", coulomb),
+        Extension("offset (levels by direction)", same("offset")),
+        Extension("Stribeck", falls),
+        Extension("nonlinear viscous", same("nonlinear_viscous")),
+        Extension("viscous by direction", same("viscous_by_direction")),
+        Extension("Coulomb by load", fading("load_smooth_sign")),
+        Extension("presliding", scaled("hysteresis", _WIDTHS)),
+        Extension("presliding by load", scaled("load_hysteresis", _WIDTHS)),
+    ]
+
+
+def check_laws(names: Sequence[str] | None) -> None:
+    """Raise ``InputError`` unless every name is one of :data:`FRICTION_LAWS`, and there is one; None for all."""
+    if names is None:
+        return
+    for name in names:
+        if name not in FRICTION_LAWS:
+            raise InputError(f"unknown friction law {name!r}; there are: {', '.join(FRICTION_LAWS)}")
+    if not names:
+        raise InputError(f"no friction law is named; there are: {', '.join(FRICTION_LAWS)}")
+
+
+def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Extension]:
+    """The rungs with the elements of some laws alone; all of them for None. Rungs left empty are dropped."""
+    if names is None:
+        return ladder
+    kinds = {kind: name for name in names for kind in FRICTION_LAWS[name]}
+
+    def allowed(own: list[FrictionTerm]) -> list[FrictionTerm]:
+        named = [term for term in own if term.kind in kinds]
+        sharpest = min((term.parameter for term in own if term.kind == "smooth_sign"), default=0.0)
+        fading = "coulomb_fading" in names
+        return [t for t in named if fading or t.kind != "smooth_sign" or t.parameter == sharpest]
+
+    kept = []
+    for rung in ladder:
+        elements = [allowed(own) for own in rung.elements]
+        whole = elements == rung.elements
+        called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
+        if called:
+            kept.append(rung if whole else Extension(" and ".join(called), elements))
+    return kept
+
+
+def select_friction(
+    arm: Arm, data: Training, design: Design, options: Options, priors: dict[str, Prior]
+) -> FrictionSelection:
+    """Choose the prior of the shared coefficients by its evidence, then every joint's friction on held-out folds.
+
+    Args:
+        data: what is fitted, and what judges.
+        design: shared columns, and the load that friction may depend on.
+        options: the friction laws that may be chosen; the first of them is taken anyway.
+        priors: what the shared coefficients may be drawn to, by name; none if empty.
+    """
+    ladder = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
+    candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
+    pooled = data.pooled(design, candidates, options.physical)
+    ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
+    places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
+    state = _State(pooled, places, priors)
+    comparisons = [state.take(level, rung.name, one_by_one=data.plenty) for level, rung in enumerate(ladder)]
+    if data.plenty:
+        comparisons.append(state.eliminate_backward())
+    notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
+    if options.friction is not None:
+        notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
+    laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
+    return FrictionSelection(laws, state.prior, comparisons, notes + _notes(comparisons), candidates, pooled)
+
+
+class _State:
+    """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds."""
+
+    def __init__(self, pooled: Pooled, places: list[list[int]], priors: dict[str, Prior]) -> None:
+        self.pooled, self._places = pooled, places
+        self._counts = pooled.counts
+        self._count = np.maximum(self._counts.sum(axis=0), 1.0)
+        self._rms = np.sqrt(np.maximum(pooled.squares.sum(axis=0) / self._count, 1e-300))
+        self.taken: list[list[int]] = [[] for _ in pooled.candidates]
+        self.prior: Prior | None = None
+        self.prior_name: str | None = None
+        self._priors = priors
+        self._weights, self._errors = self._judged()
+
+    def choice(self, taken: list[list[int]]) -> Choice:
+        """Places of the elements of some rungs per joint."""
+        return [[place for level in own for place in self._places[level]] for own in taken]
+
+    def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
+        """Take a rung for all joints or for some if it earns its place; the first, what every drive has, anyway."""
+        before = self._error(self._errors)
+        everyone = [[*own, level] for own in self.taken]
+        errors = self._held_out(everyone)
+        gain, sure = self._gain(errors, _SURE)
+        if level == 0:
+            self.taken = everyone
+            self._choose_prior()
+        elif sure and gain > _WORTH:
+            self.taken = everyone
+        elif one_by_one:
+            self.taken = [
+                everyone[j] if self._earns_alone(j, level) else own for j, own in enumerate(self.taken)
+            ]
+        joints = [j for j, own in enumerate(self.taken) if level in own]
+        if joints:
+            self._weights, self._errors = self._judged()
+        after = self._error(self._errors)
+        return Comparison(name, before, after, None if joints else self._error(errors), joints)
+
+    def eliminate_backward(self) -> Comparison:
+        """Backward elimination: every joint drops the extensions it does not miss, the last first."""
+        before, joints = self._error(self._errors), set()
+        for level in reversed(range(len(self._places))):
+            for j, own in enumerate(self.taken):
+                if level in own:
+                    shorter = [*self.taken[:j], [k for k in own if k != level], *self.taken[j + 1 :]]
+                    errors = self._held_out(shorter)
+                    if -self._gain(errors, _SURE, [j])[0] < _KEEP:
+                        self.taken, self._errors = shorter, errors
+                        joints.add(j)
+        return Comparison("backward elimination", before, self._error(self._errors), None, sorted(joints))
+
+    def _earns_alone(self, joint: int, level: int) -> bool:
+        more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
+        gain, sure = self._gain(self._held_out(more), _SURER, [joint])
+        return sure and gain > _WORTH
+
+    def _choose_prior(self) -> None:
+        if self._priors:
+            choice = self.choice(self.taken)
+            weights = self.pooled.solve(choice).weights
+            evidence = {name: self.pooled.evidence(choice, weights, p) for name, p in self._priors.items()}
+            self.prior_name = max(evidence, key=evidence.__getitem__)
+            self.prior = self._priors[self.prior_name]
+
+    def _judged(self) -> tuple[Array, Array]:
+        """Weights of the joints, and (folds, n) squared errors on the held-out folds."""
+        choice = self.choice(self.taken)
+        weights = self.pooled.solve(choice, self.prior).weights
+        return weights, self.pooled.held_out(choice, weights, self.prior)
+
+    def _held_out(self, taken: list[list[int]]) -> Array:
+        return self.pooled.held_out(self.choice(taken), self._weights, self.prior)
+
+    def _error(self, errors: Array) -> float:
+        """Held-out nRMSE, mean over the joints."""
+        return float(np.mean(np.sqrt(errors.sum(axis=0) / self._count) / self._rms))
+
+    def _gain(self, errors: Array, times: float, joints: list[int] | None = None) -> tuple[float, bool]:
+        """Mean log ratio of the squared errors before and after, and whether it exceeds its scatter over the folds.
+
+        In ratios, so that no joint and no fold that happens to be hard outweighs the others. ``joints`` are those
+        whose errors the gain is a part of.
+        """
+        ratios = np.log(np.maximum(self._errors, 1e-300) / np.maximum(errors, 1e-300))
+        whole = self._count.sum() if joints is None else self._count[joints].sum()
+        gains = (self._counts * ratios).sum(axis=1) / whole
+        scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
+        return float(gains.sum()), float(gains.sum()) > times * scatter
+
+
+def _notes(comparisons: list[Comparison]) -> list[str]:
+    """What each rung brought, in a line each."""
+    notes = []
+    for rung in comparisons:
+        who = "joints " + ", ".join(str(joint + 1) for joint in rung.joints) if rung.joints else "no joint"
+        change = f"{rung.before:.4f} → {rung.after:.4f}"
+        if rung.refused is not None:
+            change = f"{rung.before:.4f}; it would be {rung.refused:.4f}"
+        notes.append(f"friction, {rung.rung}: {who}; held-out nRMSE {change}")
+    return notes

@@ -1,0 +1,94 @@
+"""Normal equations of every joint and every fold, added up sample after sample, chunk after chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.design import Design
+from armloop.laws.friction import FrictionTerm
+from armloop.regression.moments import Moments
+from armloop.util.arrays import Array, Index
+
+
+@dataclass(frozen=True, eq=False)
+class Dealt:
+    """What each sample of a chunk is used for.
+
+    Attributes:
+        label: (N, n) which sum it adds to, from 0; -1 for none.
+        count: number of sums.
+        judges: (N,) whether it judges its sum where that is held out.
+    """
+
+    label: Index
+    count: int
+    judges: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class JointSums:
+    """Moments by joint and label; they add over chunks.
+
+    Attributes:
+        parts: of all samples.
+        judges: of those that judge.
+    """
+
+    parts: list[list[Moments]]
+    judges: list[list[Moments]]
+
+    def __add__(self, other: JointSums) -> JointSums:
+        return JointSums(_added(self.parts, other.parts), _added(self.judges, other.judges))
+
+    @staticmethod
+    def of(
+        chunk: Chunk,
+        design: Design,
+        candidates: list[list[FrictionTerm]],
+        deal: Callable[[Chunk], Dealt],
+    ) -> JointSums:
+        """Sums of a chunk: shared columns, then all candidates of each joint's friction."""
+        dealt = deal(chunk)
+        sizes = [design.size + len(terms) for terms in candidates]
+        parts = [[_Running(size) for _ in range(dealt.count)] for size in sizes]
+        all_judge = bool(dealt.judges.all())
+        judges = parts if all_judge else [[_Running(size) for _ in range(dealt.count)] for size in sizes]
+        for columns in design.walk(chunk.samples, candidates):
+            j, rows = columns.joint, slice(columns.first, columns.first + len(columns.X))
+            label, y = dealt.label[rows, j], chunk.samples.tau[rows, j]
+            for k in np.unique(label[label >= 0]):
+                own = label == k
+                parts[j][k].add(columns.where, columns.X[own], y[own])
+                if not all_judge:
+                    own &= dealt.judges[rows]
+                    judges[j][k].add(columns.where, columns.X[own], y[own])
+        made = [[one.moments() for one in own] for own in parts]
+        return JointSums(made, made if all_judge else [[one.moments() for one in own] for own in judges])
+
+
+class _Running:
+    """Moments that grow in place."""
+
+    def __init__(self, size: int) -> None:
+        self._G, self._b = np.zeros((size, size)), np.zeros(size)
+        self._yy = self._count = 0.0
+
+    def add(self, where: Index, X: Array, y: Array) -> None:
+        self._G[np.ix_(where, where)] += X.T @ X
+        self._b[where] += X.T @ y
+        self._yy += float(y @ y)
+        self._count += len(y)
+
+    def moments(self) -> Moments:
+        return Moments(self._G, self._b, self._yy, self._count)
+
+
+def _added(one: list[list[Moments]], other: list[list[Moments]]) -> list[list[Moments]]:
+    return [
+        [a + b for a, b in zip(mine, theirs, strict=True)] for mine, theirs in zip(one, other, strict=True)
+    ]

@@ -1,0 +1,333 @@
+"""The Lagrangian library: few terms of the kinetic and the potential energy, shared by all joints.
+
+Where the double feature set looks for terms of every joint's torque, this looks for terms of the energies,
+which are far fewer, and every one of them is seen by several joints at once. Terms are added greedily, the
+one that lowers the weighted residual of all joints most, for as long as data that are not fitted gain; then
+look-alikes are exchanged for what they stood in for, and terms that became superfluous are dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.pieces import LogSource
+from armloop.data.signals import smooth
+from armloop.dynamics.physics import joint_limits
+from armloop.features.lagrangian import EnergyTerms, candidates
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.data import Chunk, Data
+from armloop.identification.reconstruction.design import Design
+from armloop.identification.reconstruction.fitting import Fitting
+from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.library import Find, Library
+from armloop.identification.reconstruction.options import Options, StepReport
+from armloop.identification.reconstruction.physical import Body, physical_solution, physics_notes, postures
+from armloop.identification.reconstruction.shared import (
+    FRICTION,
+    SHARED_CONDITIONING,
+    check_moves,
+    check_rank,
+    fast_rows,
+    found_friction,
+    motion_range,
+)
+from armloop.identification.reconstruction.training import Survey, Training, fitted_rows
+from armloop.model.components import Lagrangian
+from armloop.regression.moments import Moments
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Index
+from armloop.util.errors import ExcitationError
+from armloop.util.progress import Progress
+
+Rows = NDArray[np.bool_]
+
+#: Most terms tried beside the joints' own inertias, and additions without a gain after which the search ends.
+_MOST, _PATIENCE = 80, 8
+#: Of all sizes the smallest whose held-out squared error is within this factor of the best is taken.
+_GOOD_ENOUGH = 1.01
+#: Part of the squared error that exchanging one term for another must remove.
+_WORTH_A_SWAP = 1e-4
+#: Squared error relative to the torque's below which nothing is left to find.
+_FLOOR = 1e-10
+#: Held-out nRMSE from which on a note says that the library may not suit.
+_POOR = 0.1
+#: Rows of the library evaluated at once.
+_CHUNK = 512
+
+
+def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
+    """Choose terms of T and U and regress them with friction on all moving samples at once.
+
+    The fold after the held-out one decides how many terms there are. The joints' constant inertias are always
+    terms, so that a positive definite M(q) exists; that, and friction that never drives, are constraints.
+
+    Raises:
+        ExcitationError: a joint does not move, or the motion leaves base parameters undetermined.
+    """
+    motion = data.reference.samples.motion
+    base = BaseParameters.of_arm(arm, rotors=True)
+    progress("lagrangian: what the motion can tell")
+    training = Training.of(data, Design(arm, partial(base.columns, arm), base.count), options)
+    check_moves(arm, training.survey.fitted)
+    check_rank(training.survey.products(base.count), base)
+    library = candidates(arm)
+    progress(f"lagrangian: {library.count} candidates, {len(FRICTION) + 1} friction columns a joint")
+    chosen = _choose(library, data)
+    energy = library.take(chosen)
+    progress(f"lagrangian: {len(chosen)} terms chosen")
+    design = Design(arm, energy.columns, energy.count)
+    design = design.loaded(data.sum(partial(Survey.of, design=design), "load").load(energy.count))
+    fitting = Fitting(arm, training, design, {}, options, progress)
+    ladder, laws = fitting.chosen()
+    r = energy.count + laws.count
+    shape = Body(
+        lambda q: np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.zeros(r, dtype=bool),
+    )
+
+    def regressed(held_out: bool) -> tuple[Found, Array]:
+        solution = ladder.solved(held_out)
+        theta, physics = solution.theta, {}
+        if options.physical:
+            try:
+                physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
+                theta = physical.theta
+                physics = {
+                    "constraints": physical.binding,
+                    "contradicted": physical.contradicted,
+                    "kept_positive": physical.where,
+                }
+            except (
+                ExcitationError
+            ):  # terms found in little data may leave no room for M; the notes then say so
+                pass
+        body = Lagrangian(energy, theta[: energy.count])
+        history = {"friction_ladder": [rung.to_dict() for rung in ladder.comparisons], **physics}
+        effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
+        friction = found_friction(ladder.laws, theta[r:])
+        return Found(arm, [body], friction, history=history, effects=effects), theta
+
+    found, theta = regressed(held_out=False)
+    found.final, _ = regressed(held_out=True)
+    final = found.final
+    acts = energy.acts
+    moving, at_rest = acts & ~energy.potential, acts & energy.potential
+    reports = []
+    for step in (1, 2, 3):
+        terms = at_rest.sum(axis=1) + (moving.sum(axis=1) if step > 1 else 0)
+        counts = [int(terms[j]) + sum(t.step <= step for t in final.friction[j]) for j in range(arm.n)]
+        samples_per_joint = training.survey.sliding.tolist()
+        reports.append(StepReport(step, None, library.count, library.count, counts, samples_per_joint))
+    notes = [
+        f"{energy.count} terms of the energies serve all joints and all steps: they were regressed together and "
+        "the steps are told apart on prediction"
+    ]
+    notes += [
+        *ladder.notes,
+        *laws.notes(final.effects),
+        *physics_notes(final.history),
+        *_warnings(final, motion, ladder.errors(theta)),
+    ]
+    found.reports, found.notes = reports, notes
+    return found
+
+
+def _warnings(final: Found, motion: Motion, errors: Array) -> list[str]:
+    """What speaks against the terms found: a mass matrix that is none, and torques not met on the held-out blocks.
+
+    Args:
+        errors: (n,) nRMSE there.
+    """
+    warnings = []
+    (body,) = final.components
+    assert isinstance(body, Lagrangian)
+    lowest = np.linalg.eigvalsh(body.mass_matrix(motion.q[:: max(1, motion.samples // 1000)]))[:, 0]
+    if (lowest <= 0).any():
+        warnings.append(f"M(q) is not positive definite at {np.mean(lowest <= 0):.1%} of the postures")
+    known = errors[np.isfinite(errors)]
+    error = float(known.mean()) if len(known) else 0.0
+    if error > _POOR:
+        warnings.append(
+            f"held-out nRMSE {error:.2f}: the waves of the Lagrangian library do not suit this arm or these data "
+            "(axes that cross need more terms than short logs tell apart); try --library rigid-body"
+        )
+    return warnings
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Normal equations of each joint on the columns that act on it, to be added up with weights."""
+
+    total: int
+    parts: list[tuple[Index, Moments]]
+
+    def __add__(self, other: _Problem) -> _Problem:
+        pairs = zip(self.parts, other.parts, strict=True)
+        return _Problem(self.total, [(where, a + b) for (where, a), (_, b) in pairs])
+
+    def weighted(self, weights: Array) -> Moments:
+        """Moments of all joints together; a joint's squares count ``weights`` times."""
+        G, b = np.zeros((self.total, self.total)), np.zeros(self.total)
+        yy = count = 0.0
+        for weight, (where, part) in zip(weights, self.parts, strict=True):
+            G[np.ix_(where, where)] += weight * part.G
+            b[where] += weight * part.b
+            yy += weight * part.yy
+            count += part.count
+        return Moments(G, b, yy, count)
+
+    def errors(self, theta: Array) -> Array:
+        """(n,) mean squared error of every joint, at least round-off."""
+        return np.array(
+            [max(p.squared_error(theta[where]), _FLOOR * p.yy) / max(p.count, 1.0) for where, p in self.parts]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Problems:
+    """What is fitted, and what decides how many terms there are; they add over chunks."""
+
+    fit: _Problem
+    judge: _Problem
+
+    def __add__(self, other: _Problems) -> _Problems:
+        return _Problems(self.fit + other.fit, self.judge + other.judge)
+
+    @staticmethod
+    def of(chunk: Chunk, library: EnergyTerms) -> _Problems:
+        """Independent samples that slide fast."""
+        rows = fitted_rows(chunk) & fast_rows(chunk.samples) & chunk.independent[:, None]
+        judged = chunk.validation[:, None]
+        return _Problems(
+            _problem(library, chunk.samples, rows & ~judged), _problem(library, chunk.samples, rows & judged)
+        )
+
+
+def _choose(library: EnergyTerms, data: Data) -> Index:
+    """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual."""
+    problems = data.sum(partial(_Problems.of, library=library), "normal equations of the candidates")
+    fit, judge, n = problems.fit, problems.judge, len(library.revolute)
+    forced = np.concatenate([np.arange(n), np.arange(library.count, fit.total)])
+    weights = np.array([part.count / part.yy for _, part in fit.parts])
+    support = forced
+    for _ in range(2):
+        problem = fit.weighted(weights)
+        support = _greedy(problem, judge.weighted(weights), forced, library.count)
+        theta = np.zeros(fit.total)
+        theta[support] = problem.solve(support)
+        weights = 1 / fit.errors(theta)
+    return np.sort(support[support < library.count])
+
+
+def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
+    motion, acts, p, f = samples.motion, library.acts, library.count, len(FRICTION)
+    wheres = [
+        np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
+        for j in range(motion.joints)
+    ]
+    sums = [Moments(np.zeros((len(w), len(w))), np.zeros(len(w)), 0.0, 0.0) for w in wheres]
+    friction = [
+        smooth(samples, np.column_stack([term.column(motion, j) for term in FRICTION]))
+        for j in range(motion.joints)
+    ]
+    used = np.flatnonzero(rows.any(axis=1))
+    for start in range(0, len(used), _CHUNK):
+        index = used[start : start + _CHUNK]
+        part = Motion(motion.time[index], motion.q[index], motion.v[index], motion.vdot[index], np.array([0]))
+        columns = library.columns(part)
+        for j, where in enumerate(wheres):
+            own = rows[index, j]
+            X = np.hstack([columns[own, j][:, where[: len(where) - f]], friction[j][index[own]]])
+            sums[j] = sums[j] + Moments.of(X, samples.tau[index[own], j])
+    return _Problem(p + f * motion.joints, list(zip(wheres, sums, strict=True)))
+
+
+def _greedy(fit: Moments, judge: Moments, forced: Index, count: int) -> Index:
+    """Forced columns and those of the first ``count`` that held-out data welcome, one after the other."""
+
+    def held_out(support: Index) -> float:
+        return max(judge.squared_error(fit.solve(support), support), _FLOOR * judge.yy)
+
+    support, others = forced, np.arange(count)
+    path, errors = [support], [held_out(support)]
+    while len(path) <= _MOST and len(path) - 1 - int(np.argmin(errors)) < _PATIENCE:
+        rss, gains = fit.gains(support, others)
+        gains[np.isin(others, support)] = 0.0
+        best = int(np.argmax(gains))
+        if gains[best] <= 0 or rss <= _FLOOR * fit.yy:
+            break
+        support = np.append(support, others[best])
+        path.append(support)
+        errors.append(held_out(support))
+    enough = _GOOD_ENOUGH * min(errors)
+    support = _swap(fit, path[int(np.argmax(np.array(errors) <= enough))], len(forced), others)
+    support = _prune(fit, support, forced, held_out, min(enough, _GOOD_ENOUGH * held_out(support)))
+    return _swap(fit, support, len(forced), others)
+
+
+def _swap(fit: Moments, support: Index, fixed: int, others: Index) -> Index:
+    """Exchange terms after the first ``fixed`` one by one for better ones, for as long as the error falls.
+
+    A term taken early, when it stood in for several, is often only a look-alike of the one that is there:
+    within a small range of q2, cos(q2) of cos(2 q2).
+    """
+    error = fit.gains(support, others[:0])[0]
+    changed = True
+    while changed:
+        changed = False
+        for k in range(fixed, len(support)):
+            rest = np.delete(support, k)
+            rss, gains = fit.gains(rest, others)
+            gains[np.isin(others, rest)] = 0.0
+            best = int(np.argmax(gains))
+            if rss - gains[best] < (1 - _WORTH_A_SWAP) * error - _FLOOR * fit.yy:
+                support = np.insert(rest, k, others[best])
+                error, changed = rss - gains[best], True
+    return support
+
+
+def _prune(
+    fit: Moments, support: Index, forced: Index, held_out: Callable[[Index], float], enough: float
+) -> Index:
+    """Drop, weakest first, the terms that later ones have made superfluous."""
+    while True:
+        _, losses = fit.losses(support)
+        for weakest in np.argsort(losses):
+            if support[weakest] in forced:
+                continue
+            shorter = np.delete(support, weakest)
+            if held_out(shorter) <= enough:
+                support = shorter
+                break
+            return support
+        else:
+            return support
+
+
+class LagrangianLibrary(Library):
+    """Few terms of the energies."""
+
+    name = "lagrangian"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": lagrangian}
+    conditioning = SHARED_CONDITIONING
+
+    def undetermined(self, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
+        """Why there are too many candidates for the logs.
+
+        Torque below a corner takes four values per period of it, each joint apart
+        (:func:`armloop.data.signals.independent_rows`). Fewer values than candidates determine none of them, and the search
+        among them takes longest.
+        """
+        read = (source.read() for source in logs)
+        seconds = sum(float(np.ptp(log.time[run])) for log in read for run in log.runs())
+        values, count = int(4 * cutoff_hz * seconds * arm.n), candidates(arm).count
+        return "" if count <= values else f"{count} candidates, but {values} independent values of torque"

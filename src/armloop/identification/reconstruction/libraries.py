@@ -1,0 +1,243 @@
+"""Model selection among the libraries: what a user who asked for none is best served with.
+
+The paper's double feature set needs no geometry and no symmetry, but a data collection does not tell all its terms
+apart; the base parameters of the URDF are few and right where its geometry is; the energies are few, need no lengths,
+and make M(q) symmetric by construction. Which of them suits a log is seen on blocks of it that none of them was fitted on
+and that judge nothing else: of those that pass the checks of physics (:mod:`armloop.dynamics.physics`), the one that
+leaves least, or one with fewer coefficients where the difference is within its standard error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from armloop.data.signals import Conditioning
+from armloop.dynamics.physics import PhysicsChecks, check_physics
+from armloop.identification.reconstruction.data import Data
+from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.lagrangian import LagrangianLibrary
+from armloop.identification.reconstruction.library import Library
+from armloop.identification.reconstruction.nearest_regime import Sorter
+from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
+from armloop.identification.reconstruction.shared import motion_range
+from armloop.identification.reconstruction.stepwise import DoubleFeatureSetLibrary
+from armloop.identification.reconstruction.tally import SELECTION, Part, Tally
+from armloop.model import ReconstructedModel
+from armloop.model.components import Lagrangian, RigidBody, SparseTerms
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+
+#: By name, the richest first.
+LIBRARIES: dict[str, Library] = {
+    one.name: one for one in (DoubleFeatureSetLibrary(), RigidBodyLibrary(), LagrangianLibrary())
+}
+#: Blocks from which on a difference has a standard error.
+_ENOUGH = 8
+
+
+def named(name: str) -> Library:
+    """The library of a name; raises ``InputError`` where there is none."""
+    if name not in LIBRARIES:
+        raise InputError(f"unknown library {name!r}; there are: {', '.join(LIBRARIES)}")
+    return LIBRARIES[name]
+
+
+def candidates(arm: Arm, options: Options, method: str = "stepwise") -> list[Library]:
+    """Libraries that are compared where the user names none: those asked for by an option, or all that suit the arm."""
+    able = [one for one in LIBRARIES.values() if method in one.methods]
+    asked = [one for one in able if one.asked(options)]
+    if asked:
+        return asked
+    able = [one for one in able if options.friction is None or not one.own_friction] or able
+    return [one for one in able if one.suits(arm)] or able
+
+
+def check_suits(library: Library, method: str, options: Options) -> None:
+    """Raise ``InputError`` where a library knows no such method, or no friction laws that could be chosen."""
+    if method not in library.methods:
+        able = ", ".join(one.name for one in LIBRARIES.values() if method in one.methods)
+        raise InputError(f"method {method!r} works on the library {able}, not on {library.name!r}")
+    if options.friction is not None and library.own_friction:
+        others = " or ".join(one.name for one in LIBRARIES.values() if not one.own_friction)
+        raise InputError(f"{library.own_friction}; laws are chosen with --library {others}")
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """What a library found on conditioned logs.
+
+    Attributes:
+        margin: seconds from a block's ends within which its samples do not judge.
+    """
+
+    library: Library
+    conditioning: Conditioning
+    data: Data
+    found: Found
+    margin: float = 0.0
+
+    def tally(self, sorter: Sorter | None, part: Part) -> Tally:
+        """Errors on blocks that the model has not seen; per condition where they are sorted."""
+        model = self.model()
+        return self.data.sum(partial(Tally.of, model=model, sorter=sorter, part=part, margin=self.margin))
+
+    def worst(self, sorter: Sorter | None, seconds: float) -> list[float | None]:
+        """RMSE per joint that one piece of ``seconds`` in ten exceeds, on all held-out blocks.
+
+        The yardstick of a later run, not an error of this model: also blocks that chose a library show what it leaves, and
+        half of them would miss the rarer motion.
+        """
+        tally = partial(Tally.of, model=self.model(), sorter=sorter, part="all", seconds=seconds)
+        return self.data.sum(tally).worst()
+
+    def model(self) -> ReconstructedModel:
+        """What was fitted without the held-out blocks: a model that has seen those that judge must choose nothing."""
+        found, history = self.found, {"range": motion_range(self.data.reference.samples.motion)}
+        return ReconstructedModel(
+            found.arm,
+            tuple(found.components),
+            found.law,
+            self.conditioning,
+            effects=found.effects,
+            history=history,
+        )
+
+    def coefficients(self) -> int:
+        """Number of coefficients; those that serve all joints count once."""
+        own = sum(len(added.parameters) for added in self.found.effects)
+        return own + sum(map(len, self.found.friction)) + sum(map(_size, self.found.components))
+
+
+def _size(component: object) -> int:
+    if isinstance(component, SparseTerms):
+        return int(np.count_nonzero(component.coefficients))
+    if isinstance(component, RigidBody):
+        return len(component.values)
+    assert isinstance(component, Lagrangian)
+    return len(component.coefficients)
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """One library in the comparison.
+
+    Attributes:
+        attempt: what it found; None if it could not be tried.
+        refused: why not; empty if it was.
+        nrmse: per joint, on the blocks that choose the library.
+        coefficients: their number.
+        checks: of physics, over the joint limits.
+        chosen: whether it was taken.
+    """
+
+    library: Library
+    attempt: Attempt | None = None
+    refused: str = ""
+    nrmse: tuple[float | None, ...] = ()
+    coefficients: int = 0
+    checks: PhysicsChecks | None = None
+    blocks: Array | None = None
+    chosen: bool = False
+
+    @property
+    def name(self) -> str:
+        """The library's."""
+        return self.library.name
+
+    @property
+    def error(self) -> float:
+        """Mean nRMSE over the joints that move on the blocks; infinite if there is none."""
+        known = [x for x in self.nrmse if x is not None]
+        return float(np.mean(known)) if known else float("inf")
+
+    @property
+    def passed(self) -> bool:
+        """Whether it obeys physics."""
+        return self.checks is not None and self.checks.passed
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        if self.attempt is None:
+            return {"library": self.name, "chosen": False, "refused": self.refused}
+        return {
+            "library": self.name,
+            "chosen": self.chosen,
+            "selection_nrmse": list(self.nrmse),
+            "coefficients": self.coefficients,
+            "physics": self.checks.to_dict() if self.checks else None,
+        }
+
+
+def contender(library: Library, attempt: Callable[[Library], Attempt]) -> Contender:
+    """Try a library; one that the logs do not carry is refused with the reason.
+
+    Args:
+        attempt: makes the attempt of a library.
+    """
+    try:
+        made = attempt(library)
+    except InputError as error:
+        return Contender(library, refused=str(error))
+    tally = made.tally(None, SELECTION)
+    score = tally.score()
+    return Contender(
+        library,
+        made,
+        nrmse=tuple(score.moving["nrmse"]),
+        coefficients=made.coefficients(),
+        checks=check_physics(made.model()),
+        blocks=tally.relative_blocks(),
+    )
+
+
+def choose(tried: Sequence[Contender]) -> list[Contender]:
+    """The same, with the best of them chosen.
+
+    Raises:
+        InputError: the logs carry none of the libraries.
+    """
+    made = [one for one in tried if one.attempt is not None]
+    if not made:
+        raise InputError("; ".join(f"{one.name}: {one.refused}" for one in tried))
+    eligible = [one for one in made if one.passed] or made
+    best = min(eligible, key=lambda one: one.error)
+    fewer = [one for one in eligible if one.coefficients < best.coefficients and _no_worse(one, best)]
+    taken = min(fewer, key=lambda one: one.coefficients, default=best)
+    return [replace(one, chosen=one is taken) for one in tried]
+
+
+def _no_worse(one: Contender, best: Contender) -> bool:
+    """Whether the difference of two errors on the same blocks is within its standard error."""
+    if one.blocks is None or best.blocks is None or one.blocks.shape != best.blocks.shape:
+        return False
+    excess = one.blocks - best.blocks
+    excess = excess[np.isfinite(excess)]
+    if len(excess) < _ENOUGH:
+        return False
+    return bool(excess.mean() <= excess.std(ddof=1) / np.sqrt(len(excess)))
+
+
+def comparison_notes(tried: Sequence[Contender]) -> list[str]:
+    """Why the library that was taken was, and what its checks say, a line each."""
+    (taken,) = [one for one in tried if one.chosen]
+    others = [one for one in tried if not one.chosen]
+    parts = [
+        f"{one.name} {one.error:.2%}" if one.attempt else f"{one.name} not tried ({one.refused})"
+        for one in others
+    ]
+    if np.isfinite(taken.error):
+        reason = f"it leaves {taken.error:.2%} (nRMSE) on the blocks that choose the library"
+    else:
+        reason = "the only one that the logs can determine"
+    notes = [f"library {taken.name}: {reason}; {', '.join(parts)}"]
+    for one in others:
+        if one.checks is not None and not one.passed and one.error < taken.error:
+            notes.append(f"{one.name} leaves less but is no arm: {'; '.join(one.checks.faults())}")
+    return notes

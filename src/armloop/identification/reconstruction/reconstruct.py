@@ -1,0 +1,322 @@
+"""From logs to a model: condition the signals, hold data out, run a method, score what it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.blocks import folds
+from armloop.data.log import require_different
+from armloop.data.motion import Samples
+from armloop.data.pieces import IN_MEMORY, LogSource
+from armloop.data.signals import Conditioning
+from armloop.dynamics.physics import check_physics
+from armloop.identification.goodness import Parts, merged
+from armloop.identification.reconstruction.bandwidth import (
+    Bandwidth,
+    check_nyquist,
+    choose_bandwidth,
+    highest_corner,
+)
+from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Apart, independent_blocks
+from armloop.identification.reconstruction.data import Data
+from armloop.identification.reconstruction.excitation import check_recorded
+from armloop.identification.reconstruction.fitted import uncertainty
+from armloop.identification.reconstruction.friction_selection import check_laws
+from armloop.identification.reconstruction.held_out import held_out_intervals
+from armloop.identification.reconstruction.judged import held_out_parts
+from armloop.identification.reconstruction.libraries import (
+    Attempt,
+    Contender,
+    candidates,
+    check_suits,
+    choose,
+    comparison_notes,
+    contender,
+    named,
+)
+from armloop.identification.reconstruction.library import METHODS, Library
+from armloop.identification.reconstruction.options import Options, StepReport
+from armloop.identification.reconstruction.ripple import find_ripple
+from armloop.identification.reconstruction.ripple import notes as ripple_notes
+from armloop.identification.reconstruction.shared import motion_range
+from armloop.identification.reconstruction.tally import Part
+from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.scoring import Score
+from armloop.model import ReconstructedModel
+from armloop.robot.arm import Arm
+from armloop.util.errors import InputError
+from armloop.util.progress import Progress, silent
+from armloop.util.workers import Workers, one_thread
+
+#: Samples as recorded in which ripples are looked for, where the logs are not kept in memory.
+_RIPPLE = 300_000
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """A model with the account of how it came about.
+
+    Attributes:
+        reports: one per step.
+        held_out: score on blocks that no step has seen, and that chose nothing: no term, no orders, no library.
+        notes: what the user should know.
+        libraries: those that were compared; the one taken alone where the user named it.
+        parts: how much of each joint's torque is explained, predictable but not explained, and noise, on the same
+            blocks; empty where nobody asked.
+    """
+
+    model: ReconstructedModel
+    reports: list[StepReport]
+    held_out: Score
+    notes: list[str]
+    libraries: list[Contender] = field(default_factory=list)
+    parts: list[Parts] = field(default_factory=list)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What must be said before anything else: joints of which the model leaves much that is predictable."""
+        return [one.sentence() for one in self.parts if one.much_is_left]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of ``armloop reconstruct --json``, without the model's path."""
+        return {
+            "steps": [report.to_dict() for report in self.reports],
+            "held_out": self.held_out.moving,
+            "library": self.model.history["library"],
+            "libraries": [one.to_dict() for one in self.libraries],
+            "physics": self.model.history["physics"],
+            "joints": merged(self.parts),
+            "warnings": self.warnings,
+            "notes": self.notes,
+        }
+
+
+def default_library(arm: Arm) -> str:
+    """The library that a motion is designed for where none is named: the richest that is compared."""
+    return candidates(arm, Options())[0].name
+
+
+def default_conditioning(library: str) -> Conditioning:
+    """Filter that suits a library."""
+    return named(library).conditioning
+
+
+@one_thread
+def reconstruct(
+    logs: Sequence[LogSource],
+    arm: Arm,
+    method: str = "stepwise",
+    library: str | None = None,
+    conditioning: Conditioning | None = None,
+    options: Options | None = None,
+    progress: Progress = silent,
+    recorded: dict[str, Any] | None = None,
+    workers: Workers | None = None,
+    in_memory: int = IN_MEMORY,
+) -> Reconstruction:
+    """Reconstruct a model of an arm's joint torques from its logs.
+
+    Args:
+        logs: runs of the same arm, in memory or read when needed (:mod:`armloop.data.pieces`); which sample serves
+            which step is found from the samples.
+        method: ``"stepwise"`` or ``"sindy"`` (one regression of everything, the reference method).
+        library: the name of one of :mod:`reconstruction.libraries`; by default the best of them, unless an
+            option speaks of one.
+        conditioning: filter; by default what suits the library, with a lower corner where the data ask for it
+            (:mod:`armloop.identification.reconstruction.bandwidth`).
+        recorded: how the logs recorded the torque, kept in the model for later logs.
+        workers: who passes over logs that are not kept in memory; by default this process.
+        in_memory: number of samples up to which logs are kept in memory. More are read and conditioned anew on
+            every pass by the stepwise method, whatever the library, in memory that does not grow with them.
+
+    Raises:
+        InputError: logs that do not fit the arm, an unknown method or friction law, a corner above the Nyquist rate,
+            torques that cannot be those of the arm (:mod:`reconstruction.torque_checks`), or too little excitation.
+    """
+    if method not in METHODS:
+        raise InputError(f"unknown method {method!r}; there are: {', '.join(METHODS)}")
+    settings = options or Options()
+    wanted = candidates(arm, settings, method) if library is None else [named(library)]
+    for one in wanted:
+        check_suits(one, method, settings)
+    check_laws(settings.friction)
+    for log in logs:
+        if log.joints != arm.n:
+            raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
+    large = sum(log.samples for log in logs) > in_memory
+    streamed = large and METHODS[method].streams
+    kept = [] if streamed else [log.read() for log in logs]
+    require_different(kept)
+    if conditioning is not None:
+        check_nyquist(kept or logs, conditioning.cutoff_hz)
+        # samples that are no time series show the first library alone what it needs
+        wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
+    usual = [conditioning or one.conditioning for one in wanted]
+    bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
+    settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
+    check_torques(kept or logs, arm, bandwidth.cutoff_hz)
+
+    refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
+    refused = {} if library is not None else {one: why for one, why in refused.items() if why}
+    left = [one for one in wanted if one not in refused]
+    few = len(left) > 1 and _are_few(kept, bandwidth.suited(usual[0]), settings)
+
+    def attempt(library: Library, nested: bool = False) -> Attempt:
+        how = conditioning or bandwidth.suited(library.conditioning)
+        progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
+        if streamed:
+            data = Data.streamed(logs, how, settings, workers, progress)
+        else:
+            data = Data.kept(kept, how, settings)
+            data = data.nested() if nested else data
+        check_recorded(arm, data.reference.samples)
+        found = library.methods[method](arm, data, settings, progress)
+        if bandwidth.trials:
+            found.history["bandwidth"] = bandwidth.to_dict()
+        found.notes += bandwidth.notes()
+        return Attempt(library, how, data, found, apart.margin)
+
+    if len(left) == 1:
+        tried = [Contender(one, refused=refused.get(one, "")) for one in wanted]
+        tried = [
+            one if one.refused else replace(one, attempt=attempt(one.library), chosen=True) for one in tried
+        ]
+        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, apart)
+    tried = [
+        Contender(one, refused=refused[one])
+        if one in refused
+        else contender(one, partial(attempt, nested=few))
+        for one in wanted
+    ]
+    tried = choose(tried)
+    if few:
+        tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
+    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, apart)
+
+
+def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> bool:
+    """Whether half of the held-out blocks are too few to judge by; a fold of the others then chooses the library."""
+    count = sum(map(len, held_out_intervals(logs, [how], options)))
+    return bool(logs) and options.folds > 2 and count < 2 * FEWEST_BLOCKS
+
+
+def held_apart(
+    logs: Sequence[LogSource],
+    arm: Arm,
+    usual: Sequence[Conditioning],
+    options: Options,
+    choosing: bool,
+    progress: Progress,
+) -> tuple[Bandwidth, Apart]:
+    """The low-pass, and the blocks that are held out: from it, too.
+
+    How long blocks must be depends on the low-pass, and they are held out from its choice: where a lower corner asks for
+    longer ones, it is chosen anew.
+
+    Args:
+        usual: filters of the libraries that are going to be regressed.
+        choosing: whether the corner is chosen; else it is the usual one.
+    """
+
+    def blocks(bandwidth: Bandwidth) -> Apart:
+        return independent_blocks(arm, logs, bandwidth.suited(usual[0]), options.block_seconds, options.folds)
+
+    if not choosing:
+        bandwidth = Bandwidth(usual[0].cutoff_hz)
+        return bandwidth, blocks(bandwidth)
+    progress("choosing the low-pass on blocks that judge nothing else")
+    bandwidth = Bandwidth(highest_corner(logs, Conditioning()))
+    seconds, apart = 0.0, blocks(bandwidth)
+    while apart.seconds > seconds:
+        seconds, before = apart.seconds, bandwidth.cutoff_hz
+        dealt = replace(options, block_seconds=seconds)
+        bandwidth = choose_bandwidth(logs, arm, Conditioning(), dealt, usual)
+        if bandwidth.cutoff_hz != before:
+            apart = blocks(bandwidth)
+    return bandwidth, apart.within(seconds)
+
+
+def _finished(
+    libraries: list[Contender],
+    part: Part,
+    arm: Arm,
+    method: str,
+    logs: Sequence[LogSource],
+    options: Options,
+    progress: Progress,
+    recorded: dict[str, Any] | None,
+    apart: Apart,
+) -> Reconstruction:
+    """The model with its history, its baseline on held-out data and its standard errors."""
+    (tried,) = [one.attempt for one in libraries if one.chosen]
+    assert tried is not None
+    found, data, compared = tried.found, tried.data, len(libraries) > 1
+    if not METHODS[method].reference:
+        bare = ReconstructedModel(
+            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
+        )
+        if data.in_memory:
+            recorded_logs, chunk = [log.read() for log in logs], data.reference
+        else:
+            recorded_logs, chunk = data.recorded(_RIPPLE)
+        ripple = find_ripple(bare, recorded_logs, chunk.samples, chunk.held_out)
+        found.notes += ripple_notes(ripple)
+        for one in (found, *([] if found.final is None else [found.final])):
+            one.effects = (*one.effects, *ripple)
+    notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
+    if apart.too_short:
+        notes.append(
+            f"the residual remembers for {apart.correlation:.2g} s, and the logs are too short for held-out blocks of more "
+            f"than {apart.seconds:.2g} s: the held-out error may be too good"
+        )
+    model = ReconstructedModel(
+        arm=arm,
+        components=tuple(found.components),
+        friction=found.law,
+        effects=found.effects,
+        conditioning=tried.conditioning,
+        recorded=recorded or {"unit": "N*m", "drive_gains": None},
+        history={
+            "method": method,
+            "library": tried.library.name,
+            "logs": list(dict.fromkeys(log.name for log in logs)),
+            "steps": [report.to_dict() for report in found.reports],
+            "range": motion_range(data.reference.samples.motion),
+            **found.history,
+        },
+    )
+    tally = tried.tally(found.sorter, part)
+    parts = []
+    if options.parts:
+        progress("what a flexible regression still finds in what the model leaves")
+        parts = held_out_parts(model, data, part)
+    worst = tried.worst(found.sorter, Options().block_seconds)
+    model = replace(model, baseline={**tally.baseline(), "worst": worst, "joints": merged(parts)})
+    if found.final is not None:
+        history = {**model.history, **found.final.history}
+        components = tuple(found.final.components)
+        last = found.final
+        model = replace(
+            model, components=components, friction=last.law, effects=last.effects, history=history
+        )
+    checks = check_physics(model)
+    notes += checks.faults()
+    history = {**model.history, "physics": checks.to_dict(), "notes": notes}
+    if compared:
+        history["libraries"] = [one.to_dict() for one in libraries]
+    model = replace(model, history=history)
+    if options.standard_errors:
+        progress("standard errors of the coefficients")
+        model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
+    return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
+
+
+def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:
+    """(N,) every ``folds``-th block, which no step may fit."""
+    return folds(samples, options.folds, options.block_seconds) == 0

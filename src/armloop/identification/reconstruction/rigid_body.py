@@ -1,0 +1,152 @@
+"""The rigid-body library: base parameters shared by all joints, with friction that has memory and feels load.
+
+It scales to seven joints: some 40 shared parameters and a few friction terms a joint where the double feature
+set would need tens of thousands. The regression is weighted by what each joint's residual turns out to be.
+What scarce data leave open is filled in from the URDF, as firmly as the data themselves speak for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.dynamics.physics import joint_limits
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.data import Data
+from armloop.identification.reconstruction.design import Design
+from armloop.identification.reconstruction.fitting import Fitting
+from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.library import Find, Library
+from armloop.identification.reconstruction.options import Options, StepReport
+from armloop.identification.reconstruction.physical import Body, physical_solution, physics_notes, postures
+from armloop.identification.reconstruction.pooled import Prior
+from armloop.identification.reconstruction.shared import (
+    SHARED_CONDITIONING,
+    check_moves,
+    found_friction,
+    motion_range,
+    undetermined_notes,
+)
+from armloop.identification.reconstruction.training import Training
+from armloop.model.components import RigidBody
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.arrays import Array
+from armloop.util.progress import Progress
+
+#: Standard deviations of a link's mass from the URDF's that are tried, kg.
+_SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+
+
+def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
+    """Regress base parameters and friction on all moving samples at once.
+
+    Which friction each joint has is chosen on a ladder (:mod:`reconstruction.friction_selection`). The torque
+    that passes a joint, on which its friction may depend, is known after a first pass with plain friction.
+    What physics demands (M(q) positive definite, friction that never drives) is kept as constraints.
+
+    Raises:
+        ExcitationError: a joint does not move.
+    """
+    motion = data.reference.samples.motion
+    base = BaseParameters.of_arm(arm, rotors=True)
+    design = Design(arm, partial(base.columns, arm), base.count)
+    progress(f"rigid body: {base.count} base parameters, beside plain friction")
+    training = Training.of(data, design, options)
+    survey = training.survey
+    check_moves(arm, survey.fitted)
+    unknown = undetermined_notes(survey.products(base.count), base)
+    nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
+    design = design.loaded(survey.load(base.count))
+    fitting = Fitting(arm, training, design, _priors(arm, base, nominal), options, progress)
+    ladder, laws = fitting.chosen()
+    r = base.count + laws.count
+    shape = Body(
+        lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
+    )
+
+    def regressed(held_out: bool) -> Found:
+        solution = ladder.solved(held_out)
+        theta, physics = solution.theta, {}
+        if options.physical:
+            physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
+            theta = physical.theta
+            physics = {
+                "constraints": physical.binding,
+                "contradicted": physical.contradicted,
+                "kept_positive": physical.where,
+            }
+            held = np.flatnonzero(
+                base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
+            )
+            physics["held"] = {base.names[k]: float(solution.theta[k]) for k in held}
+            below = np.flatnonzero(base.positive & (theta[: base.count] < 0))
+            physics["negative"] = {base.names[k]: float(theta[k]) for k in below}
+        values = theta[: base.count]
+        body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
+        inertial = body.parameters[: 10 * arm.n].tolist()
+        history = {
+            "inertial": inertial,
+            "friction_ladder": [rung.to_dict() for rung in ladder.comparisons],
+            **physics,
+        }
+        effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))
+        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
+
+    found = regressed(held_out=False)
+    found.final = final = regressed(held_out=True)
+    body, samples_per_joint = final.components[0], survey.sliding.tolist()
+    size = base.count + sum(len(law) for law in ladder.laws)
+    for step in (1, 2, 3):
+        friction = [sum(term.step <= step for term in terms) for terms in final.friction]
+        counts = [len(body.terms(arm, j)) + friction[j] for j in range(arm.n)]
+        found.reports.append(StepReport(step, None, size, base.count, counts, samples_per_joint))
+    found.notes = [
+        "the steps share one set of parameters: they were regressed together and are told apart on prediction",
+        "the held-out blocks judged a model without them; the model itself was then regressed on all data",
+        *unknown,
+        *ladder.notes,
+        *laws.notes(final.effects),
+    ]
+    found.notes += physics_notes(final.history)
+    return found
+
+
+def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:
+    """Beliefs that every link is like the URDF's, by how many kg its mass may well differ.
+
+    Its first moments and inertias may differ as those of so much mass a typical link's length away.
+    """
+    length = np.linalg.norm(arm.X_PF[1:, :3, 3], axis=1).sum() / max(arm.n - 1, 1)
+    length = float(length) if length > 0 else 1.0
+    unit = np.concatenate([np.tile([1.0, *[length] * 3, *[length**2] * 6], arm.n), np.full(arm.n, length**2)])
+    spread = base.grouping * unit
+    precision = np.linalg.inv(spread @ spread.T)
+    centre = base.from_full(nominal)
+    return {f"links as in the URDF ± {kg:g} kg": Prior(precision / kg**2, centre) for kg in _SPREADS}
+
+
+def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
+    """(P, n, n, r) mass matrices at postures q (P, n) per unit of each base parameter."""
+    repeated = np.repeat(q, arm.n, axis=0)
+    still, unit = np.zeros_like(repeated), np.tile(np.eye(arm.n), (len(q), 1))
+    weightless = replace(arm, gravity=np.zeros(3))
+    accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit, np.array([0]))
+    columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
+    return columns.transpose(0, 2, 1, 3)
+
+
+class RigidBodyLibrary(Library):
+    """Base parameters of the URDF's chain."""
+
+    name = "rigid-body"
+    methods: ClassVar[Mapping[str, Find]] = {"stepwise": rigid_body}
+    conditioning = SHARED_CONDITIONING

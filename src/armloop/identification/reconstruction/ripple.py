@@ -1,0 +1,152 @@
+"""Torque ripple of motors and gears, found in what a model leaves of the logs before the low-pass takes it away.
+
+A strain-wave gear ripples a hundred or two hundred times per revolution: at one rad/s that is beyond the corner at which
+torques are regressed. So the residual is taken on the unfiltered torque, and its spectrum over the angle (not over time)
+is searched for lines. A line must stand out from the orders beside it, for a model's other shortcomings are broad; it
+must keep its phase from block to block, and help on blocks left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from armloop.data.blocks import block_numbers, block_sums
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.signals import Conditioning, ShortRunError, preprocess
+from armloop.laws.effects import Context
+from armloop.laws.effects.torque_ripple import TorqueRipple
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.util.arrays import Array, Index
+
+#: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
+_BAND = 0.4
+#: A line must be so many times as strong as the median of the orders beside it …
+_STANDS_OUT = 20.0
+#: … from a quarter below to a quarter above, but for the nearest, which it leaks into; and hold so much of the residual.
+_BESIDE, _NEAREST, _WORTH = 0.25, 6, 0.005
+#: Probability that noise alone shows any line.
+_CHANCE = 1e-3
+_MOST, _FOLDS, _BLOCK_SECONDS, _FEWEST = 3, 5, 1.5, 500
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """What a model leaves of one joint's unfiltered torque, (M,) each, with the block of each sample."""
+
+    q: Array
+    left: Array
+    block: Index
+
+
+def find_ripple(
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+) -> list[AddedEffect]:
+    """Ripples of all joints that turn, strongest first at each.
+
+    Args:
+        logs: the training logs, as recorded.
+        samples: the same, conditioned for the regression; ``held_out`` (N,) of them are not looked at.
+    """
+    found: list[AddedEffect] = []
+    if samples.cutoff_hz <= 0:
+        return found
+    residuals, period = _residuals(model, logs, samples, held_out)
+    for j, joint in enumerate(model.arm.joints):
+        if joint.kind != "revolute" or len(residuals[j].q) < _FEWEST:
+            continue
+        left = residuals[j]
+        effect = TorqueRipple(j + 1)
+        orders = np.array(effect.shapes(Context(model.arm, samples.motion, period=period)))
+        for _ in range(_MOST):
+            line = _line(left, orders, model.arm.n)
+            if line is None:
+                break
+            order, x, covariance = line
+            found.append(AddedEffect(effect, effect.estimates(model.arm, x, covariance, order), "always"))
+            left = Residual(left.q, left.left - _waves(left.q, order) @ x, left.block)
+    return found
+
+
+def notes(effects: Sequence[AddedEffect]) -> list[str]:
+    """What was found, a line each."""
+    return [f"always there: {added.effect.sentence(added.parameters)}" for added in effects]
+
+
+def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Array] | None:
+    """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None."""
+    power = spectrum(left.q, left.left, orders) / max(float(np.sum(left.left**2)), 1e-300)
+    for k in np.argsort(power)[::-1][:_MOST]:
+        order = float(orders[k])
+        beside = (np.abs(orders - order) <= _BESIDE * order) & (np.abs(orders - order) > _NEAREST)
+        if power[k] < _WORTH or beside.sum() < _NEAREST or power[k] < _STANDS_OUT * np.median(power[beside]):
+            continue
+        X, y = _waves(left.q, order), left.left
+        after, fold = np.array(y), left.block % _FOLDS
+        for f in range(_FOLDS):
+            mine = fold == f
+            after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
+        a, b = block_sums(y**2, left.block), block_sums(after**2, left.block)
+        parts = (a - b) / np.maximum(a + b, 1e-300)
+        score = float(parts.sum()) / max(float(parts.std(ddof=1)) * np.sqrt(len(parts)), 1e-12)
+        if score > student.isf(_CHANCE / (len(orders) * joints), len(parts) - 1):
+            bread = np.linalg.inv(X.T @ X)
+            x = bread @ (X.T @ y)
+            scores = X * (y - X @ x)[:, None]
+            sums = np.stack([block_sums(column, left.block) for column in scores.T])
+            return order, x, bread @ (sums @ sums.T) @ bread
+    return None
+
+
+def spectrum(q: Array, x: Array, orders: Array) -> Array:
+    """(K,) sum of squares that waves of whole orders of an angle q (M,) take of x (M,), as if they were orthogonal."""
+    turn = np.exp(1j * q)
+    wave = turn ** float(orders[0])
+    power = np.empty(len(orders))
+    for k in range(len(orders)):
+        power[k] = 2 * np.abs(np.vdot(wave, x)) ** 2 / len(x)
+        wave = wave * turn
+    return power
+
+
+def _waves(q: Array, order: float) -> Array:
+    return np.column_stack([np.sin(order * q), np.cos(order * q)])
+
+
+def _residuals(
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+) -> tuple[list[Residual], float]:
+    """Per joint, what the model leaves of the unfiltered torque where the joint moves; and the sample period, s."""
+    fine = Conditioning(**{**model.conditioning.to_dict(), "oversampling": 1e9})
+    runs = samples.motion.runs()
+    collected: list[list[tuple[Array, Array, Index]]] = [[] for _ in range(model.arm.n)]
+    following = number = 0
+    period = samples.period
+    for log in logs:
+        for part in log.runs():
+            one = log.select(part)
+            try:
+                low = preprocess([one], fine)
+            except ShortRunError:
+                continue
+            period = low.period
+            full = preprocess([one], Conditioning(cutoff_hz=_BAND / period, oversampling=1e9))
+            time, known = low.motion.time, samples.motion.time[runs[number]]
+            nearest = np.clip(np.searchsorted(known, time), 0, len(known) - 1) + runs[number].start
+            number += 1
+            tau = np.column_stack([np.interp(time, full.motion.time, x) for x in full.tau.T])
+            left = tau - model.predict(low.motion)
+            block = following + block_numbers(low.motion, _BLOCK_SECONDS)
+            following = int(block[-1]) + 1
+            fitted = ~held_out[nearest]
+            for j in range(model.arm.n):
+                rows = fitted & low.moving[:, j]
+                collected[j].append((low.motion.q[rows, j], left[rows, j], block[rows]))
+    return [
+        Residual(*(np.concatenate(column) for column in zip(*own, strict=True))) for own in collected
+    ], period

@@ -1,0 +1,143 @@
+"""Held-out prediction error of a model, summed chunk by chunk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from armloop.data.blocks import block_numbers
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.nearest_regime import Sorter
+from armloop.identification.scoring import Score, residual
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+#: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
+Part = Literal["all", "selection", "test"]
+SELECTION: Part = "selection"
+
+#: Moving samples that make a block's error one.
+_FEWEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Tally:
+    """Sums over held-out samples; they add over chunks.
+
+    Attributes:
+        sums: per working condition (0 where samples are not sorted), (2, 3, n): of samples at rest and of
+            moving ones, the squared errors, the squared torques and the number.
+        blocks: (B, 2, n) of every block: the squared errors of moving samples, and their number; empty where
+            samples are no time series.
+        samples: number of held-out samples.
+    """
+
+    sums: dict[int, Array]
+    blocks: Array
+    samples: int
+
+    def __add__(self, other: Tally) -> Tally:
+        sums = dict(self.sums)
+        for label, values in other.sums.items():
+            sums[label] = sums[label] + values if label in sums else values
+        return Tally(sums, np.concatenate([self.blocks, other.blocks]), self.samples + other.samples)
+
+    @staticmethod
+    def of(
+        chunk: Chunk,
+        model: ReconstructedModel,
+        sorter: Sorter | None,
+        part: Part = "all",
+        margin: float = 0.0,
+        seconds: float | None = None,
+    ) -> Tally:
+        """Sums of one chunk, of all runs as they are: prediction and filter need every sample.
+
+        Args:
+            part: which of the held-out blocks judge.
+            margin: seconds from a block that was fitted, or that chose, within which samples do not judge.
+            seconds: length of the pieces that ``blocks`` are told apart by; the held-out blocks' own by default.
+        """
+        samples, held = chunk.samples, chunk.judging(part, margin)
+        squares = residual(model, samples)[held] ** 2
+        torques, moving = samples.tau[held] ** 2, samples.moving[held]
+        labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples.motion)
+        sums = {}
+        for label in np.unique(labels[held]):
+            rows = labels[held] == label
+            masks = (rows[:, None] & ~moving, rows[:, None] & moving)
+            parts = [
+                [(squares * m).sum(axis=0), (torques * m).sum(axis=0), m.sum(axis=0).astype(float)]
+                for m in masks
+            ]
+            sums[int(label)] = np.array(parts)
+        n = squares.shape[1]
+        blocks = np.zeros((0, 2, n))
+        if samples.cutoff_hz > 0 and held.any():
+            pieces = (
+                chunk.blocks if seconds is None else block_numbers(samples.motion, seconds, samples.spans)
+            )
+            keys = np.column_stack([chunk.blocks[held], pieces[held]])
+            index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+            blocks = np.zeros((int(index.max()) + 1, 2, n))
+            np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
+        return Tally(sums, blocks, int(held.sum()))
+
+    def score(self) -> Score:
+        """Score of all held-out samples."""
+        rest, moving = np.sum(list(self.sums.values()), axis=0)
+        rms = [_root(t, c) for t, c in zip(moving[1], moving[2], strict=True)]
+        return Score(_errors(rest + moving), _errors(moving), _errors(rest), rms, self.samples)
+
+    def baseline(self) -> dict[str, Any]:
+        """What the model leaves, per joint: of the condition that it explains worst.
+
+        A later run is one of motion; easy data (creeping, steady) must not make the model look better than
+        it is on those.
+        """
+        per_condition = [_errors(moving)["rmse"] for _, moving in self.sums.values()]
+        rmse = [
+            max((x for x in joint if x is not None), default=None)
+            for joint in zip(*per_condition, strict=True)
+        ]
+        worst = self.worst()
+        rms = self.score().rms
+        nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
+        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "samples": self.samples}
+
+    def relative_blocks(self) -> Array:
+        """(B,) mean square of each block's error relative to the torque, mean over the joints that move in it.
+
+        NaN where none does.
+        """
+        scale = np.array([x if x else np.nan for x in self.score().rms]) ** 2
+        errors, counts = self.blocks[:, 0], self.blocks[:, 1]
+        relative = np.where(counts >= _FEWEST, errors / np.maximum(counts, 1.0), np.nan) / scale
+        known = np.isfinite(relative)
+        sums = np.where(known, relative, 0.0).sum(axis=1)
+        return np.where(known.any(axis=1), sums / np.maximum(known.sum(axis=1), 1), np.nan)
+
+    def worst(self) -> list[float | None]:
+        """RMSE per joint that one block in ten exceeds: a run may consist of such motion."""
+        found: list[float | None] = []
+        for errors, counts in zip(self.blocks[:, 0].T, self.blocks[:, 1].T, strict=True):
+            enough = counts >= _FEWEST
+            many = int(enough.sum()) >= 10
+            mean = errors[enough] / counts[enough]
+            found.append(float(np.sqrt(np.quantile(mean, 0.9))) if many else None)
+        return found
+
+
+def _errors(sums: Array) -> dict[str, Any]:
+    rmse = [_root(e, c) for e, c in zip(sums[0], sums[2], strict=True)]
+    rms = [_root(t, c) for t, c in zip(sums[1], sums[2], strict=True)]
+    return {
+        "rmse": rmse,
+        "nrmse": [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)],
+    }
+
+
+def _root(total: float, count: float) -> float | None:
+    return float(np.sqrt(total / count)) if count else None

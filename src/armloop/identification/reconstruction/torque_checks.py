@@ -1,0 +1,207 @@
+"""Physical plausibility of recorded torques: passivity of friction, positive inertia, and exchanged or turned columns.
+
+Rigid bodies with Coulomb and viscous friction are regressed on the torques as recorded and on what they would be had a
+column been turned in sign or exchanged with another. A log is refused only where physics or the error speak plainly: a
+joint whose friction drives *and* whose inertia is negative, in both halves of the data, and neither once its sign is
+turned; or two joints whose torques are explained twice as well, and physically, once they are exchanged. Nothing is
+compared with the masses of the URDF, which may be dummies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.log import MotionLog, unchecked_log
+from armloop.data.pieces import LogSource
+from armloop.data.plausibility import is_time_series
+from armloop.data.signals import Conditioning
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.bandwidth import Table, even_selection, root_mean_square, table_at
+from armloop.identification.reconstruction.rigid_body import mass_columns
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.errors import LogError
+
+#: Share of friction's power that must be of one sign, and the least part of the torque that friction must be, to count.
+_DRIVES, _FRICTION = 0.5, 0.02
+#: An exchange must lower the relative error of the two joints by this factor (geometric mean), to below this.
+_BETTER, _GOOD = 2.0, 0.6
+#: Whole joints in exchange must lower the error of all joints by this factor.
+_BETTER_ALL = 1.5
+#: Mean relative error from which on whole joints are tried in exchange where the fit is unphysical; rows a joint must have.
+_POOR, _FEWEST = 0.12, 200
+#: Of the instants at which corners are compared, every so manieth is used.
+_EVERY = 3
+#: Postures at which inertia is looked at.
+_POSTURES = 60
+
+
+def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None:
+    """Raise `LogError`, with the likely cause, where the torques cannot be those of this arm in this motion."""
+    chosen = even_selection(logs)
+    if cutoff_hz <= 0 or not all(is_time_series(log.q, log.runs()) for log in chosen):
+        return
+    problem = _Problem.of(chosen, arm, cutoff_hz)
+    if problem is None:
+        return
+    names = ", ".join(dict.fromkeys(log.name for log in chosen[:3])) + (", ..." if len(chosen) > 3 else "")
+    plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
+    turned = problem.turned(plain)
+    if turned:
+        which = "all joints" if len(turned) == arm.n else ", ".join(f"tau{j + 1}" for j in turned)
+        raise LogError(
+            f"{names}: the sign of {which} is turned: as recorded, friction drives and inertia is negative; "
+            "torque must be what the drive does on the joint in the direction of q"
+        )
+    for i, j in problem.better_exchanged(plain):
+        raise LogError(
+            f"{names}: columns tau{i + 1} and tau{j + 1} are exchanged: the other way round they are explained "
+            "at least twice as well; put the columns in the order of the joints, base to tip"
+        )
+    if float(np.mean(plain.relative)) > _POOR and not plain.physical(range(arm.n)):
+        for i, j in combinations(range(arm.n), 2):
+            if arm.joints[i].kind == arm.joints[j].kind and _whole_joints(
+                chosen, arm, cutoff_hz, plain, i, j
+            ):
+                raise LogError(
+                    f"{names}: joints {i + 1} and {j + 1} are exchanged: with q, v and tau the other way round all "
+                    "torques are explained far better; number the joints from the base to the tip"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Relative errors (n,), the share of friction's power that dissipates (n,) from -1 to 1, and mean inertias (n,)."""
+
+    relative: Array
+    power: Array
+    inertia: Array
+
+    def physical(self, joints: Sequence[int]) -> bool:
+        """Whether these joints have friction that brakes and positive inertia."""
+        own = list(joints)
+        return bool((self.power[own] >= 0).all() and (self.inertia[own] > 0).all())
+
+    def driven(self, joints: Sequence[int]) -> bool:
+        """Whether these joints have negative inertia and friction that drives, as far as they have any."""
+        own = list(joints)
+        return bool((self.power[own] <= 0).all() and (self.inertia[own] < 0).all())
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Columns and torques at a few instants, and mass matrices per unit of each parameter (P, n, n, r)."""
+
+    table: Table
+    mass: Array
+    shared: int
+
+    @staticmethod
+    def of(logs: list[MotionLog], arm: Arm, cutoff_hz: float) -> _Problem | None:
+        """None where there is too little motion to judge."""
+        base = BaseParameters.of_arm(arm, rotors=True)
+        table = table_at(logs, arm, base, Conditioning(), cutoff_hz, [cutoff_hz])
+        if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
+            return None
+        q = np.concatenate([log.q for log in logs])
+        q = q[:: max(1, len(q) // _POSTURES)]
+        thin = slice(None, None, _EVERY)
+        table = Table(table.columns[thin], table.tau[thin], table.blocks[thin], table.moving[thin])
+        return _Problem(table, mass_columns(arm, base, q), base.count)
+
+    def fit(self, signs: Array, order: NDArray[np.intp], half: int | None = None) -> _Fit:
+        """Regress the torques with these signs in this order, of all blocks or of every other one."""
+        table, n, r = self.table, len(signs), self.shared
+        tau = signs * table.tau[:, order]
+        rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
+        scale = np.array([root_mean_square(tau[own, j]) for j, own in enumerate(rows.T)])
+        size, theta = np.maximum(scale, 1e-12), np.zeros(table.columns.shape[2])
+        error = np.zeros(n)
+        for _ in range(2):
+            X = np.concatenate([table.columns[rows[:, j], j] / size[j] for j in range(n)])
+            y = np.concatenate([tau[rows[:, j], j] / size[j] for j in range(n)])
+            lengths = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
+            X = X / lengths
+            theta = np.linalg.solve(X.T @ X + 1e-7 * np.eye(X.shape[1]), X.T @ y) / lengths
+            left = tau - np.einsum("njp,p->nj", table.columns, theta)
+            error = np.array([root_mean_square(left[own, j]) for j, own in enumerate(rows.T)])
+            size = np.maximum(error, 1e-6 * np.maximum(scale, 1e-12))
+        power = np.zeros(n)
+        for j, own in enumerate(rows.T):
+            columns = table.columns[own, j, r + 3 * j : r + 3 * j + 2]
+            parts = columns * theta[r + 3 * j : r + 3 * j + 2]
+            v = columns[:, 1]
+            if root_mean_square(parts.sum(axis=1)) > _FRICTION * scale[j]:
+                power[j] = float((parts.sum(axis=1) * v).sum() / np.abs(parts * v[:, None]).sum())
+        inertia = np.einsum("pjjr,r->j", self.mass, theta[:r]) / len(self.mass)
+        return _Fit(error / np.maximum(scale, 1e-12), power, inertia)
+
+    def turned(self, plain: _Fit) -> list[int]:
+        """Joints whose sign is turned: alone, or all those whose friction drives."""
+        n = len(plain.power)
+        driving = [j for j in range(n) if plain.driven([j])]
+        groups = [driving, *([j] for j in range(n)), list(range(n))]
+        suspects = []
+        for group in groups:
+            if not group or plain.physical(group):
+                continue
+            signs = np.ones(n)
+            signs[group] = -1.0
+            order = np.arange(n)
+            other = self.fit(signs, order)
+            gain = float(np.mean(np.log(np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9))))
+            if not other.physical(range(n)) or gain < -0.01:
+                continue
+            own = np.log(np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9))[group]
+            plainly = (
+                len(group) == 1 and float(own.min()) > np.log(_BETTER) and other.relative[group].max() < _GOOD
+            )
+            halves = (self.fit(np.ones(n), order, half) for half in (0, 1))
+            if other.power[group].max() > _DRIVES and (plainly or all(one.driven(group) for one in halves)):
+                suspects.append((gain, group))
+        return max(suspects)[1] if suspects else []
+
+    def better_exchanged(self, plain: _Fit) -> list[tuple[int, int]]:
+        """Pairs whose torques are explained far better the other way round."""
+        found = []
+        for i, j in combinations(range(len(plain.power)), 2):
+            order = np.arange(len(plain.power))
+            order[[i, j]] = order[[j, i]]
+            other = self.fit(np.ones(len(order)), order)
+            gain = _gain(plain, other, i, j)
+            if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < _GOOD:
+                found.append((gain, (i, j)))
+        return [max(found)[1]] if found else []
+
+
+def _gain(plain: _Fit, other: _Fit, i: int, j: int) -> float:
+    """How many times smaller the other's relative error of two joints is, in the geometric mean."""
+    ratio = np.maximum(plain.relative[[i, j]], 1e-9) / np.maximum(other.relative[[i, j]], 1e-9)
+    return float(np.exp(np.mean(np.log(ratio))))
+
+
+def _whole_joints(logs: list[MotionLog], arm: Arm, cutoff_hz: float, plain: _Fit, i: int, j: int) -> bool:
+    """Whether q, v and tau of two joints explain one another far better the other way round."""
+    order = np.arange(arm.n)
+    order[[i, j]] = order[[j, i]]
+    exchanged = [
+        unchecked_log(
+            time=log.time, q=log.q[:, order], v=log.v[:, order], tau=log.tau[:, order], name=log.name
+        )
+        for log in logs
+    ]
+    problem = _Problem.of(exchanged, arm, cutoff_hz)
+    if problem is None:
+        return False
+    other = problem.fit(np.ones(arm.n), np.arange(arm.n))
+    ratio = np.maximum(plain.relative, 1e-9)[order] / np.maximum(other.relative, 1e-9)
+    return bool(
+        np.exp(np.mean(np.log(ratio))) > _BETTER
+        and other.physical(range(arm.n))
+        and other.relative.max() < _GOOD
+    )

@@ -1,0 +1,81 @@
+"""Coulomb level and viscous coefficient of any friction law: the straight line nearest to it over the speeds trained on.
+
+Laws are sums of elements (directions that fade in, Stribeck falls, roots and powers) whose single coefficients say little,
+because neighbouring elements share what the data show. What a data sheet or a simulator asks for, τ = f_c sign(v) + f_v v,
+is a linear function of them, so that its standard errors follow from their covariance, correlations included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Motion, Samples
+from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY
+from armloop.laws.friction import FrictionTerm, stribeck_fall
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+#: Speeds at which a law is compared with its line, and the quantiles of the fitted speeds that they lie between.
+_SPEEDS, _BETWEEN = 100, (0.1, 0.95)
+#: Parameter of what fades in, of the slowest of these speeds: nearer to rest the direction is not yet all there.
+_FADED = 3.0
+
+
+def friction_line(
+    model: ReconstructedModel,
+    joint: int,
+    names: Sequence[str],
+    covariance: Array,
+    freedom: float,
+    samples: Samples,
+    rows: NDArray[np.bool_],
+) -> dict[str, Any]:
+    """f_c, f_v of a joint (0-based) with standard errors, and the speeds between which they hold.
+
+    Args:
+        names: of the p unknowns of the joint's friction, ``v_s`` among them.
+        covariance: (p, p) of these.
+        rows: (N,) samples fitted.
+
+    Friction that grows with the load is left out: the line is that of the unloaded joint. Empty where there is none.
+    """
+    terms = [t for t in model.friction.terms[joint] if not t.by_load]
+    moving = np.abs(samples.motion.v[rows, joint])
+    if not terms or not len(moving):
+        return {}
+    low, high = np.quantile(moving, _BETWEEN)
+    fades = [_FADED * t.parameter for t in terms if t.kind == "smooth_sign"]
+    low = min(max(low, *fades, 0.0), 0.5 * high) if fades else low
+    v = np.linspace(low, high, _SPEEDS)
+    # Half the difference of both directions: what an offset adds to each is no friction.
+    columns = np.column_stack([0.5 * (_column(t, v) - _column(t, -v)) for t in terms])
+    line = np.linalg.pinv(np.column_stack([np.ones_like(v), v])) @ columns
+    places = {t.name(joint + 1): k for k, t in enumerate(terms)}
+    weights = np.zeros((2, len(names)))
+    for k, name in enumerate(names):
+        if name in places:
+            weights[:, k] = line[:, places[name]]
+        elif name == STRIBECK_VELOCITY:
+            own = next(t for t in terms if t.kind == "stribeck")
+            slope = -2 * v**2 / own.parameter**3 * stribeck_fall(v, own.parameter)
+            weights[:, k] = np.linalg.pinv(np.column_stack([np.ones_like(v), v])) @ (own.coefficient * slope)
+    values = line @ [t.coefficient for t in terms]
+    errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))
+    entry = {
+        key: {"value": float(x), "std_error": float(e), "degrees_of_freedom": round(float(freedom), 1)}
+        for key, x, e in zip(("coulomb", "viscous"), values, errors, strict=True)
+    }
+    return {**entry, "speeds": [float(low), float(high)]}
+
+
+def _column(term: FrictionTerm, v: Array) -> Array:
+    """A term's values at speeds that have lasted: memory is fully slid."""
+    rates = v[:, None]
+    motion = Motion(
+        np.arange(float(len(v))), np.zeros_like(rates), rates, np.zeros_like(rates), np.arange(len(v))
+    )
+    return np.where(np.abs(v) > 0, np.sign(v), 0.0) if term.kind == "hysteresis" else term.column(motion, 0)

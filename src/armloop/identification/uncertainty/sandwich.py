@@ -1,0 +1,98 @@
+"""Covariance of regressed coefficients whose errors are correlated within blocks of samples.
+
+The coefficients solve estimating equations: for each step the sum over its samples of column times residual,
+where the residual contains what the steps before it found. Stacked, their Jacobian is block-triangular, and so
+the uncertainty of inherited steps reaches the later ones (Newey, "A method of moments interpretation of
+sequential estimators", Economics Letters 14, 1984). Blocks of samples are the independent units. The covariance
+is the delete-one-block jackknife, which is the sandwich of Liang and Zeger (1986) corrected for the leverage of
+every block (CV3 of MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
+cluster-robust inference", J. Applied Econometrics 38, 2023).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.util.arrays import Array
+
+#: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
+_RIDGE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Estimating equations of p coefficients, summed over each of B blocks.
+
+    Attributes:
+        jacobian: (B, p, p) minus the derivative of the scores; row k holds the products of column k with the
+            columns that enter the residual of its step.
+        score: (B, p) column times residual.
+        count: (B, p) samples that entered.
+        stage: (p,) which of the regressions, one after the other, found each coefficient.
+        variance: (p,) mean squared residual of its regression, weighted as the scores are.
+    """
+
+    jacobian: Array
+    score: Array
+    count: Array
+    stage: NDArray[np.intp]
+    variance: Array
+
+    @property
+    def blocks(self) -> int:
+        """The number B of blocks."""
+        return len(self.score)
+
+    @cached_property
+    def scale(self) -> Array:
+        """(p,) factors that make the columns' squares sum to one."""
+        squares = np.diagonal(self.jacobian.sum(axis=0))
+        return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
+
+    @cached_property
+    def _scaled(self) -> Array:
+        return self.jacobian * np.multiply.outer(self.scale, self.scale)
+
+    def step(self) -> Array:
+        """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
+        total = self._scaled.sum(axis=0) + _RIDGE * np.eye(len(self.scale))
+        return np.asarray(self.scale * np.linalg.solve(total, self.scale * self.score.sum(axis=0)))
+
+    def covariance(self) -> Array:
+        """(p, p) covariance, blocks being independent and the errors within them anything."""
+        # Scores of least squares sum to zero; where a constraint or a correction for noise in the columns moved
+        # the solution they do not, and what all samples have in common is no error.
+        share = self.count / np.maximum(self.count.sum(axis=0), 1.0)
+        score = (self.score - share * self.score.sum(axis=0)) * self.scale
+        without = self._scaled.sum(axis=0) - self._scaled + _RIDGE * np.eye(score.shape[1])
+        moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
+        moved = moved - moved.mean(axis=0)
+        inner = moved.T @ moved * (self.blocks - 1) / self.blocks
+        return np.asarray(inner * np.multiply.outer(self.scale, self.scale))
+
+    def independent_covariance(self) -> Array:
+        """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""
+        same = self.stage[:, None] == self.stage
+        total = np.where(same, self._scaled.sum(axis=0), 0.0)
+        inverse = np.linalg.inv(total + _RIDGE * np.eye(len(total)))
+        used = np.array([np.count_nonzero(self.stage == s) for s in self.stage])
+        samples = np.maximum(self.count.sum(axis=0) - used, 1.0)
+        spread = self.variance * self.count.sum(axis=0) / samples
+        return np.asarray(inverse * spread * np.multiply.outer(self.scale, self.scale))
+
+    def degrees_of_freedom(self) -> Array:
+        """(p,) of Student's t: the number of blocks that really determine a coefficient, less one.
+
+        A block's weight is the variance it would contribute with independent errors; the effective number of
+        blocks is (Σ w)²/Σ w² (Satterthwaite; Carter, Schnepel and Steigerwald 2017).
+        """
+        total = self._scaled.sum(axis=0)
+        inverse = np.linalg.inv(total + _RIDGE * np.eye(len(total)))
+        noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
+        weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
+        effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300)
+        return np.maximum(effective - 1, 1.0)

@@ -1,0 +1,360 @@
+"""Standard errors of all coefficients of a reconstructed model, from the samples it was fitted on.
+
+The terms are taken as given: that they were chosen by the same data is not part of the errors, nor is what a
+wrong term or noise in the motion shifts. A column that depends on the torque passing a joint is taken at the
+estimate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.blocks import overlapping
+from armloop.data.motion import Samples
+from armloop.identification.uncertainty.blocking import (
+    block_length,
+    correlation_time,
+    covered_time,
+    independent_blocks,
+)
+from armloop.identification.uncertainty.friction_lines import friction_line
+from armloop.identification.uncertainty.sandwich import Equations
+from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
+from armloop.model import ReconstructedModel
+from armloop.regression.determined import combination, told_apart
+from armloop.util.arrays import Array
+
+#: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
+_PIECE, _MARGIN = 8192, 2.0
+#: Of a problem with more unknowns (nothing was chosen) no errors are computed: the table would say nothing.
+MOST_UNKNOWNS = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Samples that one regression used.
+
+    Attributes:
+        steps: the steps whose terms it found, (1, 2, 3) where they were regressed together.
+        rows: (N, n) the samples fitted, per joint.
+    """
+
+    steps: tuple[int, ...]
+    rows: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """One problem's unknowns with their covariance (p, p) and degrees of freedom (p,)."""
+
+    unknowns: list[Unknown]
+    covariance: Array
+    freedom: Array
+    equations: Equations
+
+    @property
+    def std_error(self) -> Array:
+        """(p,) standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    def undetermined(self) -> list[dict[str, Any]]:
+        """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
+
+        A joint's own friction stays, of two terms that are one function on these samples.
+        """
+        own = self.equations.stage[:, None] == self.equations.stage
+        G = np.where(own, self.equations.jacobian.sum(axis=0), 0.0)
+        order = np.argsort([unknown.kind != "friction" for unknown in self.unknowns], kind="stable")
+        kept, sums = told_apart(G[np.ix_(order, order)])
+        lost = sorted(set(range(len(order))) - set(kept.tolist()))
+        if not lost:
+            return []
+        names = [self.unknowns[k].name for k in order]
+        values = np.array([self.unknowns[k].value for k in order])
+        covariance = self.covariance[np.ix_(order, order)]
+        mixed = [(int(k), row) for k, row in zip(kept, sums, strict=True) if np.count_nonzero(row) > 1]
+        joint = self.unknowns[order[lost[0]]].joint
+        return [
+            {
+                "joint": None if joint is None else joint + 1,
+                "coefficients": [names[k] for k in lost],
+                "sums": [
+                    {
+                        "sum": combination(row, names, k),
+                        "value": float(row @ values),
+                        "std_error": float(np.sqrt(max(row @ covariance @ row, 0.0))),
+                    }
+                    for k, row in mixed
+                ],
+            }
+        ]
+
+
+def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> dict[str, Any]:
+    """What the model file keeps under ``uncertainty``.
+
+    Args:
+        samples: the training samples, conditioned as for the fit.
+        fitted: the regressions in their order.
+
+    Returns:
+        ``joints`` and ``friction``: per joint, for every term's name (and ``v_s``) its ``std_error`` and
+        ``degrees_of_freedom`` of Student's t; ``shared``: the same for terms that serve all joints;
+        ``undetermined``: coefficients that these samples do not tell apart, and the sums of them that they determine;
+        ``stribeck``: per joint f_s, f_c, f_v, v_s of Eq. (34), where the law has that form;
+        ``friction_line``: per joint f_c, f_v of the straight line nearest to any law;
+        ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
+    """
+    parts, seconds, correlation = covariances(model, samples, fitted)
+    n = model.arm.n
+    table: dict[str, Any] = {
+        "joints": [{} for _ in range(n)],
+        "friction": [{} for _ in range(n)],
+        "shared": {},
+    }
+    for part in parts:
+        for unknown, error, freedom in zip(part.unknowns, part.std_error, part.freedom, strict=True):
+            place = table[unknown.kind]
+            where = place if unknown.joint is None else place[unknown.joint]
+            # what the fitted samples do not determine has no error; it must not spoil the model's file
+            if np.isfinite(error) and np.isfinite(freedom):
+                where[unknown.name] = _entry(error, freedom)
+    table["undetermined"] = [entry for part in parts for entry in part.undetermined()]
+    table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
+    rows = np.logical_or.reduce([one.rows for one in fitted])
+    table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
+    return {
+        "method": "jackknife over blocks of samples; the terms are taken as given",
+        "block_seconds": seconds,
+        "correlation_seconds": correlation,
+        **table,
+    }
+
+
+def covariances(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]
+) -> tuple[list[Errors], float, float]:
+    """Covariance of every problem's unknowns, the blocks' length and the residual's correlation time, s."""
+    todo = problems(model)
+    residual, spread = _residuals(todo, samples, fitted)
+    rows = np.logical_or.reduce([part.rows for part in fitted])
+    # an even selection from long logs is coarser than its sample period
+    step = float(np.median(np.diff(samples.motion.time)))
+    correlation = max(
+        correlation_time(residual[:, j], rows[:, j], samples.motion, step) for j in range(model.arm.n)
+    )
+    covered = [
+        covered_time(samples.motion.time, np.any(one.rows, axis=1, keepdims=True)[:, 0]) for one in fitted
+    ]
+    seconds = block_length(correlation, min(covered))
+    blocks = independent_blocks(samples.motion, seconds)
+    found = []
+    for problem in todo:
+        if 0 < len(problem.unknowns) <= MOST_UNKNOWNS:
+            sums = _equations(problem, samples, fitted, blocks, spread)
+            found.append(Errors(problem.unknowns, sums.covariance(), sums.degrees_of_freedom(), sums))
+    return found, seconds, correlation
+
+
+def gauss_newton_steps(
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]
+) -> list[tuple[list[Unknown], Array]]:
+    """Every problem's unknowns with the step (p,) that solves their linearised estimating equations."""
+    todo = problems(model)
+    _, spread = _residuals(todo, samples, fitted)
+    whole = np.zeros(samples.motion.samples, dtype=np.intp)
+    return [
+        (problem.unknowns, _equations(problem, samples, fitted, whole, spread).step())
+        for problem in todo
+        if problem.unknowns
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """Estimating equations of a stepwise model's problems on some samples, and how it fits; they add over samples.
+
+    Attributes:
+        unknowns: of every problem.
+        jacobian, score: per problem, (p, p) and (p,).
+        squares, power: (n,) sums of squared residual and squared torque per joint, every sample by the last
+            regression that used it.
+    """
+
+    unknowns: list[list[Unknown]]
+    jacobian: list[Array]
+    score: list[Array]
+    squares: Array
+    power: Array
+
+    @staticmethod
+    def of(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> Assembled:
+        """Equations of some samples; for models whose joints have coefficients of their own."""
+        todo = [problem for problem in problems(model) if problem.unknowns]
+        whole = np.zeros(samples.motion.samples, dtype=np.intp)
+        spread = np.ones((len(fitted), model.arm.n))
+        squares = np.zeros(model.arm.n)
+        sums = [_equations(problem, samples, fitted, whole, spread, squares) for problem in todo]
+        rows = np.logical_or.reduce([one.rows for one in fitted])
+        return Assembled(
+            [problem.unknowns for problem in todo],
+            [_summed(e.jacobian, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
+            [_summed(e.score, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
+            squares,
+            (samples.tau**2 * rows).sum(axis=0),
+        )
+
+    def __add__(self, other: Assembled) -> Assembled:
+        pairs = [
+            [a + b for a, b in zip(mine, theirs, strict=True)]
+            for mine, theirs in ((self.jacobian, other.jacobian), (self.score, other.score))
+        ]
+        return Assembled(
+            self.unknowns, pairs[0], pairs[1], self.squares + other.squares, self.power + other.power
+        )
+
+    def steps(self) -> list[tuple[list[Unknown], Array]]:
+        """Every problem's unknowns with the step (p,) that solves the linearised equations."""
+        found = []
+        for unknowns, jacobian, score in zip(self.unknowns, self.jacobian, self.score, strict=True):
+            p = len(unknowns)
+            whole = Equations(
+                jacobian[None], score[None], np.ones((1, p)), np.zeros(p, dtype=np.intp), np.ones(p)
+            )
+            found.append((unknowns, whole.step()))
+        return found
+
+    def misfit(self) -> float:
+        """Sum over the joints of mean squared residual relative to mean squared torque."""
+        return float((self.squares / np.maximum(self.power, 1e-300)).sum())
+
+
+def _summed(blocks: Array, p: int) -> Array:
+    # Where no sample was fitted there is no block; its sum has the right shape all the same.
+    return blocks.sum(axis=0) if len(blocks) else np.zeros((p,) * (blocks.ndim - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Portion:
+    """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,)."""
+
+    index: NDArray[np.intp]
+    joint: int
+    stage: int
+    where: NDArray[np.intp]
+    X: Array
+    r: Array
+
+
+def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Iterator[_Portion]:
+    stages = _stages(problem, fitted)
+    theta = np.array([u.value if u.linear else 0.0 for u in problem.unknowns])
+    for part, core, start in overlapping(samples, _PIECE, _MARGIN):
+        for design in problem.designs(part):
+            stage = stages[design.where]
+            for s, one in enumerate(fitted):
+                inside = np.flatnonzero(one.rows[start : start + core.stop - core.start, design.joint])
+                if len(inside) == 0:
+                    continue
+                X = design.X[core][inside]
+                known = np.where(stage <= s, theta[design.where], 0.0)
+                r = part.tau[core][inside, design.joint] - X @ known
+                yield _Portion(start + inside, design.joint, s, design.where, X, r)
+
+
+def _stages(problem: Problem, fitted: Sequence[Fitted]) -> NDArray[np.intp]:
+    order = {step: s for s, one in enumerate(fitted) for step in one.steps}
+    return np.array([order[unknown.step] for unknown in problem.unknowns], dtype=np.intp)
+
+
+def _residuals(todo: Sequence[Problem], samples: Samples, fitted: Sequence[Fitted]) -> tuple[Array, Array]:
+    """(N, n) residual of the last regression that used a sample, and (S, n) mean squares per regression."""
+    residual = np.zeros_like(samples.tau)
+    squares, counts = np.zeros((2, len(fitted), samples.motion.joints))
+    for problem in todo:
+        for portion in _walk(problem, samples, fitted):
+            residual[portion.index, portion.joint] = portion.r
+            squares[portion.stage, portion.joint] += portion.r @ portion.r
+            counts[portion.stage, portion.joint] += len(portion.r)
+    return residual, squares / np.maximum(counts, 1.0)
+
+
+def _equations(
+    problem: Problem,
+    samples: Samples,
+    fitted: Sequence[Fitted],
+    blocks: NDArray[np.intp],
+    spread: Array,
+    squares: Array | None = None,
+) -> Equations:
+    """The estimating equations by blocks; ``squares`` (n,) is given the squared residuals of each joint."""
+    p, B = len(problem.unknowns), int(blocks[-1]) + 1
+    stages = _stages(problem, fitted)
+    jacobian, score, count = np.zeros((B, p, p)), np.zeros((B, p)), np.zeros((B, p))
+    for portion in _walk(problem, samples, fitted):
+        if squares is not None:
+            squares[portion.joint] += portion.r @ portion.r
+        weight = 1 / max(spread[portion.stage, portion.joint], 1e-300) if problem.weighted else 1.0
+        own = stages[portion.where] == portion.stage
+        seen = stages[portion.where] <= portion.stage
+        rows, columns = portion.where[own], portion.where[seen]
+        mine = blocks[portion.index]
+        edges = np.flatnonzero(np.diff(mine, prepend=-1, append=B))
+        for first, last in pairwise(edges):
+            b, X = mine[first], portion.X[first:last]
+            jacobian[b][np.ix_(rows, columns)] += weight * X[:, own].T @ X[:, seen]
+            score[b, rows] += weight * X[:, own].T @ portion.r[first:last]
+            count[b, rows] += last - first
+    used = count.any(axis=1)
+    joint = problem.unknowns[0].joint
+    variance = np.ones(p) if problem.weighted else spread[stages, joint]
+    return Equations(jacobian[used], score[used], count[used], stages, variance)
+
+
+def _entry(error: float, freedom: float) -> dict[str, float]:
+    return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
+
+
+def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
+    """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
+    kinds = {term.kind: term.name(joint + 1) for term in model.friction.terms[joint]}
+    sums = {"static": ("sign",), "coulomb": ("sign", "stribeck"), "viscous": ("viscous",)}
+    if "sign" not in kinds:
+        return {}
+    found = {}
+    for key, value in model.friction.stribeck_parameters(joint).items():
+        if key == "stribeck_velocity":
+            names = {STRIBECK_VELOCITY}
+        else:
+            names = {kinds[kind] for kind in sums.get(key, ()) if kind in kinds}
+        for part in parts:
+            chosen = np.array(
+                [u.kind == "friction" and u.joint == joint and u.name in names for u in part.unknowns], float
+            )
+            if chosen.any():
+                error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
+                freedom = float(part.freedom[chosen > 0].min())
+                if np.isfinite(error) and np.isfinite(freedom):
+                    found[key] = {"value": float(value), **_entry(error, freedom)}
+    return found
+
+
+def _line(
+    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """:func:`friction_line` of a joint, whose friction is all in one problem."""
+    for part in parts:
+        own = np.array([u.kind == "friction" and u.joint == joint for u in part.unknowns], dtype=bool)
+        if own.any():
+            names = [u.name for u, mine in zip(part.unknowns, own, strict=True) if mine]
+            covariance = part.covariance[np.ix_(own, own)]
+            return friction_line(
+                model, joint, names, covariance, float(part.freedom[own].min()), samples, rows
+            )
+    return {}

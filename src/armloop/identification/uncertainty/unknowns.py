@@ -1,0 +1,158 @@
+"""A model's coefficients as the unknowns of regressions, with the columns that multiply them.
+
+Sparse terms belong to one joint each, so there is one problem per joint. Base parameters and terms of the
+energies serve all joints: one problem, in which every joint's samples count by the size of its residual. The
+Stribeck velocity v_s is an unknown too; it enters by its derivative (delta method). Columns pass the filter that
+the torque has passed: friction steps where a joint reverses, and so must its column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
+from armloop.features.double_feature_set import products
+from armloop.features.rigid_body import BaseParameters
+from armloop.laws.friction import FrictionTerm, stribeck_fall
+from armloop.model import ReconstructedModel
+from armloop.model.components import Lagrangian, RigidBody, SparseTerms
+from armloop.util.arrays import Array
+
+#: Name of the unknown v_s beside the friction terms of a joint.
+STRIBECK_VELOCITY = "v_s"
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One coefficient.
+
+    Attributes:
+        kind: ``"joints"`` (a sparse term), ``"friction"`` or ``"shared"``.
+        joint: 0-based; None where all joints share it.
+        name: as the model prints it.
+        value: the estimate.
+        step: which found it.
+        linear: whether value times column is part of the torque; not so for a derivative's column.
+    """
+
+    kind: str
+    joint: int | None
+    name: str
+    value: float
+    step: int
+    linear: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Columns of one joint: X (N, k) belong to the unknowns ``where`` (k,)."""
+
+    joint: int
+    where: NDArray[np.intp]
+    X: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Unknowns that are regressed together.
+
+    Attributes:
+        unknowns: p of them.
+        weighted: whether several joints' samples enter, each weighted by its residual.
+        designs: the columns on some samples, one design per joint that enters.
+    """
+
+    unknowns: list[Unknown]
+    weighted: bool
+    designs: Callable[[Samples], list[Design]]
+
+
+def problems(model: ReconstructedModel) -> list[Problem]:
+    """The regressions whose solution the model is; effects that a diagnosis added are left aside."""
+    if any(isinstance(component, RigidBody | Lagrangian) for component in model.components):
+        return [_shared(model)]
+    return [_sparse(model, joint) for joint in range(model.arm.n)]
+
+
+def _sparse(model: ReconstructedModel, joint: int) -> Problem:
+    found = [c for c in model.components if isinstance(c, SparseTerms) and c.coefficients[:, joint].any()]
+    used = [np.flatnonzero(component.coefficients[:, joint]) for component in found]
+    unknowns = [
+        Unknown("joints", joint, name, value, step)
+        for component in found
+        for step, value, name in component.terms(model.arm, joint)
+    ]
+    law = model.friction.terms[joint]
+    unknowns += _friction_unknowns(law, joint)
+    where = np.arange(len(unknowns), dtype=np.intp)
+
+    def designs(samples: Samples) -> list[Design]:
+        motion = samples.motion
+        load = model.rigid_body(motion) if any(term.by_load for term in law) else None
+        parts = [
+            products(c.factors.evaluate(motion), c.index[rows]) for c, rows in zip(found, used, strict=True)
+        ]
+        X = np.column_stack(
+            [np.zeros((motion.samples, 0)), *parts, *_friction_columns(law, motion, joint, load)]
+        )
+        return [Design(joint, where, smooth(samples, X))]
+
+    return Problem(unknowns, False, designs)
+
+
+def _shared(model: ReconstructedModel) -> Problem:
+    (body,) = (c for c in model.components if isinstance(c, RigidBody | Lagrangian))
+    if isinstance(body, RigidBody):
+        base = BaseParameters.of_arm(model.arm, rotors=len(body.parameters) == 11 * model.arm.n)
+        names, values = list(body.names), body.values
+    else:
+        base, names, values = None, body.energy.names, body.coefficients
+    unknowns = [Unknown("shared", None, name, float(c), 1) for name, c in zip(names, values, strict=True)]
+    r = len(unknowns)
+    wheres = []
+    for joint, law in enumerate(model.friction.terms):
+        own = _friction_unknowns(law, joint)
+        wheres.append(np.concatenate([np.arange(r), len(unknowns) + np.arange(len(own))]).astype(np.intp))
+        unknowns += own
+
+    def designs(samples: Samples) -> list[Design]:
+        motion = samples.motion
+        columns = base.columns(model.arm, motion) if base is not None else body.energy.columns(motion)  # type: ignore[union-attr]
+        load = columns @ values
+        columns = smooth(samples, columns)
+        found = []
+        for joint, law in enumerate(model.friction.terms):
+            friction = [smooth(samples, x) for x in _friction_columns(law, motion, joint, load)]
+            found.append(Design(joint, wheres[joint], np.column_stack([columns[:, joint], *friction])))
+        return found
+
+    return Problem(unknowns, True, designs)
+
+
+def _friction_unknowns(law: Sequence[FrictionTerm], joint: int) -> list[Unknown]:
+    found = []
+    for term in law:
+        found.append(Unknown("friction", joint, term.name(joint + 1), term.coefficient, term.step))
+        if term.kind == "stribeck":
+            found.append(
+                Unknown("friction", joint, STRIBECK_VELOCITY, term.parameter, term.step, linear=False)
+            )
+    return found
+
+
+def _friction_columns(
+    law: Sequence[FrictionTerm], motion: Motion, joint: int, load: Array | None
+) -> list[Array]:
+    columns = []
+    for term in law:
+        columns.append(term.column(motion, joint, load))
+        if term.kind == "stribeck":
+            v, vs = motion.v[:, joint], term.parameter
+            slope = -2 * v**2 / vs**3 * stribeck_fall(v, vs) * np.sign(v)
+            columns.append(term.coefficient * slope)
+    return columns

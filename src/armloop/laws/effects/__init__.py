@@ -1,0 +1,90 @@
+"""Physical effects that a model can lack, one file each, and how to build them by name.
+
+Users add their own by :func:`register` or as entry points (see :mod:`armloop.laws.effects.own`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from armloop.laws.effects.base import Context, Effect, Estimate, Parameter, Value
+from armloop.laws.effects.law import INERTIA, Law, LinearJointEffect, ProfiledJointEffect
+from armloop.laws.effects.listed import EFFECTS
+from armloop.laws.effects.own import REGISTRY, register
+from armloop.laws.friction import Element
+from armloop.robot.arm import Arm
+from armloop.util.errors import ModelError
+
+__all__ = [
+    "EFFECTS",
+    "INERTIA",
+    "REGISTRY",
+    "Context",
+    "Effect",
+    "Element",
+    "Estimate",
+    "Law",
+    "LinearJointEffect",
+    "Parameter",
+    "ProfiledJointEffect",
+    "Value",
+    "effect",
+    "effect_kind",
+    "hypotheses",
+    "register",
+]
+
+
+def effect_kind(name: Any) -> type[Effect]:
+    """The class of an effect, listed or a user's own.
+
+    Raises:
+        ModelError: there is none of that name.
+    """
+    kind = REGISTRY.find(name) if isinstance(name, str) else None
+    if kind is None:
+        own = f"; of your own: {', '.join(REGISTRY.own_names())}" if REGISTRY.own_names() else ""
+        raise ModelError(
+            f"unknown effect {name!r}; install the package that brings it (entry points armloop.effects), or register its "
+            f"class with armloop.laws.effects.register. Listed are: {', '.join(EFFECTS)}{own}"
+        )
+    return kind
+
+
+def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
+    """Build an effect by name for a joint (1-based; None for effects of the whole arm) or a pair of joints.
+
+    Raises:
+        ModelError: there is no such effect, or a joint is missing or superfluous.
+    """
+    kind = effect_kind(name)
+    for field, value, needed in (
+        ("joint", joint, kind.joint_wise),
+        ("other_joint", other_joint, kind.pair_wise),
+    ):
+        if needed != isinstance(value, int):
+            raise ModelError(
+                f"effect {name!r}: {field} must be {'a number' if needed else 'null'}, not {value!r}"
+            )
+    if kind.pair_wise and joint == other_joint:
+        raise ModelError(f"effect {name!r}: joint and other_joint must differ, both are {joint}")
+    return kind(joint, other_joint)
+
+
+def hypotheses(arm: Arm) -> list[Effect]:
+    """Every effect that is searched for, at every joint of an arm and at every pair of joints.
+
+    Raises:
+        InputError: an effect of the user's own cannot be loaded.
+    """
+    listed: list[Effect] = []
+    for kind in [*EFFECTS.values(), *REGISTRY.own().values()]:
+        if not kind.searched:
+            continue
+        if kind.pair_wise:
+            listed += [kind(j + 1, k + 1) for j in range(arm.n) for k in range(j + 1, arm.n)]
+        elif kind.joint_wise:
+            listed += [kind(j + 1) for j in range(arm.n)]
+        else:
+            listed.append(kind())
+    return listed

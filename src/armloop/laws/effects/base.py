@@ -1,0 +1,330 @@
+"""What every physical effect says of itself: where it sits, its law, its parameters and their bounds.
+
+An effect is fitted as coefficients of columns, linear for a fixed shape (the order of a ripple, say), and
+then turned into named physical parameters. The same object predicts its torque for a model that has it.
+Most are a :class:`armloop.laws.effects.law.Law`; what is none (a body, a fault of a sensor, a push) derives from
+:class:`Effect` itself.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.laws.friction import Acting, Direction
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import regressor
+from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.arrays import Array
+
+Value = float | list[float]
+Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What a law calls a number of its, its unit and its bounds.
+
+    Attributes:
+        unit: with TAU, POS and INERTIA to be filled in for a joint.
+        least: smallest value of the whole effect, as a simulated arm may have it; ``above``: it must be larger.
+        positive: whether also what is found in addition to a model must be above zero.
+        size: 3 for a vector.
+        default: value where none is given; None where it must be.
+        shape: whether it is the law's nonlinear parameter: "continuous" is refined between the values tried,
+            "chosen" is one of them.
+    """
+
+    name: str
+    unit: str = "1"
+    least: float = -np.inf
+    above: float = -np.inf
+    positive: bool = False
+    size: int = 1
+    default: Value | None = None
+    shape: str = ""
+
+    def fault(self, value: Any) -> str:
+        """What is wrong with a value given for it, as "must be ..."; empty if nothing is."""
+        try:
+            number = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            return "must be a number"
+        if number.shape != (() if self.size == 1 else (self.size,)) or not np.isfinite(number).all():
+            return "must be one finite number" if self.size == 1 else "must be three finite numbers"
+        if (number <= self.above).any():
+            return f"must be above {self.above:g}"
+        if (number < self.least).any():
+            return f"must not be {'negative' if self.least == 0 else f'below {self.least:g}'}"
+        return ""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A physical parameter: value, standard error and unit; vectors are lists."""
+
+    value: Value
+    std_error: Value
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return {"value": self.value, "std_error": self.std_error, "unit": self.unit}
+
+    def words(self, digits: int = 4) -> str:
+        """A scalar with its standard error and unit."""
+        return f"{number(self.value):.{digits}g} ± {number(self.std_error):.2g} {self.unit}".removesuffix(
+            " 1"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What an effect may look at: the arm, the motion, and what the known model says of it.
+
+    Attributes:
+        inertial: (10 n,) link parameters that reproduce the known model's rigid-body torques on this
+            motion, or None where no effect needed them.
+        period: sample period, s.
+        load: (N, n) torque that passes the joints' bearings and gears, by the known model.
+        predict: the known model's torque (N, n) of any motion, without sensor faults.
+        predicted: (N, n) the same on this motion, with the sensor faults that come before.
+    """
+
+    arm: Arm
+    motion: Motion
+    inertial: Array | None = None
+    period: float = 0.01
+    load: Array | None = None
+    predict: Callable[[Motion], Array] | None = None
+    predicted: Array | None = None
+
+
+class Body(NamedTuple):
+    """Rigid bodies on the links: (10 n,) parameters, a gravity of their own (3,), or none; or their weight alone."""
+
+    parameters: Array
+    gravity: Array | None = None
+    weight_only: bool = False
+
+
+class Placed(NamedTuple):
+    """A law with its numbers: the elements that act along a direction."""
+
+    along: Direction
+    terms: tuple[Acting, ...]
+
+
+class Effect(ABC):
+    """A physical effect on the whole arm, on one joint (1-based), or on a pair.
+
+    Class attributes:
+        name: as in ``diagnosis.json``.
+        scope: "arm", "joint" or "pair"; ``joint_wise`` and ``pair_wise`` follow from it.
+        role: "mechanical"; "sensor", which falsifies what is recorded instead of acting on the arm; or "event" of one
+            run, which no hypothesis of a diagnosis searches for and no controller supplies. ``sensor`` and
+            ``searched`` follow from it.
+        parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
+        needs_inertial: whether its columns are made of the known model's inertial parameters.
+        needs_model: whether its columns depend on anything the known model says, not on the motion alone.
+        load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
+        memory: whether it depends on the path or the time, not only on q, v and vdot.
+        rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
+        fault_order: of sensors: a record is falsified by the lower ones first.
+        alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
+        looks_like: the name of an effect whose likenesses it shares.
+    """
+
+    name: ClassVar[str]
+    scope: ClassVar[str] = "joint"
+    role: ClassVar[str] = "mechanical"
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    joint_wise: ClassVar[bool] = True
+    pair_wise: ClassVar[bool] = False
+    sensor: ClassVar[bool] = False
+    complexity: ClassVar[int] = 1
+    needs_inertial: ClassVar[bool] = False
+    needs_model: ClassVar[bool] = True
+    load: ClassVar[bool] = False
+    searched: ClassVar[bool] = True
+    memory: ClassVar[bool] = False
+    rubs: ClassVar[bool] = False
+    fault_order: ClassVar[int] = 9
+    alike: ClassVar[Mapping[str, str]] = {}
+    looks_like: ClassVar[str] = ""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        stated = vars(cls)
+        if "scope" in stated:
+            cls.joint_wise, cls.pair_wise = cls.scope != "arm", cls.scope == "pair"
+        if "role" in stated:
+            cls.sensor, cls.searched = cls.role == "sensor", cls.role != "event"
+        if "parameters" in stated and "complexity" not in stated:
+            cls.complexity = len(cls.parameters)
+
+    def __init__(self, joint: int | None = None, other_joint: int | None = None) -> None:
+        self.joint = joint
+        self.other_joint = other_joint
+
+    def label(self) -> str:
+        """Readable name, such as ``viscous_friction at joint 2``."""
+        if self.joint is None:
+            return self.name
+        if self.other_joint is not None:
+            return f"{self.name} of joints {self.joint} and {self.other_joint}"
+        return f"{self.name} at joint {self.joint}"
+
+    @property
+    def place(self) -> tuple[str, int | None, int | None]:
+        """Name and joints: what makes two effects the same."""
+        return self.name, self.joint, self.other_joint
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        """Values of the nonlinear parameter to try; one dummy value where there is none."""
+        del context
+        return (0.0,)
+
+    def refined(self, x: Array, shape: float) -> float:
+        """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
+        del x
+        return shape
+
+    @abstractmethod
+    def columns(self, context: Context, shape: float) -> Array:
+        """(N, n, p) torque per unit of each coefficient, or (N, p) on the effect's own joint."""
+
+    def start(self, beta: Array) -> Array:
+        """Free parameters x (k,) nearest to unconstrained coefficients beta (p,)."""
+        return beta
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        """Coefficients (p,) of free parameters x (k,), and their derivative (p, k); the identity by default.
+
+        An effect whose coefficients obey physical laws among themselves (a body's mass, centre and
+        inertia) states them here.
+        """
+        return x, np.eye(len(x))
+
+    def named(self, x: Array, shape: float) -> tuple[float, ...]:
+        """The scalar parameters, in their order, of free parameters x (k,): these themselves by default."""
+        del shape
+        return tuple(x.tolist())
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        """Named parameters from the free parameters (k,) and their covariance (k, k), by the delta method."""
+        step = 1e-6 * np.maximum(np.sqrt(np.abs(np.diag(covariance))), np.maximum(np.abs(x), 1e-12))
+        ends = [[self.named(x + s * h, shape) for s in (1.0, -1.0)] for h in np.diag(step)]
+        slopes = np.array([np.subtract(up, down) for up, down in ends]) / (2 * step[:, None])
+        errors = np.sqrt(np.maximum(np.einsum("kp,kl,lp->p", slopes, covariance, slopes), 0.0))
+        return {
+            p.name: Estimate(float(value), float(error), fill(arm, p.unit, self.joint))
+            for p, value, error in zip(self.parameters, self.named(x, shape), errors, strict=True)
+        }
+
+    @abstractmethod
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        """(N, n) torque that the drive must supply in addition (or that the sensor adds)."""
+
+    def placed(self, parameters: Mapping[str, Value]) -> Placed | None:
+        """The law along its direction, where it has one written for every kind of number."""
+        del parameters
+        return None
+
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
+        """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
+        del arm, parameters, inertial
+        return None
+
+    def body_torque(self, context: Context, parameters: Mapping[str, Value]) -> Array:
+        """(N, n) torque of :meth:`body`."""
+        body, motion = self.body(context.arm, parameters, context.inertial), context.motion
+        assert body is not None
+        v, vdot = ((0 * x if body.weight_only else x) for x in (motion.v, motion.vdot))
+        return np.asarray(regressor(context.arm, motion.q, v, vdot, body.gravity) @ body.parameters)
+
+    def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
+        """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,); none of an event."""
+        rest = np.zeros(arm.n)
+        if not self.searched:
+            return lambda q, v, vdot: rest
+        body = self.body(arm, parameters, inertial)
+        if body is not None:
+            dynamics = inverse_dynamics(arm, body.parameters, body.gravity)
+            return (lambda q, v, vdot: dynamics(q, rest, rest)) if body.weight_only else dynamics
+
+        def torque(q: Array, v: Array, vdot: Array) -> Array:
+            motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.zeros(1, dtype=np.intp))
+            return self.torque(Context(arm, motion, inertial), parameters)[0]
+
+        return torque
+
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        """What is wrong with parameters beside each other, each of which is right; empty if nothing is."""
+        del parameters
+        return ""
+
+    def falsified(
+        self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
+    ) -> tuple[Array, Array] | None:
+        """What a sensor makes of one run's q and tau (N, n), recorded at ``time`` (N,); None where it cannot be told so."""
+        del time, q, tau, parameters
+        return None
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        """Whether the parameters are physically possible."""
+        del arm
+        return all(number(parameters[p.name].value) > 0 for p in self.parameters if p.positive)
+
+    def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
+        """Whether the run can show the nonlinear parameter found; beyond what was tried it stands for another effect."""
+        del parameters, tried
+        return True
+
+    @abstractmethod
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        """What was found, in words."""
+
+    def remedy(self, parameters: dict[str, Estimate]) -> str:
+        """What the arm's owner should do, in words; empty for what acts on the arm itself."""
+        del parameters
+        of = "" if self.joint is None else f" of joint {self.joint}"
+        return (
+            f"Correct the reading{of} before anything uses it. The feedforward stays as it is"
+            if self.sensor
+            else ""
+        )
+
+    def full_columns(self, context: Context, shape: float) -> Array:
+        """(N, n, p) columns on all joints."""
+        return self.on_all_joints(self.columns(context, shape), context.arm.n)
+
+    def on_all_joints(self, columns: Array, joints: int) -> Array:
+        """(N, n, p) of columns on the effect's own joint (N, p); others as they are."""
+        if columns.ndim == 3:
+            return columns
+        assert self.joint is not None
+        full = np.zeros((len(columns), joints, columns.shape[1]))
+        full[:, self.joint - 1] = columns
+        return full
+
+
+def number(value: Value) -> float:
+    """The single number of a scalar parameter."""
+    return float(np.asarray(value, dtype=float).reshape(()))
+
+
+def fill(arm: Arm, text: str, joint: int | None) -> str:
+    """A unit with TAU, POS and INERTIA filled in for a joint (1-based)."""
+    if joint is None:
+        return text
+    kind = arm.joints[joint - 1]
+    inertia = "kg*m^2" if kind.kind == "revolute" else "kg"
+    unit = text.replace("TAU", kind.torque_unit).replace("POS", kind.position_unit)
+    return unit.replace("INERTIA", inertia)

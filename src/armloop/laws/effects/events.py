@@ -1,0 +1,45 @@
+"""When an event took place: an interval of one log, told from other logs with the same clock."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.motion import Motion
+from armloop.laws.effects.base import Estimate, Value, number
+
+#: Two postures, rad or m, that are the same sample of the same log.
+_SAME = 1e-6
+
+
+def during(motion: Motion, parameters: dict[str, Value]) -> NDArray[np.bool_]:
+    """(N,) samples within an event's interval.
+
+    ``posture``, the joints' positions at ``start``, says which log it was: every log's clock passes the same
+    times, and no two motions measured pass the same numbers. Without it every run counts.
+    """
+    start, end = number(parameters["start"]), number(parameters["end"])
+    posture = parameters.get("posture")
+    rows = np.zeros(motion.samples, dtype=bool)
+    for run in motion.runs():
+        time = motion.time[run]
+        if posture is not None:
+            if not time[0] - _SAME <= start <= time[-1] + _SAME:
+                continue
+            at = motion.q[run.start + int(np.argmin(np.abs(time - start)))]
+            if np.abs(at - np.asarray(posture, dtype=float)).max() > _SAME:
+                continue
+        rows[run] = (time >= start) & (time <= end)
+    return rows
+
+
+def interval(
+    start: float, end: float, error: float, posture: NDArray[np.float64], unit: str
+) -> dict[str, Estimate]:
+    """The parameters by which :func:`during` knows an event."""
+    still = [0.0] * len(posture)
+    return {
+        "start": Estimate(start, error, "s"),
+        "end": Estimate(end, error, "s"),
+        "posture": Estimate([float(x) for x in posture], still, unit),
+    }

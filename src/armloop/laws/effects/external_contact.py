@@ -1,0 +1,70 @@
+"""Contact force on the arm during an interval: somebody leans on it, or it touches something."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.events import during
+from armloop.laws.effects.payload import link_parameters
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import tool_jacobian
+
+
+class ExternalContact(Effect):
+    """tau -= J(q)^T F from ``start`` to ``end``, F the mean force in the base frame.
+
+    The force acts on the tool, or, with a parameter ``link``, on the far end of that link (from 1): the joints beyond
+    feel nothing of it. The drives have to hold against it. It is an event of one run, not a property of the arm: no
+    controller supplies it. Its interval is found by :mod:`armloop.diagnosis.contacts`, before everything else.
+    """
+
+    name = "external_contact"
+    scope = "arm"
+    role = "event"
+    parameters = (
+        Parameter("start", "s", least=0.0),
+        Parameter("end", "s"),
+        Parameter("force", "N", size=3),
+    )
+    memory = True
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        rows = during(context.motion, parameters)
+        tau = np.zeros_like(context.motion.q)
+        force = np.asarray(parameters["force"], dtype=float)
+        link = int(number(parameters["link"])) if "link" in parameters else None
+        tau[rows] = -force @ tool_jacobian(context.arm, context.motion.q[rows], link)
+        return tau
+
+    def columns(self, context: Context, shape: float) -> Array:
+        link = int(shape) or None
+        return -np.swapaxes(tool_jacobian(context.arm, context.motion.q, link), 1, 2)
+
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        late = number(parameters["end"]) <= number(parameters["start"])
+        return "end must come after start" if late else ""
+
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+        """-J^T force while it lasts: the weight of a unit mass at the tool whose gravity is the force."""
+        mass = link_parameters(arm, {"mass": 1.0, "com": [0.0, 0.0, 0.0]})
+        force = np.asarray(parameters["force"], dtype=float)
+        return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), mass]), force, weight_only=True)
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return {"force": Estimate(x.tolist(), errors.tolist(), "N")}
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        start, end, force = (parameters[key] for key in ("start", "end", "force"))
+        size = float(np.linalg.norm(np.asarray(force.value)))
+        at = ", ".join(f"{x:.1f}" for x in np.asarray(force.value))
+        where = f"link {number(parameters['link'].value):.0f}" if "link" in parameters else "the tool"
+        return (
+            f"something pushed {where} with {size:.3g} N on average, ({at}) N in the base frame, from "
+            f"{number(start.value):.2f} to {number(end.value):.2f} s"
+        )

@@ -1,0 +1,100 @@
+"""A rigid body fixed to the last link: a load, a tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import regressor
+
+_TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+class Payload(Effect):
+    """A compact body of mass m with centre c on the last link: M(q), bias and gravity of a rigid body.
+
+    Its torques are linear in ten parameters (m, m c, inertia about the link's origin). Of these a compact
+    body has five free ones: m, m c and one inertia about its own centre, equal in all directions; so a
+    motion that hides some of the ten cannot turn them into an impossible body. ``com`` is given in the
+    frame of the link ``tool`` if the URDF has one fixed to the last moving link, else in that link's frame.
+    """
+
+    name = "payload"
+    scope = "arm"
+    parameters = (
+        Parameter("mass", "kg", least=0.0, positive=True),
+        Parameter("com", "m", size=3),
+        Parameter("own_inertia", "kg*m^2", least=0.0, default=0.0),
+    )
+    needs_model = False
+    complexity = 5
+    load = True
+
+    def columns(self, context: Context, shape: float) -> Array:
+        motion = context.motion
+        return regressor(context.arm, motion.q, motion.v, motion.vdot, links=[context.arm.n - 1])
+
+    def start(self, beta: Array) -> Array:
+        mass = max(float(beta[0]), 1e-3)
+        return np.array([mass, *beta[1:4], 1e-4 * mass])
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        mass, moment, own = max(float(x[0]), 1e-3), x[1:4], max(float(x[4]), 0.0)
+        point = (float(moment @ moment) * np.eye(3) - np.outer(moment, moment)) / mass
+        tensor = point + own * np.eye(3)
+        beta = np.concatenate([[mass], moment, [tensor[i] for i in _TENSOR]])
+        J = np.zeros((10, 5))
+        J[:4, :4] = np.eye(4)
+        J[4:, 0] = [-point[i] / mass for i in _TENSOR]
+        for k in range(3):
+            unit = np.eye(3)[k]
+            slope = (2 * moment[k] * np.eye(3) - np.outer(unit, moment) - np.outer(moment, unit)) / mass
+            J[4:, 1 + k] = [slope[i] for i in _TENSOR]
+        J[4:7, 4] = 1.0
+        return beta, J
+
+    def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
+        return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), link_parameters(arm, parameters)]))
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        return self.columns(context, 0.0) @ link_parameters(context.arm, parameters)
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        mass = max(float(x[0]), 1e-3)
+        com = x[1:4] / mass
+        J = np.hstack([-com[:, None] / mass, np.eye(3) / mass])
+        R, p = arm.X_tool[:3, :3], arm.X_tool[:3, 3]
+        com_cov = R.T @ J @ covariance[:4, :4] @ J.T @ R
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return {
+            "mass": Estimate(mass, float(errors[0]), "kg"),
+            "com": Estimate(
+                (R.T @ (com - p)).tolist(), np.sqrt(np.maximum(np.diag(com_cov), 0)).tolist(), "m"
+            ),
+            "own_inertia": Estimate(max(float(x[4]), 0.0), float(errors[4]), "kg*m^2"),
+        }
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        # A body has a mass, and its centre lies where something bolted to the flange can reach.
+        mass, com = number(parameters["mass"].value), np.asarray(parameters["com"].value)
+        chain = float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum())
+        # The last link's own length is not in the chain; a link reaches twice as far as its centre, and a load beyond.
+        reach = max(0.15, 0.5 * chain, 2.5 * float(np.linalg.norm(arm.com[-1])))
+        return mass > 0 and float(np.linalg.norm(com)) < reach
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        mass, com = parameters["mass"], np.asarray(parameters["com"].value)
+        at = ", ".join(f"{x:.3f}" for x in com)
+        return f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m"
+
+
+def link_parameters(arm: Arm, parameters: Mapping[str, Value]) -> Array:
+    """(10,) parameters about the last link's origin, in its frame."""
+    mass, com_tool = number(parameters["mass"]), np.asarray(parameters["com"], dtype=float)
+    com = arm.X_tool[:3, :3] @ com_tool + arm.X_tool[:3, 3]
+    own = number(parameters.get("own_inertia", 0.0))
+    tensor = mass * (float(com @ com) * np.eye(3) - np.outer(com, com)) + own * np.eye(3)
+    return np.concatenate([[mass], mass * com, [tensor[i] for i in _TENSOR]])

@@ -1,0 +1,34 @@
+"""Friction with memory: before a joint slides, it stretches like a spring that yields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.laws.effects.base import Context, Parameter
+from armloop.laws.effects.law import Law
+
+
+class PreslidingHysteresis(Law):
+    """tau_j += f z / w, with z carried along by q_j and clipped at ±w (see :mod:`armloop.laws.hysteresis`).
+
+    A model that has learned the same friction as a step sign(v) has that level already: ``level_change`` is
+    what has to be added to it, so that -f says that the friction as a whole is one with memory.
+    One sample has no past: a controller supplies it as if fully slid.
+    """
+
+    name = "presliding_hysteresis"
+    parameters = (
+        Parameter("level", "TAU", least=0.0, positive=True),
+        Parameter("width", "POS", above=0.0, shape="continuous"),
+        Parameter("level_change", "TAU", default=0.0),
+    )
+    law = "f z/w with dz = dq, |z| <= w"
+    elements = ("hysteresis", "sign")
+    memory = True
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        assert self.joint is not None
+        travel = float(np.ptp(context.motion.q[:, self.joint - 1]))
+        return [] if travel <= 0 else [float(w) for w in np.geomspace(2e-4 * travel, 5e-2 * travel, 16)]

@@ -1,0 +1,30 @@
+"""Dry friction that is larger at low speed: the Stribeck part of Eq. (34) of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armloop.laws.effects.base import Context, Parameter
+from armloop.laws.effects.law import Law
+
+
+class StribeckFriction(Law):
+    """tau_j += d exp(-(v_j/v_s)^2) sign(v_j)."""
+
+    name = "stribeck_friction"
+    parameters = (
+        Parameter("static_excess", "TAU", least=0.0, positive=True),
+        Parameter("velocity", "POS/s", above=0.0, shape="continuous"),
+    )
+    law = "d exp(-(v/vs)^2) sign(v)"
+    elements = ("stribeck_peak",)
+
+    def shapes(self, context: Context) -> Sequence[float]:
+        assert self.joint is not None
+        speed = np.abs(context.motion.v[:, self.joint - 1])
+        slowest, fastest = np.quantile(speed, 0.02), np.quantile(speed, 0.98)
+        # Below the slowest speeds an exponential cannot be seen, beyond half the fastest it is a level with drag.
+        low, high = max(float(slowest), 1e-3 * float(fastest)), 0.5 * float(fastest)
+        return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]

@@ -1,0 +1,321 @@
+"""Elements of friction, the one vocabulary of the program, and their sum as the friction law of an arm.
+
+An element is a function of the state along one direction, per unit of its coefficient: the ladder of a reconstruction
+chooses among them, and the effects of a diagnosis consist of them. It is written once, over
+:class:`armloop.util.functions.Functions`, for floats, arrays of samples, AutoDiffXd and symbolic Expressions alike. Whoever
+evaluates it hands in the direction of sliding: sign(v), a smooth stand-in, or the state of an elasto-plastic element;
+from the values for +1 and -1 follow the level of dry friction, which a plant needs to stick, and what is smooth.
+
+Sect. 4.3 of the paper sorts data by direction and adds Stribeck exponentials; here the direction is a
+column, sign(v), which gives the same forward and backward levels together with the offset. The Stribeck
+column is (1 − exp(−(v/v_s)²)) sign(v), which vanishes at standstill, so that a later step adds it without
+touching the level inherited from the first: with level f_s and coefficient f_c − f_s it is Eq. (34).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.laws.hysteresis import stop_operator
+from armloop.util.arrays import Array
+from armloop.util.errors import ModelError
+from armloop.util.functions import NUMPY, Functions
+
+#: A joint that is no faster than this when a run begins, rad/s or m/s, begins at rest.
+_AT_REST = 0.005
+
+
+class Direction(NamedTuple):
+    """What a law acts along: joint j, or w = v_j + r v_k of two joints that share it; counted from 0."""
+
+    joint: int
+    other: int = -1
+    ratio: float = 0.0
+
+    def of(self, x: Sequence[Any] | Array) -> Any:
+        """The component of a vector of n numbers."""
+        return x[self.joint] + self.ratio * x[self.other] if self.ratio else x[self.joint]
+
+    def add(self, total: list[Any], torque: Any) -> None:
+        """Add a torque that acts along it to those of the n joints: by virtual work, r times on joint k."""
+        total[self.joint] = total[self.joint] + torque
+        if self.ratio:
+            total[self.other] = total[self.other] + self.ratio * torque
+
+
+class Sliding(NamedTuple):
+    """Position and velocity along a direction, the direction of sliding in [-1, 1], and the time since the start, s."""
+
+    q: Any
+    v: Any
+    sign: Any
+    t: Any = np.inf
+
+
+@dataclass(frozen=True)
+class Element:
+    """A function of the state along a direction, per unit of its coefficient.
+
+    Attributes:
+        value: (state, parameter, functions) -> torque.
+        pattern: readable form, with {j} for the joint and {p} for the parameter.
+        step: step of the reconstruction that finds it: 1 with the direction only, 2 with the velocity.
+        part: what of M vdot + bias + gravity + friction it belongs to: "friction"; "position", of q alone; or
+            "inertia", which multiplies the acceleration.
+        way: how the direction of sliding turns: "sharp", as sign(v); "fading", as tanh(v / parameter); "memory", as the
+            state of an elasto-plastic element (:mod:`armloop.laws.hysteresis`) of the width ``parameter``.
+        by_load: whether it grows with the torque that passes the joint, abs(load).
+        called: what a user calls the friction law that it belongs to, if the ladder has it.
+    """
+
+    value: Callable[[Sliding, float, Functions], Any]
+    pattern: str
+    step: int = 3
+    way: str = "sharp"
+    by_load: bool = False
+    part: str = "friction"
+    called: tuple[str, ...] = ()
+
+
+class Acting(NamedTuple):
+    """An element with its coefficient and parameter."""
+
+    coefficient: float
+    element: Element
+    parameter: float = 0.0
+
+
+def torque_along(
+    terms: Iterable[Acting], x: Sliding, load: Any, functions: Functions, sharp: bool = True
+) -> Any:
+    """The sum of elements at a state; ``sharp`` takes directions that fade in as the one handed in."""
+    total: Any = 0.0
+    for coefficient, element, p in terms:
+        fading = not sharp and element.way == "fading"
+        value = coefficient * element.value(
+            x._replace(sign=functions.tanh(x.v / p)) if fading else x, p, functions
+        )
+        total = total + (value * abs(load) if element.by_load else value)
+    return total
+
+
+def stribeck_fall(v: Any, speed: Any, functions: Functions = NUMPY) -> Any:
+    """exp(−(v/v_s)²): what is left at a velocity of the excess of static over Coulomb friction, Eq. (34)."""
+    x = v / speed
+    return functions.exp(-x * x)
+
+
+def _direction(x: Sliding, p: float, f: Functions) -> Any:
+    return x.sign
+
+
+#: Every kind of friction element by the name that model files give it; first those that the ladder tries, in its order.
+KINDS: dict[str, Element] = {
+    "smooth_sign": Element(_direction, "tanh(v{j}/{p:g})", 1, "fading", called=("coulomb", "coulomb_fading")),
+    "viscous": Element(lambda x, p, f: x.v, "v{j}", 2, called=("viscous",)),
+    "offset": Element(lambda x, p, f: 1.0, "1", 1, called=("offset",)),
+    "stribeck_peak": Element(
+        lambda x, p, f: stribeck_fall(x.v, p, f) * x.sign,
+        "exp(-(v{j}/{p:g})^2)*sign(v{j})",
+        2,
+        called=("stribeck",),
+    ),
+    # sqrt(|v|) sign(v), rounded off below 1e-10 so that it has a derivative at rest
+    "root": Element(
+        lambda x, p, f: x.v / f.sqrt(f.sqrt(x.v * x.v + 1e-20)),
+        "sqrt(abs(v{j}))*sign(v{j})",
+        2,
+        called=("nonlinear_viscous",),
+    ),
+    "quadratic": Element(lambda x, p, f: abs(x.v) * x.v, "abs(v{j})*v{j}", 2, called=("nonlinear_viscous",)),
+    "cubic": Element(lambda x, p, f: x.v * x.v * x.v, "v{j}^3", 2, called=("nonlinear_viscous",)),
+    "viscous_forward": Element(
+        lambda x, p, f: 0.5 * (x.v + abs(x.v)), "max(v{j},0)", 2, called=("viscous_by_direction",)
+    ),
+    "viscous_backward": Element(
+        lambda x, p, f: 0.5 * (x.v - abs(x.v)), "min(v{j},0)", 2, called=("viscous_by_direction",)
+    ),
+    "load_smooth_sign": Element(
+        _direction, "abs(load{j})*tanh(v{j}/{p:g})", 1, "fading", True, called=("coulomb_by_load",)
+    ),
+    "hysteresis": Element(_direction, "stop(q{j},{p:g})", 1, "memory", called=("presliding",)),
+    "load_hysteresis": Element(
+        _direction, "abs(load{j})*stop(q{j},{p:g})", 1, "memory", True, called=("presliding_by_load",)
+    ),
+    "sign": Element(_direction, "sign(v{j})", 1),
+    "load_sign": Element(_direction, "abs(load{j})*sign(v{j})", 1, by_load=True),
+    "both_ways": Element(lambda x, p, f: x.sign * x.sign, "abs(sign(v{j}))", 1),
+    "fading_sign": Element(lambda x, p, f: f.exp(-(x.t / p)) * x.sign, "exp(-t/{p:g})*sign(v{j})", 1),
+    "stribeck": Element(
+        lambda x, p, f: (1.0 - stribeck_fall(x.v, p, f)) * x.sign, "(1-exp(-(v{j}/{p:g})^2))*sign(v{j})", 2
+    ),
+}
+#: What a user calls the friction laws of the ladder, and the kinds of elements that each consists of. Of the directions
+#: that fade in, plain Coulomb friction is the sharpest: the others stand in for what happens before the joint slides.
+FRICTION_LAWS: dict[str, tuple[str, ...]] = {
+    name: tuple(kind for kind, element in KINDS.items() if name in element.called)
+    for name in dict.fromkeys(name for element in KINDS.values() for name in element.called)
+}
+
+
+def column(
+    element: Element,
+    motion: Motion,
+    along: Direction,
+    parameter: float,
+    load: Array | None = None,
+    sign: Array | None = None,
+) -> Array:
+    """(N,) values of an element along a direction; ``load`` (N, n) is the torque that passes the joints.
+
+    Args:
+        sign: (N,) direction of sliding where it is known, as of a memory that began before this motion does.
+    """
+    q, v, vdot = (np.asarray(along.of(x.T)) for x in (motion.q, motion.v, motion.vdot))
+    if element.part == "inertia":
+        return vdot
+    sign = sliding_direction(element, motion, along, parameter) if sign is None else sign
+    values = element.value(Sliding(q, v, sign, motion.elapsed()), parameter, NUMPY)
+    if element.by_load:
+        assert load is not None
+        values = values * np.abs(load[:, along.joint])
+    return np.asarray(values + np.zeros_like(v))
+
+
+def sliding_direction(element: Element, motion: Motion, along: Direction, parameter: float) -> Array:
+    """(N,) direction of sliding in [-1, 1] as an element sees it.
+
+    Of its memory a run of a log tells nothing: it begins relaxed where the joint is at rest, else as if the acceleration
+    had been what it is now since the last reversal (v²/2a ago where the joint speeds up, without end where it slows down).
+    """
+    v = np.asarray(along.of(motion.v.T))
+    if element.way == "memory":
+        vdot = np.asarray(along.of(motion.vdot.T))
+        start = _entry(v[motion.starts], vdot[motion.starts], parameter)
+        return stop_operator(np.asarray(along.of(motion.q.T)), parameter, motion.starts, start)
+    return np.asarray(np.tanh(v / parameter) if element.way == "fading" else np.sign(v))
+
+
+def _entry(v: Array, a: Array, width: float) -> Array:
+    """State in [-1, 1] of an elasto-plastic element with which runs begin that start at velocities v, accelerating by a."""
+    speeding = v * a > 0
+    distance = np.where(speeding, v**2 / (2 * np.where(speeding, np.abs(a), 1.0)), np.inf)
+    distance = np.where(np.abs(v) > _AT_REST, distance, 0.0)
+    return np.asarray(np.sign(v) * (distance > 0) * np.clip(distance / width - 1, -1, 1))
+
+
+@dataclass(frozen=True)
+class FrictionTerm:
+    """One term of a joint's friction: a kind, its parameter (v_s in rad/s, width in rad, …) and coefficient."""
+
+    kind: str
+    coefficient: float = 1.0
+    parameter: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ModelError(f"unknown friction term {self.kind!r}; there are: {', '.join(KINDS)}")
+        if "{p" in self.element.pattern and not self.parameter > 0:
+            raise ModelError(f"friction term {self.kind!r} needs a positive parameter, not {self.parameter}")
+
+    @property
+    def element(self) -> Element:
+        """What its coefficient multiplies."""
+        return KINDS[self.kind]
+
+    @property
+    def acting(self) -> Acting:
+        """The element with its numbers; Python's own, as numpy's scalars take three times as long."""
+        return Acting(float(self.coefficient), self.element, float(self.parameter))
+
+    @property
+    def step(self) -> int:
+        """Step of the reconstruction that finds it: 1 with the direction only, 2 with the velocity."""
+        return self.element.step
+
+    def name(self, joint: int) -> str:
+        """Readable form for a joint counted from 1."""
+        return self.element.pattern.format(j=joint, p=self.parameter)
+
+    @property
+    def by_load(self) -> bool:
+        """Whether it is proportional to the torque that passes the joint."""
+        return self.element.by_load
+
+    def column(
+        self, motion: Motion, joint: int, load: Array | None = None, sign: Array | None = None
+    ) -> Array:
+        """(N,) values for joint ``joint`` (0-based), without the coefficient.
+
+        ``load`` (N, n) is the rigid-body torque, which kinds proportional to the load need; ``sign`` (N,) the direction
+        of sliding where it is known already.
+        """
+        if self.by_load and load is None:
+            raise ModelError(f"friction term {self.kind!r} needs the load torque")
+        return column(self.element, motion, Direction(joint), self.parameter, load, sign)
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """Friction of all joints: a tuple of terms per joint."""
+
+    terms: tuple[tuple[FrictionTerm, ...], ...]
+
+    def torque(self, motion: Motion, step: int = 3, load: Array | None = None) -> Array:
+        """(N, n) friction torque of the terms found up to ``step``; ``load`` (N, n) is the rigid-body torque."""
+        tau = np.zeros_like(motion.q)
+        for j, terms in enumerate(self.terms):
+            for term in terms:
+                if term.step <= step:
+                    tau[:, j] += term.coefficient * term.column(motion, j, load)
+        return tau
+
+    def stribeck_parameters(self, joint: int) -> dict[str, float]:
+        """f_s, f_c, f_v, v_s of Eq. (34) for a joint (0-based), where the law has that form."""
+        by_kind = {term.kind: term for term in self.terms[joint]}
+        static = by_kind["sign"].coefficient if "sign" in by_kind else 0.0
+        values = {"static": static, "coulomb": static}
+        if "stribeck" in by_kind:
+            values["coulomb"] += by_kind["stribeck"].coefficient
+            values["stribeck_velocity"] = by_kind["stribeck"].parameter
+        if "viscous" in by_kind:
+            values["viscous"] = by_kind["viscous"].coefficient
+        return values
+
+    def to_dict(self) -> list[list[dict[str, Any]]]:
+        """JSON-ready values, one list of terms per joint."""
+        return [
+            [
+                {
+                    "kind": t.kind,
+                    "name": t.name(j + 1),
+                    "coefficient": t.coefficient,
+                    "parameter": t.parameter,
+                }
+                for t in terms
+            ]
+            for j, terms in enumerate(self.terms)
+        ]
+
+    @staticmethod
+    def from_dict(data: Any) -> FrictionLaw:
+        """Rebuild from :meth:`to_dict`; raises ``ModelError`` for unknown or misshapen terms."""
+        try:
+            return FrictionLaw(
+                tuple(
+                    tuple(
+                        FrictionTerm(t["kind"], float(t["coefficient"]), float(t.get("parameter", 0)))
+                        for t in joint
+                    )
+                    for joint in data
+                )
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            if isinstance(error, ModelError):
+                raise
+            raise ModelError(f"friction: a list of terms per joint is needed: {error!r}") from error

@@ -1,1 +1,0 @@
-"""Candidate functions of the joint torques, one kind a file."""

@@ -1,0 +1,5 @@
+"""A reconstructed model: readable terms that predict joint torques, and its file."""
+
+from armloop.model.model import AddedEffect, ReconstructedModel, load_model, model_of
+
+__all__ = ["AddedEffect", "ReconstructedModel", "load_model", "model_of"]

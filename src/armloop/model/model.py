@@ -1,0 +1,368 @@
+"""A reconstructed model: readable terms that predict joint torques, and its file.
+
+A model is the sum of components, each with the step that found it: sparse terms of the double feature set,
+a rigid body's inertial parameters, a friction law, and effects that a diagnosis added. Sensor effects change
+what a log shows (``predict``), never what a controller supplies (``feedforward``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.data.signals import Conditioning
+from armloop.laws.effects import Context, Effect, Estimate, Value, effect
+from armloop.laws.effects.base import Placed
+from armloop.laws.effects.base import Pointwise as EffectPointwise
+from armloop.laws.friction import Acting, FrictionLaw
+from armloop.model.components import COMPONENTS, Component
+from armloop.model.pointwise import InverseDynamics, pointwise, stacked
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.arrays import Array
+from armloop.util.errors import ArmError, ModelError
+from armloop.util.files import write_json
+from armloop.util.reading import read_json
+
+SCHEMA = "armloop/model/2"
+
+
+@dataclass(frozen=True)
+class AddedEffect:
+    """An effect that is not among the model's components, with its estimated parameters.
+
+    ``when`` is ``"always"`` where a reconstruction found it in the training data, None where a diagnosis added it.
+    """
+
+    effect: Effect
+    parameters: dict[str, Estimate]
+    when: str | None = None
+
+    def torque(self, context: Context) -> Array:
+        """(N, n) torque of the effect."""
+        return self.effect.torque(context, self.values)
+
+    def pointwise(self, arm: Arm, inertial: Array | None) -> EffectPointwise:
+        """The effect's torque for one sample at a time."""
+        return self.effect.pointwise(arm, self.values, inertial)
+
+    def placed(self) -> Placed | None:
+        """The effect's law along its direction, where it has one."""
+        return self.effect.placed(self.values)
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """The parameters without their errors."""
+        return {key: e.value for key, e in self.parameters.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values, as in ``diagnosis.json``."""
+        return {
+            "effect": self.effect.name,
+            "joint": self.effect.joint,
+            **({"other_joint": self.effect.other_joint} if self.effect.pair_wise else {}),
+            "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
+            **({"when": self.when} if self.when else {}),
+        }
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> AddedEffect:
+        """Rebuild from :meth:`to_dict`."""
+        return AddedEffect(
+            effect(data["effect"], data["joint"], data.get("other_joint")),
+            {
+                key: Estimate(e["value"], _error(e["std_error"]), str(e["unit"]))
+                for key, e in data["parameters"].items()
+            },
+            data.get("when"),
+        )
+
+
+def _error(value: Any) -> Any:
+    """A standard error as it is read: null where nobody knows it."""
+    if isinstance(value, list):
+        return [_error(each) for each in value]
+    return math.nan if value is None else value
+
+
+@dataclass(frozen=True, eq=False)
+class ReconstructedModel:
+    """Sum of components with friction and effects, made for one arm.
+
+    Attributes:
+        arm: the arm it was made for.
+        components: rigid-body part, in the order of the steps.
+        friction: friction law of all joints.
+        conditioning: how the training logs were filtered; later logs are treated alike.
+        recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
+        baseline: what the model leaves on data of its own training runs that were not fitted:
+            ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
+            the parts of the torque that are explained, predictable but not explained, and noise.
+        effects: laws of the catalogue that a reconstruction found beside the components, and what a diagnosis added.
+        history: method, library, steps: how the model came about.
+        uncertainty: standard errors of the coefficients (see :func:`armloop.identification.uncertainty.standard_errors`);
+            empty where nobody computed them.
+    """
+
+    arm: Arm
+    components: tuple[Component, ...]
+    friction: FrictionLaw
+    conditioning: Conditioning = field(default_factory=Conditioning)
+    recorded: dict[str, Any] = field(default_factory=lambda: {"unit": "N*m", "drive_gains": None})
+    baseline: dict[str, Any] = field(default_factory=dict)
+    effects: tuple[AddedEffect, ...] = ()
+    history: dict[str, Any] = field(default_factory=dict)
+    uncertainty: dict[str, Any] = field(default_factory=dict)
+
+    def rigid_body(self, motion: Motion, step: int = 3) -> Array:
+        """(N, n) torque of the components without friction and effects."""
+        tau = np.zeros_like(motion.q)
+        for component in self.components:
+            tau += component.torque(self.arm, motion, step)
+        return tau
+
+    def predict(self, motion: Motion, step: int = 3, sensors: bool = True) -> Array:
+        """Joint torques for a motion, (N, n) in N·m (N for a prismatic joint).
+
+        Args:
+            step: 1 gravity and dry friction, 2 with velocity terms, 3 the whole model with its effects.
+            sensors: include what a faulty sensor adds to the record.
+        """
+        self._check(motion)
+        if step < 3 or not self.effects:
+            rigid = self.rigid_body(motion, step)
+            return rigid + self.friction.torque(motion, step, rigid)
+        context = self.context(motion)
+        tau = context.predicted
+        assert tau is not None
+        # One fault after the other, each on what the one before has left: first where the encoder says the arm is.
+        faults = sorted(
+            (a for a in self.effects if sensors and a.effect.sensor), key=lambda a: a.effect.fault_order
+        )
+        for fault in faults:
+            tau = tau + fault.torque(replace(context, predicted=tau))
+        return tau
+
+    def _mechanical(self, motion: Motion) -> tuple[Array, Array]:
+        """Torque of the arm itself, effects included and sensor faults not, and the load on its joints."""
+        load = self.rigid_body(motion)
+        effects = [added for added in self.effects if not added.effect.sensor]
+        context = self._bare_context(motion, [added.effect for added in effects])
+        for added in effects:
+            if added.effect.load:
+                load = load + added.torque(context)
+        context = replace(context, load=load)
+        tau = load + self.friction.torque(motion, 3, load)
+        for added in effects:
+            if not added.effect.load:
+                tau = tau + added.torque(context)
+        return tau, load
+
+    def _bare_context(self, motion: Motion, effects: Sequence[Effect]) -> Context:
+        inertial = self.inertial_parameters() if any(e.needs_inertial for e in effects) else None
+        return Context(self.arm, motion, inertial, motion.period)
+
+    def context(self, motion: Motion, needed: Sequence[Effect] | None = None) -> Context:
+        """What effects may look at; inertial parameters only where an effect needs them."""
+        effects = [added.effect for added in self.effects] if needed is None else needed
+        predicted, load = self._mechanical(motion)
+        return replace(
+            self._bare_context(motion, effects),
+            load=load,
+            predicted=predicted,
+            # effects ask for the motion itself at every step of their search
+            predict=lambda other: predicted if other is motion else self._mechanical(other)[0],
+        )
+
+    def inertial_parameters(self) -> Array:
+        """(10 n,) link parameters that reproduce the model's rigid-body torques.
+
+        Found by least squares on random motion within the ranges the model was fitted on; where the
+        torques do not reveal a parameter, the arm's nominal value stands.
+        """
+        return self._inertial.copy()
+
+    @cached_property
+    def _inertial(self) -> Array:
+        if "inertial" in self.history:
+            return np.asarray(self.history["inertial"], dtype=float)
+        n, rng = self.arm.n, np.random.default_rng(0)
+        size = np.array(self.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+        q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
+        part = Motion(np.arange(400.0), q + size[3], v, vdot, np.array([0]))
+        Y = regressor(self.arm, part.q, v, vdot).reshape(-1, 10 * n)
+        nominal = nominal_parameters(self.arm)
+        rest = self.rigid_body(part).ravel() - Y @ nominal
+        return nominal + np.linalg.lstsq(Y, rest, rcond=1e-4)[0]
+
+    def feedforward(
+        self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
+    ) -> Array:
+        """(n,) torque a controller should supply for one sample; sensor effects excluded.
+
+        Friction with memory acts as if fully slid: a single sample has no history. ``sliding`` (n,) are the
+        velocities to take friction at, by default v.
+        """
+        return self.drive(step)(q, v, vdot, sliding)
+
+    def drive(self, step: int = 3) -> InverseDynamics:
+        """The function behind :meth:`feedforward`, for loops in which a look-up counts."""
+        if step not in self._pointwise:
+            self._pointwise[step] = pointwise(*self._parts(step), step)
+        return self._pointwise[step]
+
+    def stacked_drive(self, step: int = 3) -> Callable[[Array], Sequence[float]]:
+        """The same function of q, v and vdot behind each other in one array (3n,), -> n torques; the fastest there is."""
+        return stacked(*self._parts(step), step)
+
+    def _parts(
+        self, step: int
+    ) -> tuple[Arm, tuple[Component, ...], list[list[Acting]], list[tuple[bool, EffectPointwise]]]:
+        """What acts at one sample: added effects that are friction of one joint stand with its friction."""
+        added = [a for a in self.effects if step >= 3 and not a.effect.sensor and a.effect.searched]
+        inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
+        friction = [[t.acting for t in joint if t.step <= step] for joint in self.friction.terms]
+        effects = []
+        for a in added:
+            law = a.placed()
+            if law is None or law.along.ratio or any(t.element.part != "friction" for t in law.terms):
+                effects.append((a.effect.load, a.pointwise(self.arm, inertial)))
+            else:
+                friction[law.along.joint] += law.terms
+        return self.arm, self.components, friction, effects
+
+    @cached_property
+    def _pointwise(self) -> dict[int, InverseDynamics]:
+        return {}
+
+    def with_effects(self, added: Sequence[AddedEffect]) -> ReconstructedModel:
+        """The model with further effects."""
+        return replace(self, effects=(*self.effects, *added))
+
+    def formulas(self) -> list[str]:
+        """One readable formula per joint, with the step that found each term in brackets."""
+        lines = []
+        for j in range(self.arm.n):
+            terms: list[tuple[int, float, str]] = []
+            for component in self.components:
+                terms += component.terms(self.arm, j)
+            terms += [(t.step, t.coefficient, t.name(j + 1)) for t in self.friction.terms[j]]
+            terms.sort(key=lambda term: term[0])
+            body = " ".join(
+                f"{'-' if c < 0 else '+'} {abs(c):.4g}{'' if name == '1' else '*' + name}"
+                for _, c, name in terms
+            )
+            lines.append(f"tau{j + 1} = {body.removeprefix('+ ') or '0'}")
+        return lines
+
+    def legend(self) -> list[str]:
+        """What symbols in the formulas stand for, one line each; empty where they speak for themselves."""
+        return [line for component in self.components for line in component.legend()]
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file (JSON), whole or not at all."""
+        write_json(path, self.to_dict())
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values with the schema version."""
+        return {
+            "schema": SCHEMA,
+            "formulas": self.formulas(),
+            "arm": self.arm.to_dict(),
+            "components": [component.to_dict() for component in self.components],
+            "friction": self.friction.to_dict(),
+            "effects": [added.to_dict() for added in self.effects],
+            "conditioning": self.conditioning.to_dict(),
+            "recorded": self.recorded,
+            "baseline": self.baseline,
+            "history": self.history,
+            "uncertainty": self.uncertainty,
+        }
+
+    def _check(self, motion: Motion) -> None:
+        if motion.joints != self.arm.n:
+            raise ModelError(
+                f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
+            )
+
+
+def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:
+    """Read a model file; with ``arm``, refuse a model that was made for another one.
+
+    Raises:
+        ModelError: unreadable, not JSON, another schema, or a field missing, misshapen or not finite.
+        ArmError: the model belongs to another arm.
+    """
+    model = model_of(read_json(path, ModelError, "a model written by `armloop reconstruct`"), str(path))
+    if arm is not None:
+        model.arm.require_same(arm, str(path))
+    return model
+
+
+def model_of(data: Any, where: str) -> ReconstructedModel:
+    """The model of a file's content, as of :meth:`ReconstructedModel.to_dict`; ``where`` is named in the errors.
+
+    Raises:
+        ModelError, ArmError: as of :func:`load_model`.
+    """
+    # Here, for a command that only says what it can do should not wait for descriptions of files.
+    from armloop.schemas.model import model_data
+
+    try:
+        return _from_dict(model_data(data))
+    except KeyError as error:
+        raise ModelError(f"{where}: field {error} is missing") from error
+    except (ModelError, ArmError) as error:
+        raise type(error)(f"{where}: {error}") from error
+    except (TypeError, ValueError, AttributeError, OverflowError, IndexError) as error:
+        raise ModelError(f"{where}: a field is misshapen: {error}") from error
+
+
+def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
+    """The model of a file whose fields have been checked one by one; what they mean together is checked here."""
+    arm = Arm.from_dict(data["arm"])
+    model = ReconstructedModel(
+        arm=arm,
+        components=tuple(COMPONENTS[item["kind"]].from_dict(item, arm) for item in data["components"]),
+        friction=FrictionLaw.from_dict(data["friction"]),
+        conditioning=Conditioning(**data["conditioning"]),
+        recorded=dict(data["recorded"]),
+        baseline=dict(data["baseline"]),
+        effects=tuple(AddedEffect.from_dict(item) for item in data["effects"]),
+        history=dict(data["history"]),
+        uncertainty=_known(data["uncertainty"]),
+    )
+    for added in model.effects:
+        try:
+            plausible = added.effect.plausible(arm, added.parameters)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ModelError(f"effect {added.effect.label()}: a parameter is misshapen: {error}") from error
+        if not plausible:
+            values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
+            raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
+    half = np.full((1, arm.n), 0.5)
+    probe = Motion(np.zeros(1), half, half, half, np.array([0]))
+    with np.errstate(all="ignore"):  # the line below says it
+        tau = model.predict(probe)
+    if not np.isfinite(tau).all():
+        raise ModelError("a coefficient is not a finite number, or so large that the torque is none")
+    return model
+
+
+def _known(value: Any) -> Any:
+    """Null, which stands for a standard error that nobody knows, as the number that is none."""
+    if isinstance(value, dict):
+        return {
+            key: math.nan if each is None and key in _ERRORS else _known(each) for key, each in value.items()
+        }
+    return [_known(each) for each in value] if isinstance(value, list) else value
+
+
+_ERRORS = {"std_error", "degrees_of_freedom"}

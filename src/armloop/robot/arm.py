@@ -1,0 +1,325 @@
+"""An arm: joint kinds, names, limits and kinematics, read from a URDF.
+
+URDFs are parsed by Drake, so whatever Drake accepts loads here: fixed joints are merged into the
+link they are welded to, revolute, continuous and prismatic joints move. The result is plain numpy
+and can be kept inside a model file, so that numerics and diagnosis need neither Drake nor the URDF.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.robot.urdf import base_links, read_urdf, serial_chain
+from armloop.util.arrays import Array
+from armloop.util.errors import ArmError
+from armloop.util.resources import urdf_names, urdf_path
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One moving joint.
+
+    ``kind`` is ``"revolute"`` (rad, N·m; URDF's ``continuous`` too) or ``"prismatic"`` (m, N).
+    Limits are infinite where the URDF states none.
+    """
+
+    name: str
+    kind: str
+    lower: float = -np.inf
+    upper: float = np.inf
+    velocity: float = np.inf
+    effort: float = np.inf
+
+    @property
+    def torque_unit(self) -> str:
+        """Unit of the generalized force, ``"N*m"`` or ``"N"``."""
+        return "N*m" if self.kind == "revolute" else "N"
+
+    @property
+    def position_unit(self) -> str:
+        """Unit of the coordinate, ``"rad"`` or ``"m"``."""
+        return "rad" if self.kind == "revolute" else "m"
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A serial arm of n moving joints, numbered base to tip.
+
+    Link i's frame M_i coincides with its joint frame F_i at q_i = 0 and moves along or about
+    ``axis[i]``; ``X_PF[i]`` is the pose of F_i in M_{i-1} (in the base for the first joint).
+
+    Attributes:
+        X_PF: (n, 4, 4) homogeneous poses.
+        axis: (n, 3) unit axes in F_i.
+        mass, com, inertia: (n,), (n, 3) m, (n, 3, 3) kg·m² nominal parameters of the links in M_i,
+            inertia about M_i's origin. They may be dummies in a URDF made for kinematics.
+        X_tool: (4, 4) pose of the link ``tool`` in M_n, the identity without such a link.
+        gravity: (3,) m/s² in the base frame.
+        urdf: the URDF's text, empty for an arm rebuilt from a model file.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    X_PF: Array
+    axis: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    X_tool: Array = field(default_factory=lambda: np.eye(4))
+    gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
+    urdf: str = ""
+
+    @property
+    def n(self) -> int:
+        """Number of moving joints."""
+        return len(self.joints)
+
+    @property
+    def revolute(self) -> NDArray[np.bool_]:
+        """(n,) true where the joint turns, false where it slides."""
+        return np.array([joint.kind == "revolute" for joint in self.joints])
+
+    @property
+    def torque_units(self) -> list[str]:
+        """Unit of each joint's generalized force."""
+        return [joint.torque_unit for joint in self.joints]
+
+    def fingerprint(self) -> str:
+        """Digest of the joint kinds and the kinematics: two arms that agree in it move alike.
+
+        Masses do not enter: a model is made for a geometry, and nominal inertias are often dummies.
+        """
+        parts = {
+            "kinds": [joint.kind for joint in self.joints],
+            "X_PF": _rounded(self.X_PF),
+            "axis": _rounded(self.axis),
+        }
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The arm as JSON-ready values (without the URDF's text)."""
+        joints = []
+        for joint in self.joints:
+            limits = {key: getattr(joint, key) for key in ("lower", "upper", "velocity", "effort")}
+            finite = {key: value for key, value in limits.items() if np.isfinite(value)}
+            joints.append({"name": joint.name, "kind": joint.kind, **finite})
+        arrays = ("X_PF", "axis", "mass", "com", "inertia", "X_tool", "gravity")
+        return {
+            "name": self.name,
+            "fingerprint": self.fingerprint(),
+            "joints": joints,
+            **{key: getattr(self, key).tolist() for key in arrays},
+        }
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Arm:
+        """Rebuild an arm from :meth:`to_dict`; raises ``ArmError`` if a field is missing or misshapen."""
+        try:
+            joints = tuple(Joint(**joint) for joint in data["joints"])
+            for joint in joints:
+                if joint.kind not in ("revolute", "prismatic"):
+                    raise ValueError(
+                        f"joint {joint.name!r} is {joint.kind!r}, it must be revolute or prismatic"
+                    )
+            n = len(joints)
+            shapes = {
+                "X_PF": (n, 4, 4),
+                "axis": (n, 3),
+                "mass": (n,),
+                "com": (n, 3),
+                "inertia": (n, 3, 3),
+                "X_tool": (4, 4),
+                "gravity": (3,),
+            }
+            arrays: dict[str, Any] = {
+                key: np.array(data[key], dtype=float).reshape(shape) for key, shape in shapes.items()
+            }
+            arm = Arm(name=str(data["name"]), joints=joints, **arrays)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ArmError(f"the arm description is incomplete or misshapen: {error}") from error
+        if not all(np.isfinite(value).all() for value in arrays.values()):
+            raise ArmError("the arm description holds a number that is not finite")
+        return arm
+
+    def require_same(self, other: Arm, what: str) -> None:
+        """Raise ``ArmError`` unless ``other`` has this arm's joints and geometry."""
+        if self.n != other.n:
+            raise ArmError(
+                f"{what}: made for {self.name} with {self.n} joints, not for {other.name} with {other.n}"
+            )
+        if self.fingerprint() != other.fingerprint():
+            raise ArmError(
+                f"{what}: made for {self.name} ({self.fingerprint()}), but {other.name} has other "
+                f"kinematics ({other.fingerprint()}); use the URDF the model was made with"
+            )
+
+
+def _rounded(values: Array) -> Any:
+    return (np.round(values, 6) + 0.0).tolist()
+
+
+def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str | None = None) -> Arm:
+    """Load a built-in arm by name, or any serial arm from the path of a URDF.
+
+    Args:
+        lock: positions (rad, m) of moving joints that are to be fixed there, such as those of a gripper.
+        tip: name of the arm's last link, or of one fixed to it; moving joints off the way to it are fixed at zero.
+
+    What is doubtful about the URDF is said as :class:`~armloop.util.errors.InputWarning`.
+
+    Raises:
+        ArmError: the name is unknown, the file cannot be read or parsed or describes what cannot be, or the
+            mechanism is not a single chain of revolute, continuous and prismatic joints.
+    """
+    text_spec = str(spec)
+    path = urdf_path(text_spec) if text_spec in urdf_names() else Path(text_spec)
+    try:
+        found = path.is_file()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ArmError(f"{text_spec[:200]}: cannot be read ({reason}); give the path of a URDF") from error
+    if not found:
+        hint = "" if "/" in text_spec or text_spec.endswith(".urdf") else " and no built-in arm"
+        known = ", ".join(urdf_names())
+        raise ArmError(f"{text_spec[:200]}: no such file{hint}; give the path of a URDF or one of: {known}")
+    root = read_urdf(path)
+    root = serial_chain(root, path, lock or {}, tip)
+    changed = bool(lock) or tip is not None
+    urdf = ElementTree.tostring(root, encoding="unicode") if changed else path.read_text(encoding="utf-8")
+    return _from_urdf(root, urdf, path)
+
+
+def mechanics_only(root: ElementTree.Element) -> str:
+    """The URDF without geometry, sensors and vendor tags: meshes need not exist to load the mechanics."""
+    keep = {"link", "joint"}
+    slim = ElementTree.Element("robot", root.attrib)
+    for element in root:
+        if element.tag not in keep:
+            continue
+        copy = ElementTree.fromstring(ElementTree.tostring(element))
+        for child in list(copy):
+            if child.tag in {"visual", "collision"}:
+                copy.remove(child)
+        slim.append(copy)
+    return ElementTree.tostring(slim, encoding="unicode")
+
+
+def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
+    # Drake is imported here: a command that fails before it needs an arm should not wait for it.
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import JointIndex, PrismaticJoint, RevoluteJoint, WeldJoint
+
+    plant = MultibodyPlant(time_step=0.0)
+    try:
+        parser = Parser(plant)
+        (instance,) = parser.AddModelsFromString(mechanics_only(root), "urdf")
+        base = _base_link(root, path)
+        # A root link called "world" is Drake's world itself: nothing is left to weld.
+        if base != "world":
+            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
+        plant.Finalize()
+    except (RuntimeError, ValueError) as error:
+        raise ArmError(f"{path}: unreadable URDF: {_one_line(str(error))}") from error
+
+    moving = []
+    for index in range(plant.num_joints()):
+        joint = plant.get_joint(JointIndex(index))
+        if isinstance(joint, WeldJoint):
+            continue
+        if not isinstance(joint, RevoluteJoint | PrismaticJoint):
+            raise ArmError(
+                f"{path}: joint {joint.name()!r} is {joint.type_name()}; only revolute, continuous, prismatic "
+                "and fixed joints are supported"
+            )
+        moving.append(joint)
+    if not moving:
+        raise ArmError(f"{path}: the URDF has no moving joint; an arm needs at least one")
+    moving = _ordered_chain(plant, moving, path)
+
+    context = plant.CreateDefaultContext()
+    n = len(moving)
+    joints: list[Joint] = []
+    X_PF = np.zeros((n, 4, 4))
+    axis, mass, com, inertia = np.zeros((n, 3)), np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3))
+    previous = plant.world_frame()
+    for i, joint in enumerate(moving):
+        frame_M = joint.frame_on_child()
+        X_PF[i] = joint.frame_on_parent().CalcPose(context, previous).GetAsMatrix4()
+        revolute = isinstance(joint, RevoluteJoint)
+        axis[i] = joint.revolute_axis() if revolute else joint.translation_axis()
+        bodies = [body.index() for body in plant.GetBodiesWeldedTo(joint.child_body())]
+        M_link = plant.CalcSpatialInertia(context, frame_M, bodies)
+        mass[i] = M_link.get_mass()
+        com[i] = M_link.get_com() if mass[i] > 0 else 0.0
+        inertia[i] = M_link.CalcRotationalInertia().CopyToFullMatrix3() if mass[i] > 0 else 0.0
+        joints.append(
+            Joint(
+                name=joint.name(),
+                kind="revolute" if revolute else "prismatic",
+                lower=float(joint.position_lower_limits()[0]),
+                upper=float(joint.position_upper_limits()[0]),
+                velocity=float(joint.velocity_upper_limits()[0]),
+                effort=_effort_limit(root, joint.name()),
+            )
+        )
+        previous = frame_M
+    X_tool = np.eye(4)
+    tip = [body.index() for body in plant.GetBodiesWeldedTo(moving[-1].child_body())]
+    if plant.HasBodyNamed("tool") and plant.GetBodyByName("tool").index() in tip:
+        X_tool = plant.GetBodyByName("tool").body_frame().CalcPose(context, previous).GetAsMatrix4()
+    name = root.get("name") or path.stem
+    return Arm(name, tuple(joints), X_PF, axis, mass, com, inertia, X_tool, urdf=urdf)
+
+
+def _base_link(root: ElementTree.Element, path: Path) -> str:
+    """Name of the link that is no joint's child."""
+    roots = list(base_links(root))
+    if len(roots) != 1:
+        found = ", ".join(roots) or "none (a loop)"
+        raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(roots)}: {found}")
+    return roots[0]
+
+
+def _ordered_chain(plant: Any, moving: list[Any], path: Path) -> list[Any]:
+    """The moving joints from base to tip; raises ``ArmError`` if the mechanism branches."""
+    ordered: list[Any] = []
+    tip = plant.world_body()
+    while len(ordered) < len(moving):
+        rigid = {body.index() for body in plant.GetBodiesWeldedTo(tip)}
+        following = [joint for joint in moving if joint.parent_body().index() in rigid]
+        if len(following) != 1:
+            names = ", ".join(joint.name() for joint in following) or "none"
+            raise ArmError(
+                f"{path}: not a serial arm: {len(following)} moving joints follow link {tip.name()!r} ({names}); "
+                "lock a gripper's joints (--lock JOINT=VALUE) or name the arm's last link (--tip LINK)"
+            )
+        ordered.append(following[0])
+        tip = following[0].child_body()
+    return ordered
+
+
+def _effort_limit(root: ElementTree.Element, name: str) -> float:
+    """The URDF's effort limit; Drake keeps it only for joints with a transmission."""
+    for joint in root.findall("joint"):
+        limit = joint.find("limit")
+        if joint.get("name") == name and limit is not None and limit.get("effort"):
+            effort = float(limit.get("effort", ""))
+            return effort if effort > 0 else np.inf
+    return np.inf
+
+
+def _one_line(message: str) -> str:
+    return re.sub(r"\s+", " ", message).strip()

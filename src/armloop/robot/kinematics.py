@@ -1,0 +1,197 @@
+"""Rigid-body quantities of an arm, vectorised over samples (numpy only).
+
+Poses, spatial velocities and accelerations of every link are carried outwards along the chain, all
+samples at once; the regressor of the inertial parameters follows from the Newton-Euler equations,
+which are linear in them (Atkeson, An and Hollerbach 1986; Siciliano et al., Robotics, Sect. 7.3).
+Gravity enters as an upward acceleration of the base.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+
+#: Parameters of one link, about its frame's origin and in its frame.
+LINK_PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+#: Samples that are carried along the chain together: their columns stay in a processor's cache.
+_AT_A_TIME = 1024
+
+
+@dataclass(frozen=True)
+class LinkMotion:
+    """Motion of every link, expressed in the link's own frame.
+
+    Attributes:
+        R: (n, 3, 3, N) rotation from link i's frame into the previous link's.
+        p: (n, 3, N) origin of link i in the previous link's frame, m.
+        w, wdot: (n, 3, N) angular velocity and acceleration, rad/s, rad/s².
+        a: (n, 3, N) acceleration of the origin minus gravity, m/s².
+    """
+
+    R: Array
+    p: Array
+    w: Array
+    wdot: Array
+    a: Array
+
+
+def _rotations(axis: Array, angle: Array) -> Array:
+    """Rotation matrices (N, 3, 3) about a unit axis (Rodrigues)."""
+    x, y, z = axis
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.eye(3) + s * K + (1 - c) * (K @ K)
+
+
+def _cross(x: Array, y: Array) -> Array:
+    """x × y along the first axis; the others broadcast (np.cross takes several times as long)."""
+    out = np.empty(np.broadcast_shapes(x.shape, y.shape))
+    out[0] = x[1] * y[2] - x[2] * y[1]
+    out[1] = x[2] * y[0] - x[0] * y[2]
+    out[2] = x[0] * y[1] - x[1] * y[0]
+    return out
+
+
+def _out_of(R: Array, x: Array) -> Array:
+    """Express x (3, ..., N) of the frame whose rotation is R (3, 3, ..., N) in the previous frame: R x."""
+    return np.asarray(R[:, 0] * x[0] + R[:, 1] * x[1] + R[:, 2] * x[2])
+
+
+def _into(R: Array, x: Array) -> Array:
+    """Express x (3, N) of the previous frame in the frame whose rotation is R (3, 3, N): Rᵀ x."""
+    return np.asarray(R[0] * x[0] + R[1] * x[1] + R[2] * x[2])
+
+
+def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None = None) -> LinkMotion:
+    """Outward recursion over the chain for N samples.
+
+    Args:
+        q, v, vdot: (N, n).
+        gravity: (3,) m/s² in the base frame; the arm's own by default.
+    """
+    N, n = q.shape
+    g = arm.gravity if gravity is None else np.asarray(gravity, dtype=float)
+    R, p = np.empty((n, 3, 3, N)), np.empty((n, 3, N))
+    w, wdot, a = np.empty((n, 3, N)), np.empty((n, 3, N)), np.empty((n, 3, N))
+    w_prev, wdot_prev = np.zeros((3, 1)), np.zeros((3, 1))
+    a_prev = -g[:, None]
+    for i, joint in enumerate(arm.joints):
+        R_PF, p_PF, s = arm.X_PF[i, :3, :3], arm.X_PF[i, :3, 3], arm.axis[i]
+        turning = joint.kind == "revolute"
+        if turning:
+            x, y, z = s
+            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            B, C = R_PF @ K, R_PF @ (K @ K)  # Rodrigues
+            R[i] = R_PF[..., None] + B[..., None] * np.sin(q[:, i]) + C[..., None] * (1 - np.cos(q[:, i]))
+            p[i] = p_PF[:, None]
+        else:
+            R[i] = R_PF[..., None]
+            p[i] = p_PF[:, None] + (R_PF @ s)[:, None] * q[:, i]
+        carried = a_prev + _cross(wdot_prev, p[i]) + _cross(w_prev, _cross(w_prev, p[i]))
+        w[i], wdot[i], a[i] = _into(R[i], w_prev), _into(R[i], wdot_prev), _into(R[i], carried)
+        rate, accel = s[:, None] * v[:, i], s[:, None] * vdot[:, i]
+        if turning:
+            wdot[i] += accel + _cross(w[i], rate)
+            w[i] += rate
+        else:
+            a[i] += accel + 2 * _cross(w[i], rate)
+        w_prev, wdot_prev, a_prev = w[i], wdot[i], a[i]
+    return LinkMotion(R, p, w, wdot, a)
+
+
+def _inertia_columns(w: Array) -> Array:
+    """(3, 6, N): w (3, N) -> L with I w = L [Ixx Iyy Izz Ixy Ixz Iyz]."""
+    out = np.zeros((3, 6, w.shape[1]))
+    x, y, z = w
+    out[0, 0], out[0, 3], out[0, 4] = x, y, z
+    out[1, 1], out[1, 3], out[1, 5] = y, x, z
+    out[2, 2], out[2, 4], out[2, 5] = z, x, y
+    return out
+
+
+def _wrench_columns(w: Array, wdot: Array, a: Array) -> tuple[Array, Array]:
+    """Force (3, 4, N) per unit of m, mx, my, mz of a link (it depends on no others), and moment (3, 10, N) about the
+    link's origin per unit of each of its parameters.
+    """
+    N = w.shape[1]
+    force, moment = np.empty((3, 4, N)), np.zeros((3, 10, N))
+    axes = np.eye(3)[:, :, None]
+    force[:, 0] = a
+    force[:, 1:] = _cross(wdot[:, None], axes) + _cross(w[:, None], _cross(w[:, None], axes))
+    moment[:, 1:4] = _cross(axes, a[:, None])
+    moment[:, 4:] = _inertia_columns(wdot) + _cross(w[:, None], _inertia_columns(w))
+    return force, moment
+
+
+def regressor(
+    arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None = None, links: list[int] | None = None
+) -> Array:
+    """Columns of the joint torques per unit of the links' inertial parameters, (N, n, 10·len(links)).
+
+    ``links`` (0-based, all by default) chooses whose parameters appear; the order within a link is
+    :data:`LINK_PARAMETERS`. tau = regressor · parameters without friction.
+    """
+    N, n = q.shape
+    chosen = list(range(n)) if links is None else links
+    Y = np.zeros((N, n, 10 * len(chosen)))
+    for first in range(0, N, _AT_A_TIME):
+        some = slice(first, first + _AT_A_TIME)
+        motion = link_motion(arm, q[some], v[some], vdot[some], gravity)
+        for k, link in enumerate(chosen):
+            _fill(Y[some, :, 10 * k : 10 * k + 10], arm, motion, link)
+    return Y
+
+
+def _fill(Y: Array, arm: Arm, motion: LinkMotion, link: int) -> None:
+    """Write the columns of one link's parameters, (N, n, 10): its wrench, carried inwards along the chain."""
+    force, moment = _wrench_columns(motion.w[link], motion.wdot[link], motion.a[link])
+    for i in range(link, -1, -1):
+        wrench = moment if arm.joints[i].kind == "revolute" else force
+        Y[:, i, : wrench.shape[1]] = np.tensordot(arm.axis[i], wrench, 1).T
+        if i:
+            R = motion.R[i][:, :, None]
+            force, moment = _out_of(R, force), _out_of(R, moment)
+            moment[:, :4] += _cross(motion.p[i][:, None], force)
+
+
+def nominal_parameters(arm: Arm) -> Array:
+    """The arm's nominal link parameters as one vector (10 n), in the order of :func:`regressor`."""
+    rows = []
+    for m, c, inertia in zip(arm.mass, arm.com, arm.inertia, strict=True):
+        tensor = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        rows.append([m, *(m * c), *tensor])
+    return np.concatenate([np.array(row) for row in rows])
+
+
+def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
+    """(N, 3, n) translational Jacobian of the tool's origin in the base frame, at postures q (N, n).
+
+    The tool is the frame X_tool fixed to the last link (that link's own frame where there is none).
+
+    Args:
+        link: of the far end of this link (from 1) instead: where the next joint sits, which with all joints beyond
+            does not move the point.
+    """
+    N, n = q.shape
+    R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
+    axes, origins = np.zeros((n, N, 3)), np.zeros((n, N, 3))
+    for i, joint in enumerate(arm.joints):
+        s = arm.axis[i]
+        p = p + R @ arm.X_PF[i, :3, 3]
+        R = R @ arm.X_PF[i, :3, :3]
+        axes[i], origins[i] = R @ s, p
+        if joint.kind == "revolute":
+            R = R @ _rotations(s, q[:, i])
+        else:
+            p = p + q[:, i : i + 1] * axes[i]
+        if link == i + 1 < n:
+            break
+    tip = p + R @ (arm.X_tool if i + 1 == n else arm.X_PF[i + 1])[:3, 3]
+    turning = np.asarray(arm.revolute)[:, None, None]
+    J = np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
+    J[:, :, i + 1 :] = 0.0
+    return J

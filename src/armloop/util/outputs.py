@@ -1,0 +1,234 @@
+"""Overwrite protection: a command replaces neither what it reads, nor a device, nor a file that it did not write itself.
+
+A file tells who wrote it: JSON, HTML and PNG by a mark near their beginning (:func:`stamp`), every other by a line
+``SHA-256  command  name`` of the file ``.armloop`` beside it. The rules hold while a command runs (:func:`guarding`);
+Python programs write where they say.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from armloop.util.errors import InputError
+
+#: Beside outputs that have no room for a mark: what was written, by which command.
+RECORD = ".armloop"
+#: Bytes at the beginning of a file among which its mark is.
+_HEAD = 4096
+_LONGEST_RECORD = 1 << 22
+
+
+class _Guard:
+    """A command that runs: its name, what it reads by device and inode, and what it has taken for itself."""
+
+    def __init__(self, command: str, force: bool) -> None:
+        self.command, self.force = command, force
+        self.inputs: set[tuple[int, int]] = set()
+        self.locks: list[int] = []
+        self.made: list[Path] = []
+
+
+_guard: _Guard | None = None
+
+
+@contextmanager
+def guarding(command: str, inputs: Iterable[str | Path] = (), force: bool = False) -> Iterator[None]:
+    """Hold outputs to the rules while the block runs; ``force`` leaves out all but the one on devices.
+
+    inputs : files that may be read; those that do not exist are passed over
+    """
+    global _guard
+    before, _guard = _guard, _Guard(command, force)
+    try:
+        for path in inputs:
+            reading(path)
+        yield
+    finally:
+        for lock in _guard.locks:
+            os.close(lock)
+        for folder in reversed(_guard.made):
+            with suppress(OSError):  # what has been written keeps its folder
+                folder.rmdir()
+        _guard = before
+
+
+def reading(path: str | Path) -> None:
+    """Remember a file as an input of the command that runs."""
+    if _guard is not None:
+        found = _status(Path(path))
+        if found is not None:
+            _guard.inputs.add((found.st_dev, found.st_ino))
+
+
+def stamp() -> str | None:
+    """The mark of the command that runs, such as ``armloop reconstruct``; None outside of commands."""
+    return None if _guard is None else f"armloop {_guard.command}"
+
+
+def target(path: str | Path, option: str = "") -> Path:
+    """The file that an output goes to, links followed.
+
+    Raises:
+        InputError: it is a folder or a device, it is read, or this command has not written it.
+    """
+    where, name = str(path), option or "the output"
+    try:
+        real = Path(path).resolve()
+        found = _status(real)
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{where}: cannot be written ({reason}); choose another name for {name}") from error
+    if found is None:
+        return real
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError(f"{where}: is a folder; {name} must name a file")
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError(f"{where}: is a device or a pipe; {name} must name a file")
+    if _guard is not None and not _guard.force:
+        if (found.st_dev, found.st_ino) in _guard.inputs:
+            raise InputError(
+                f"{where}: is read by this command and would be replaced; choose another name, or add --force"
+            )
+        if not _own(real, _guard.command):
+            raise InputError(
+                f"{where}: exists, and `armloop {_guard.command}` has not written it; choose another name, or add "
+                "--force"
+            )
+    return real
+
+
+def record(draft: Path, final: Path) -> None:
+    """Note in :data:`RECORD` that ``draft`` will become ``final``, if the draft has no mark of its own."""
+    if _guard is None or _marked(draft, _guard.command):
+        return
+    line = _line(draft, _guard.command, final.name)
+    known = final.with_name(RECORD)
+    if line not in _lines(known):
+        # One short write at the end of a file is whole, whoever else writes.
+        descriptor = os.open(
+            known, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666
+        )
+        try:
+            os.write(descriptor, f"{line}\n".encode(errors="surrogateescape"))
+        finally:
+            os.close(descriptor)
+
+
+def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--out") -> Path:
+    """The output folder for this command alone, checked before any work is done, with the files that will go into it.
+
+    The folder is made, and taken away again if nothing is written. Nothing but a lock of the system holds it: it
+    ends with the command, however that ends.
+
+    Raises:
+        InputError: it cannot be made or written to, another run writes into it, or a file in it is not to be replaced.
+    """
+    folder = Path(path)
+    try:
+        existing = folder
+        while _status(existing) is None:
+            existing = existing.parent
+        if not existing.is_dir():
+            raise InputError(f"{existing}: is a file; {option} must name a folder")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise InputError(f"{existing}: cannot be written to; choose another folder for {option}")
+        for name in names:
+            target(folder / name)
+        if _guard is not None:
+            _lock(folder, option, _guard)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{option} {path}: no such folder can be made ({reason})") from error
+    return folder
+
+
+def take_file(path: str | Path | None, option: str) -> None:
+    """Check the place of an output file before any work is done; None is no output.
+
+    Raises:
+        InputError: as :func:`target`, or its folder cannot be written to.
+    """
+    if path is None:
+        return
+    real = target(path, option)
+    existing = real.parent
+    try:
+        while _status(existing) is None:
+            existing = existing.parent
+        if not existing.is_dir():
+            raise InputError(f"{existing}: is a file; {option} must lie in a folder")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise InputError(f"{existing}: cannot be written to; choose another folder for {option}")
+        longest = os.pathconf(existing, "PC_NAME_MAX")
+    except OSError as error:
+        raise InputError(f"{option} {path}: cannot be written ({error.strerror or error})") from error
+    if len(os.fsencode(real.name)) > longest:
+        raise InputError(
+            f"{real.name[:40]}…: longer than {longest} bytes; shorten the name that {option} gives"
+        )
+
+
+def _lock(folder: Path, option: str, guard: _Guard) -> None:
+    missing = []
+    each = folder
+    while not each.exists():
+        missing.append(each)
+        each = each.parent
+    for each in reversed(missing):
+        each.mkdir(exist_ok=True)
+        guard.made.append(each)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise InputError(
+            f"{option} {folder}: another run writes into this folder; wait for its end, or choose another"
+        ) from error
+    except OSError:  # a file system without locks: outputs are whole all the same, if of two runs
+        os.close(descriptor)
+        return
+    guard.locks.append(descriptor)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _own(path: Path, command: str) -> bool:
+    """Whether a file was written by a command of this name, and not changed since where no mark can tell."""
+    return _marked(path, command) or _line(path, command, path.name) in _lines(path.with_name(RECORD))
+
+
+def _marked(path: Path, command: str) -> bool:
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    name = f"armloop {command}".encode()
+    if head.startswith(b"\x89PNG"):
+        return b"Software\x00" + name in head
+    return head.lstrip()[:1] in (b"{", b"<") and any(
+        before + name + b'"' in head for before in (b'"written_by": "', b'name="generator" content="')
+    )
+
+
+def _line(path: Path, command: str, name: str) -> str:
+    import hashlib
+
+    with path.open("rb") as file:
+        return f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {command}  {name}"
+
+
+def _lines(path: Path) -> set[str]:
+    try:
+        with path.open("rb") as file:
+            return set(file.read(_LONGEST_RECORD).decode(errors="surrogateescape").splitlines())
+    except OSError:
+        return set()

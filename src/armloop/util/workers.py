@@ -1,0 +1,251 @@
+"""Parallel map over chunks: one after the other, in processes of this machine, or on a Dask cluster.
+
+Answers come back in the order of the chunks whoever computed them, so that sums of them are the same to the bit
+for any number of workers.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import os
+import re
+import signal
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager, suppress
+from functools import wraps
+from multiprocessing import get_context
+from threading import Thread
+from typing import Any, ParamSpec, Protocol, TypeVar
+
+from armloop.util.errors import InputError
+from armloop.util.quiet import quiet
+
+Chunk = TypeVar("Chunk")
+Answer = TypeVar("Answer")
+Arguments = ParamSpec("Arguments")
+
+#: Seconds that a scheduler has to answer.
+PATIENCE = 10.0
+#: Seconds that a connection to it may take.
+_CONNECTED = 3.0
+#: Chunks handed to each worker of a cluster ahead of what has been taken back, so that answers do not pile up.
+_AHEAD = 4
+
+
+class Workers(Protocol):
+    """Who applies a function to chunks."""
+
+    def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
+        """Yield the answers in the order of the chunks; exceptions of the function come through."""
+        ...
+
+    def close(self) -> None:
+        """Let go of what was opened."""
+        ...
+
+
+class Serial:
+    """In this process."""
+
+    def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
+        # With one BLAS thread, as in every other worker: how many there are decides the order of a product's sums.
+        return (_apply(function, chunk) for chunk in chunks)
+
+    def close(self) -> None:
+        pass
+
+
+class Pool(ProcessPoolExecutor):
+    """Forked processes with one BLAS thread each that end with the process that made them, however it ends.
+
+    An exception in the ``with`` block, Ctrl-C among them, does not wait for what the processes are at.
+
+    Args:
+        jobs: how many.
+        prepare, arguments: called in each process when it begins; inherited, so they need not be picklable.
+    """
+
+    def __init__(
+        self, jobs: int, prepare: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
+    ) -> None:
+        super().__init__(
+            jobs, get_context("fork"), initializer=_begin, initargs=(os.getpid(), prepare, arguments)
+        )
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        # The first task forks the processes: until they ignore Ctrl-C themselves, it has to wait.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        try:
+            return super().submit(function, *arguments, **named)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:
+        if kind is not None:
+            for process in list((self._processes or {}).values()):
+                process.kill()
+        self.shutdown(wait=True, cancel_futures=kind is not None)
+
+
+def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    # Ctrl-C reaches every process of a terminal; the parent answers it, and ends these.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    _die_with(parent)
+    _one_thread()
+    if prepare is not None:
+        prepare(*arguments)
+
+
+def _die_with(parent: int) -> None:
+    """Be killed when the parent ends, even by SIGKILL (Linux: prctl PR_SET_PDEATHSIG)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+    if os.getppid() != parent:  # it has ended before it could be said
+        os._exit(1)
+
+
+class Processes:
+    """In forked processes, one BLAS thread each; they inherit function and chunks, only answers are copied.
+
+    Args:
+        jobs: how many; all cores by default.
+    """
+
+    def __init__(self, jobs: int | None = None) -> None:
+        self.jobs = jobs or len(os.sched_getaffinity(0))
+
+    def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
+        jobs = min(self.jobs, len(chunks))
+        if jobs <= 1:
+            yield from Serial().map(function, chunks)
+            return
+        with _inherited(function, chunks) as key:
+            with Pool(jobs) as pool:
+                yield from pool.map(_call, [key] * len(chunks), range(len(chunks)))
+
+    def close(self) -> None:
+        pass
+
+
+class Cluster:
+    """On the workers of a Dask scheduler, which must have this package and see the same files.
+
+    Args:
+        address: of the scheduler, such as ``tcp://10.0.0.7:8786``.
+
+    Raises:
+        InputError: Dask is not installed, or nothing answers at the address.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise InputError(
+                "--scheduler needs Dask, which is not installed; install the extra: armloop[dask]"
+            ) from error
+        _somebody_listens(address)
+        # Dask waits without end for one that accepts a connection and says nothing.
+        connecting: Future[Any] = Future()
+        thread = Thread(target=_connect, args=(Client, address, connecting), daemon=True)
+        thread.start()
+        try:
+            self.client = connecting.result(PATIENCE + 1)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise InputError(_nobody(address)) from error
+        if not self.client.scheduler_info()["workers"]:
+            self.client.close()
+            raise InputError(
+                f"--scheduler {address}: the scheduler has no workers; start `dask worker {address}`"
+            )
+
+    def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
+        most = _AHEAD * max(1, len(self.client.scheduler_info()["workers"]))
+        shared = self.client.scatter([function], broadcast=True, hash=False)[0]
+        futures: list[Any] = []
+        following = iter(chunks)
+        for chunk in following:
+            futures.append(self.client.submit(_apply, shared, chunk, pure=False))
+            if len(futures) == most:
+                yield futures.pop(0).result()
+        for future in futures:
+            yield future.result()
+
+    def close(self) -> None:
+        self.client.close()
+
+
+_ADDRESS = re.compile(r"(?:(?:tcp|tls)://)?(\[[0-9a-fA-F:.]+\]|[^/:\s]+):(\d{1,5})")
+
+
+def _nobody(address: str) -> str:
+    return f"--scheduler {address}: no Dask scheduler answers there; give an address like tcp://10.0.0.7:8786"
+
+
+def _somebody_listens(address: str) -> None:
+    """Refuse what is no address, and one at which nothing listens, at once: Dask would try for twice its patience."""
+    found = _ADDRESS.fullmatch(address)
+    if found is None or not 0 < int(found[2]) < 1 << 16:
+        raise InputError(_nobody(address))
+    try:
+        socket.create_connection((found[1].strip("[]"), int(found[2])), _CONNECTED).close()
+    except (OSError, UnicodeError) as error:
+        raise InputError(_nobody(address)) from error
+
+
+def _connect(client: Any, address: str, answer: Future[Any]) -> None:
+    try:
+        with quiet("distributed", logging.CRITICAL):
+            answer.set_result(client(address, timeout=PATIENCE, set_as_default=False))
+    except BaseException as error:
+        answer.set_exception(error)
+
+
+def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:
+    with _threads():
+        return function(chunk)
+
+
+#: What forked processes inherit: functions and chunks that need not be picklable, nor copied.
+_INHERITED: dict[int, tuple[Callable[[Any], Any], Sequence[Any]]] = {}
+
+
+@contextmanager
+def _inherited(function: Callable[[Any], Any], chunks: Sequence[Any]) -> Iterator[int]:
+    key = max(_INHERITED, default=0) + 1
+    _INHERITED[key] = (function, chunks)
+    try:
+        yield key
+    finally:
+        del _INHERITED[key]
+
+
+def _call(key: int, index: int) -> Any:
+    function, chunks = _INHERITED[key]
+    return function(chunks[index])
+
+
+def one_thread(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+    """The function with one BLAS thread: several wait for each other longer than they compute where matrices are small."""
+
+    @wraps(function)
+    def alone(*arguments: Arguments.args, **named: Arguments.kwargs) -> Answer:
+        with _threads():
+            return function(*arguments, **named)
+
+    return alone
+
+
+def _threads() -> Any:
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
+
+
+def _one_thread() -> None:
+    _threads()

@@ -1,0 +1,229 @@
+"""The main job: measure → reconstruct → control → measure again → residual → effect → augmented model → control."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.data.log import MotionLog, read_log, write_log
+from armloop.data.regimes import Clusters, sort_samples
+from armloop.data.signals import preprocess
+from armloop.diagnosis import Diagnosis, diagnose
+from armloop.drake.experiments.collection import collect, measure_run
+from armloop.drake.experiments.scenarios import TrackingScenario, load_plan, load_tracking
+from armloop.drake.experiments.tracking import TrackingResult, track
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.view.replay import write_replay
+from armloop.experiment.sampling import CONDITIONS
+from armloop.identification.reconstruction import Reconstruction, reconstruct
+from armloop.laws.effects import EFFECTS
+from armloop.model import ReconstructedModel, load_model
+from armloop.robot.arm import Arm
+from armloop.util.files import write_figure, write_json, write_text
+from armloop.util.progress import Progress
+from armloop.util.workers import Pool
+from armloop.workflows.tracking import tracking_answer
+from armloop.workflows.undeclared import draw
+
+SCHEMA = "armloop/loop/1"
+SCENARIO = "three_axis_tracking"
+#: What the loop writes, beside its logs.
+LOOP_FILES = (
+    *(f"logs/{name}.csv" for name in (*CONDITIONS, "second_run")),
+    "model.json",
+    "augmented.json",
+    "diagnosis.json",
+    "loop.json",
+    "loop.png",
+    "replay.html",
+    "report.html",
+)
+
+
+@dataclass(eq=False)
+class LoopResult:
+    """Everything the loop found, for the report.
+
+    Attributes:
+        logs: what was collected, per condition.
+        reconstruction, reference: the stepwise model, and one-shot SINDy on the same logs.
+        tracking: PID, PID + Step I, PID + Step III on the arm as it was collected.
+        diagnosis: of the second measured run.
+        undeclared: the effect that was put into the plant, as revealed after the verdict.
+        right: the verdict names exactly that effect at its joint, and no event beside it.
+        tracking_before, tracking_after: PID + Step III on the arm with the effect, with the model as
+            collected and with the augmented one.
+        seconds: wall time per stage.
+    """
+
+    seed: int
+    arm: Arm
+    logs: dict[str, MotionLog]
+    clusters: Clusters
+    reconstruction: Reconstruction
+    reference: Reconstruction | None
+    tracking: dict[str, TrackingResult]
+    diagnosis: Diagnosis
+    undeclared: dict[str, Any]
+    right: bool
+    tracking_before: TrackingResult
+    tracking_after: TrackingResult
+    seconds: dict[str, float]
+    notes: list[str] = field(default_factory=list)
+
+
+def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
+    """Run the loop on the three-axis arm, print its tables and write its files into ``folder``.
+
+    What the diagnosis is given of the second run are two files: the model and the log.
+    """
+    from armloop.reports.diagnosis_tables import diagnosis_table
+    from armloop.reports.loop_report import loop_figure, loop_report
+    from armloop.reports.tables import eta_table, score_table, steps_table
+
+    scenario = load_tracking(SCENARIO)
+    plant = scenario.plant
+    seconds: dict[str, float] = {}
+    with _Clock(seconds, "collect", progress, "1/6 measure: collecting three logs on the simulated arm"):
+        logs = collect(plant.arm, plant.config, load_plan("paper"), seed, processes=2)
+        for name, log in logs.items():
+            write_log(folder / "logs" / f"{name}.csv", log)
+    with Pool(2) as workers:  # two cores, no more
+        with _Clock(
+            seconds, "reconstruct", progress, "2/6 reconstruct: three steps, each inheriting the last"
+        ):
+            sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
+            one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
+            reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise")
+            model = reconstruction.model
+            model.save(folder / "model.json")
+            samples = preprocess(list(logs.values()), model.conditioning)
+            clusters = sort_samples(samples.motion)
+        print(steps_table(reconstruction.reports), end="\n\n")
+        print(score_table(reconstruction.held_out, plant.arm), end="\n\n", flush=True)
+        with _Clock(seconds, "track", progress, "3/6 control: tracking with three controllers"):
+            undeclared = sealed.result()
+            runs = [workers.submit(track, scenario, name, {"model": model}) for name in scenario.controllers]
+            before_run = workers.submit(track, scenario, "pid_step3", {"model": model}, [undeclared])
+            tracking = {name: run.result() for name, run in zip(scenario.controllers, runs, strict=True)}
+            reference = one_shot.result()
+        print(eta_table(tracking, paper=True), end="\n\n", flush=True)
+        with _Clock(
+            seconds, "diagnose", progress, "4/6 measured again: tracing the residual of the second run"
+        ):
+            diagnosis = _diagnose(folder, progress)
+        print(diagnosis_table(diagnosis), end="\n\n", flush=True)
+        with _Clock(
+            seconds, "track_again", progress, "5/6 control better: tracking with the augmented model"
+        ):
+            after_run = workers.submit(
+                track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared]
+            )
+            write_replay(folder / "replay.html", plant.arm, tracking)
+            before, after = before_run.result(), after_run.result()
+    right = _is_right(diagnosis, undeclared)
+    result = LoopResult(
+        seed=seed,
+        arm=plant.arm,
+        logs=logs,
+        clusters=clusters,
+        reconstruction=reconstruction,
+        reference=reference,
+        tracking=tracking,
+        diagnosis=diagnosis,
+        undeclared=_revealed(undeclared),
+        right=right,
+        tracking_before=before,
+        tracking_after=after,
+        seconds=seconds,
+        notes=reconstruction.notes,
+    )
+    again = {"before (model as collected)": before, "after (augmented model)": after}
+    print(eta_table(again, paper=False))
+    print(
+        f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}",
+        flush=True,
+    )
+    with _Clock(seconds, "report", progress, "6/6 writing the report"):
+        write_json(folder / "loop.json", loop_answer(result, scenario))
+        write_text(folder / "report.html", loop_report(result))
+        write_figure(folder / "loop.png", loop_figure(result))
+    print(f"open {folder}/report.html  ({sum(seconds.values()):.0f} s)")
+    return result
+
+
+def loop_answer(result: LoopResult, scenario: TrackingScenario) -> dict[str, Any]:
+    """The content of ``loop.json``."""
+    return {
+        "schema": SCHEMA,
+        "seed": result.seed,
+        "reconstruct": result.reconstruction.to_dict(),
+        "sindy": None if result.reference is None else result.reference.to_dict(),
+        "tracking": tracking_answer(scenario, result.tracking),
+        "diagnosis": result.diagnosis.to_dict(),
+        "undeclared": result.undeclared,
+        "right": result.right,
+        "tracking_with_effect": {
+            "before": {"eta_deg": result.tracking_before.eta.tolist()},
+            "after": {"eta_deg": result.tracking_after.eta.tolist()},
+        },
+        "seconds": result.seconds,
+    }
+
+
+def _measure_with_effect(scenario: TrackingScenario, seed: int, path: Path) -> UndeclaredEffect:
+    """Draw the effect, measure a run of the arm that has it, and write the log; the effect stays sealed."""
+    effect = draw(scenario.plant.arm, seed)
+    write_log(path, measure_run(scenario.plant.arm, scenario.plant.config, seed + 500, effects=[effect]))
+    return effect
+
+
+def _reconstruct(logs: list[MotionLog], arm: Arm, method: str) -> Reconstruction:
+    # The paper's own library: its three steps, and what each of them is worth to a controller, are what is shown.
+    return reconstruct(logs, arm, method, "double-feature-set")
+
+
+def _diagnose(folder: Path, progress: Progress) -> Diagnosis:
+    """Diagnose from the two files a user would have, the model and the log."""
+    model: ReconstructedModel = load_model(folder / "model.json")
+    log = read_log(folder / "logs" / "second_run.csv", joints=model.arm.n)
+    diagnosis = diagnose(model, [log], progress)
+    write_json(folder / "diagnosis.json", diagnosis.to_dict())
+    diagnosis.model.save(folder / "augmented.json")
+    return diagnosis
+
+
+def _is_right(diagnosis: Diagnosis, undeclared: UndeclaredEffect) -> bool:
+    return diagnosis.named == [(undeclared.name, undeclared.joint)] and diagnosis.unlisted is None
+
+
+def _revealed(undeclared: UndeclaredEffect) -> dict[str, Any]:
+    parameters = {key: np.asarray(value).tolist() for key, value in undeclared.parameters.items()}
+    return {"effect": undeclared.name, "joint": undeclared.joint, "parameters": parameters}
+
+
+def _in_words(undeclared: UndeclaredEffect) -> str:
+    joint = undeclared.joint if EFFECTS[undeclared.name].joint_wise else None
+    numbers = ", ".join(f"{key} {np.round(value, 4)}" for key, value in undeclared.parameters.items())
+    return EFFECTS[undeclared.name](joint).label() + f" ({numbers})"
+
+
+class _Clock:
+    """Announce a stage and keep its wall time."""
+
+    def __init__(
+        self, seconds: dict[str, float], stage: str, progress: Callable[[str], None], words: str
+    ) -> None:
+        self._seconds, self._stage, self._start = seconds, stage, 0.0
+        progress(words)
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self._seconds[self._stage] = time.perf_counter() - self._start

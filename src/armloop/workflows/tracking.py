@@ -1,0 +1,123 @@
+"""A tracking scenario from start to end: models, runs, and the files a user looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armloop.drake.experiments.collection import collect
+from armloop.drake.experiments.metrics import BAND
+from armloop.drake.experiments.scenarios import TrackingScenario, load_plan
+from armloop.drake.experiments.tracking import (
+    MAIN_MODEL,
+    TrackingResult,
+    needs_model,
+    run_tracking,
+    track_in_view,
+)
+from armloop.drake.tuning.loop_analysis import loop_margins
+from armloop.drake.view.live import LiveView
+from armloop.identification.reconstruction import reconstruct
+from armloop.model import ReconstructedModel
+from armloop.util.files import write_figure, write_json
+from armloop.util.progress import Progress
+
+SCHEMA = "armloop/tracking/1"
+
+
+def run_scenario(
+    scenario: TrackingScenario,
+    models: Mapping[str, ReconstructedModel],
+    folder: Path | None,
+    progress: Progress,
+    view: LiveView | None = None,
+) -> tuple[dict[str, Any], dict[str, TrackingResult]]:
+    """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
+
+    Without any model one is reconstructed first, from data collected on the scenario's own arm, if a controller of
+    the scenario needs one.
+    ``models`` are named as in :func:`tracking.run_tracking`; a ``view`` shows all controllers at once.
+
+    Returns:
+        The content of ``tracking.json`` and the results by controller.
+    """
+    chosen = models_for(scenario, models, progress)
+    progress(f"tracking {scenario.reference.duration:g} s with each controller")
+    results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
+    answer = tracking_answer(scenario, results)
+    if folder is not None:
+        from armloop.drake.view.replay import write_replay
+        from armloop.reports.plots import tracking_figure
+
+        progress("drawing and recording the replay")
+        write_json(folder / "tracking.json", answer)
+        write_figure(folder / "tracking.png", tracking_figure(results))
+        write_replay(folder / "replay.html", scenario.plant.arm, results)
+        save_made(folder, chosen, models)
+    return answer, results
+
+
+def models_for(
+    scenario: TrackingScenario, models: Mapping[str, ReconstructedModel], progress: Progress
+) -> dict[str, ReconstructedModel]:
+    """The models that were given; without any, one reconstructed from data collected on the scenario's own arm, if a
+    controller of the scenario needs one."""
+    if models or not any(map(needs_model, scenario.controllers)):
+        return dict(models)
+    progress("no --model given: collecting data on the scenario's arm and reconstructing one")
+    plant = scenario.plant
+    logs = collect(plant.arm, plant.config, load_plan("paper"), scenario.seed, processes=2)
+    return {MAIN_MODEL: reconstruct(list(logs.values()), plant.arm, progress=progress).model}
+
+
+def save_made(
+    folder: Path, chosen: Mapping[str, ReconstructedModel], given: Mapping[str, ReconstructedModel]
+) -> None:
+    """Write model.json where `models_for` reconstructed one."""
+    if chosen and not given:
+        chosen[MAIN_MODEL].save(folder / "model.json")
+
+
+def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
+    """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
+    first = next(iter(results.values()))
+    plant = scenario.plant
+    q0 = scenario.reference.evaluate([0.0])[0][0]
+    margins = loop_margins(
+        plant.arm, plant.config.friction, scenario.gains, q0, period=plant.config.time_step
+    )
+    return {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "arm": plant.arm.name,
+        "scored_s": list(scenario.score),
+        "unit": list(first.unit),
+        "settling_band": BAND,
+        "controllers": {name: result_answer(result) for name, result in results.items()},
+        "loop": [
+            {
+                "phase_margin_deg": m.phase_margin,
+                "bandwidth_rad_s": m.bandwidth,
+                "sensitivity_peak": m.sensitivity_peak,
+            }
+            for m in margins
+        ],
+    }
+
+
+def result_answer(result: TrackingResult) -> dict[str, Any]:
+    """η, RMS and largest error in the scenario's ``unit``, effort in N*m (N), times in s; null where there is none."""
+    answer = {"eta_deg": result.eta.tolist(), "rms": result.rms.tolist(), "max": result.largest.tolist()}
+    if result.metrics is not None:
+        m = result.metrics
+        answer |= {
+            "effort": m.effort.tolist(),
+            "clipped": m.clipped.tolist(),
+            "stick_s": m.stick.tolist(),
+            "settling_s": [None if np.isnan(x) else x for x in m.settling.tolist()],
+            "unsettled": [None if np.isnan(x) else x for x in m.unsettled.tolist()],
+        }
+    return answer

@@ -1,0 +1,190 @@
+"""Do the intervals cover? Simulated logs with known coefficients, errors as measured torques have them.
+
+For every kind of coefficient: the part of nominal 95 % intervals that contain the truth, from blocks and, beside
+it, from the textbook formula that takes samples as independent; and how far the estimates are off on average,
+in units of their spread, because noise in the motion biases least squares and no standard error tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from armloop.data.motion import Samples
+from armloop.data.signals import independent_rows, preprocess
+from armloop.identification.uncertainty.solving import solve_given_terms
+from armloop.identification.uncertainty.standard_errors import Fitted
+from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown, problems
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+from armloop.util.progress import Progress, silent
+from armloop_paper.simulated import Collection, Disturbance, collection, true_model
+
+NOMINAL = 0.95
+
+DISTURBANCES = (
+    Disturbance("white torque noise", white=0.02),
+    Disturbance("coloured torque noise (0.2 s)", coloured=0.02),
+    Disturbance("drifting friction level (1 s)", drift=0.1),
+    Disturbance("coloured noise; little noise in q, v", coloured=0.02, q_noise=1e-4, v_noise=2e-4),
+    Disturbance("coloured noise; much noise in q, v", coloured=0.02, q_noise=3e-3, v_noise=1e-2),
+    Disturbance("torque ripple in q", ripple=0.1),
+)
+
+
+@dataclass(frozen=True)
+class Covered:
+    """One disturbance.
+
+    Attributes:
+        disturbance: its name.
+        coefficients: number of coefficients of each kind.
+        blocks: part of the intervals from blocks that cover, per kind.
+        independent: the same with samples taken as independent.
+        bias: root mean square over a kind's coefficients of mean error over standard deviation of the estimates.
+        width: median ratio of stated standard error to the estimates' standard deviation, per kind.
+        block_count: mean number of blocks.
+    """
+
+    disturbance: str
+    coefficients: dict[str, int]
+    blocks: dict[str, float]
+    independent: dict[str, float]
+    bias: dict[str, float | None]
+    width: dict[str, float | None]
+    block_count: float
+
+
+@dataclass(frozen=True)
+class CoverageStudy:
+    """Nominal level, number of simulated logs per disturbance, how they were regressed, and what came out."""
+
+    nominal: float
+    simulations: int
+    jointly: bool
+    results: list[Covered]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return asdict(self)
+
+
+def coverage_study(
+    simulations: int = 100,
+    seed: int = 0,
+    disturbances: Sequence[Disturbance] = DISTURBANCES,
+    jointly: bool = False,
+    design: Collection | None = None,
+    progress: Progress = silent,
+) -> CoverageStudy:
+    """Regress the true terms of a three-axis arm from simulated logs, again and again.
+
+    Args:
+        simulations: logs per disturbance; motion is the same in all, the errors are fresh.
+        seed: of the motion and the errors.
+        jointly: regress all terms on all samples at once instead of step by step. The level of Step I is that
+            at creeping speed, viscous friction included; regressed jointly it is that of Eq. (34).
+        design: the motion; by default creeping past 24 poses, 60 constant velocities, 60 s of varying ones.
+    """
+    design = design or collection(seed)
+    truth = true_model()
+    results = []
+    for disturbance in disturbances:
+        progress(f"coverage: {disturbance.name}, {simulations} logs")
+        runs = [_one(truth, design, disturbance, jointly, 1000 * seed + k) for k in range(simulations)]
+        results.append(_summary(disturbance.name, runs))
+    return CoverageStudy(NOMINAL, simulations, jointly, results)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    kinds: list[str]
+    error: Array
+    block: Array
+    independent: Array
+    half: Array
+    blocks: int
+
+
+def _one(
+    truth: ReconstructedModel, design: Collection, disturbance: Disturbance, jointly: bool, seed: int
+) -> _Run:
+    samples = preprocess(design.logs(disturbance, seed), truth.conditioning)
+    fitted = _fitted(samples, len(design.motions[0].starts), len(design.motions[1].starts), jointly)
+    _, parts = solve_given_terms(truth, samples, fitted)
+    true_values = {_key(u): u.value for problem in problems(truth) for u in problem.unknowns}
+    kinds, error, block, independent, half = [], [], [], [], []
+    for part in parts:
+        textbook = np.sqrt(np.diag(part.equations.independent_covariance()))
+        for k, unknown in enumerate(part.unknowns):
+            kinds.append(_kind(unknown))
+            error.append(unknown.value - true_values[_key(unknown)])
+            block.append(part.std_error[k])
+            half.append(part.std_error[k] * student.ppf(0.5 + NOMINAL / 2, part.freedom[k]))
+            independent.append(textbook[k])
+    return _Run(
+        kinds,
+        np.array(error),
+        np.array(block),
+        np.array(independent),
+        np.array(half),
+        max(part.equations.blocks for part in parts),
+    )
+
+
+def _key(unknown: Unknown) -> tuple[str, int | None, str]:
+    # a friction term's name may contain v_s, which is estimated
+    name = "stribeck" if unknown.name.startswith("(1-exp") else unknown.name
+    return unknown.kind, unknown.joint, name
+
+
+def _kind(unknown: Unknown) -> str:
+    if unknown.kind == "friction":
+        if unknown.name == STRIBECK_VELOCITY:
+            return "v_s"
+        name = unknown.name
+        return "f_c - f_s" if name.startswith("(1-exp") else ("f_s" if name.startswith("sign") else "f_v")
+    return ("gravity", "velocity terms", "acceleration terms")[unknown.step - 1]
+
+
+def _fitted(samples: Samples, static: int, steady: int, jointly: bool) -> list[Fitted]:
+    """The three regressions: the first runs creep, then come those of constant velocity; or one of all."""
+    edges = [*samples.motion.starts, samples.motion.samples]
+    stage = np.full(samples.motion.samples, 2)
+    stage[: edges[static + steady]] = 1
+    stage[: edges[static]] = 0
+    # where the velocity is constant no direction reverses, however noisy it looks
+    usable = (samples.moving | (stage < 2)[:, None]) & independent_rows(samples)[:, None]
+    if jointly:
+        return [Fitted((1, 2, 3), usable)]
+    return [Fitted((s + 1,), usable & (stage == s)[:, None]) for s in range(3)]
+
+
+def _summary(name: str, runs: Sequence[_Run]) -> Covered:
+    kinds = np.array(runs[0].kinds)
+    error = np.array([run.error for run in runs])
+    half = np.array([run.half for run in runs])
+    plain = 1.959964 * np.array([run.independent for run in runs])
+    # a coefficient that ran away in every run has no spread to compare with
+    spread = error.std(axis=0, ddof=1)
+    spread[~(spread > 1e-12)] = np.nan
+    off = error.mean(axis=0) / spread
+    wide = np.median(np.array([run.block for run in runs]), axis=0) / spread
+    names = list(dict.fromkeys(runs[0].kinds))
+    return Covered(
+        disturbance=name,
+        coefficients={k: int((kinds == k).sum()) for k in names},
+        blocks={k: float(np.mean(np.abs(error) <= half, axis=0)[kinds == k].mean()) for k in names},
+        independent={k: float(np.mean(np.abs(error) <= plain, axis=0)[kinds == k].mean()) for k in names},
+        bias={k: _finite(np.sqrt(np.nanmean(off[kinds == k] ** 2))) for k in names},
+        width={k: _finite(np.nanmedian(wide[kinds == k])) for k in names},
+        block_count=float(np.mean([run.blocks for run in runs])),
+    )
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if np.isfinite(x) else None

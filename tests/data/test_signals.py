@@ -1,0 +1,225 @@
+"""Filtering keeps signals together in time, never crosses a gap, and knows when a joint slides."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from armloop.data.log import MotionLog
+from armloop.data.signals import Conditioning, LowPass, derivative, preprocess, smooth, uniform_period
+from armloop.util.errors import LogError
+
+TEN_HZ = Conditioning(cutoff_hz=10.0)
+
+
+def sines(time: np.ndarray, hz: tuple[float, ...] = (0.7, 2.0)) -> MotionLog:
+    """A log of one sine per joint, whose torque repeats the velocity; amplitude 1 rad."""
+    w = 2 * np.pi * np.array(hz)
+    phase = np.multiply.outer(time, w)
+    return MotionLog(time, np.sin(phase), w * np.cos(phase), w * np.cos(phase), name="sines")
+
+
+def phase_of(time: np.ndarray, x: np.ndarray, hz: float) -> float:
+    """Phase of x against sin(2 pi hz t), rad, by least squares."""
+    w = 2 * np.pi * hz
+    a, b = np.linalg.lstsq(np.column_stack([np.sin(w * time), np.cos(w * time)]), x, rcond=None)[0]
+    return float(np.arctan2(b, a))
+
+
+def test_every_signal_keeps_its_place_in_time():
+    # a filter that runs forwards only would delay 2 Hz by some 40 ms, half a radian
+    samples = preprocess([sines(np.arange(0, 8, 0.004))], TEN_HZ)
+    motion = samples.motion
+    for j, hz in enumerate((0.7, 2.0)):
+        phases = {
+            name: phase_of(motion.time, x[:, j], hz)
+            for name, x in (("q", motion.q), ("v", motion.v), ("vdot", motion.vdot), ("tau", samples.tau))
+        }
+        assert phases["q"] == pytest.approx(0.0, abs=1e-3)
+        assert phases["v"] == pytest.approx(np.pi / 2, abs=1e-3)
+        assert phases["tau"] == pytest.approx(np.pi / 2, abs=1e-3)
+        assert abs(phases["vdot"]) == pytest.approx(np.pi, abs=1e-3)
+
+
+def test_velocity_does_not_lag_the_derivative_of_the_position_under_noise():
+    rng = np.random.default_rng(4)
+    log = sines(np.arange(0, 20, 0.002))
+    log = replace(log, v=log.v + 0.05 * rng.normal(size=log.v.shape))
+    motion = preprocess([log], TEN_HZ).motion
+    rate = derivative(motion.q, float(np.median(np.diff(motion.time))))
+    acceleration = derivative(rate, float(np.median(np.diff(motion.time))))
+    for j in range(2):
+        lag = -np.polyfit(acceleration[:, j], motion.v[:, j] - rate[:, j], 1)[0]
+        assert abs(lag) < 2e-4  # s
+
+
+def test_what_is_slow_passes_and_what_is_fast_does_not():
+    time = np.arange(0, 8, 0.004)
+    motion = preprocess([sines(time, (1.0, 40.0))], TEN_HZ).motion
+    inside = np.abs(motion.time - 4) < 3.4  # the ends know one side of the motion only
+    np.testing.assert_allclose(motion.q[inside, 0], np.sin(2 * np.pi * motion.time[inside]), atol=1e-5)
+    assert np.abs(motion.q[inside, 1]).max() < 1e-4
+
+
+def test_the_acceleration_is_that_of_the_motion():
+    samples = preprocess([sines(np.arange(0, 8, 0.004), (0.5,))], TEN_HZ)
+    w = 2 * np.pi * 0.5
+    expected = -(w**2) * np.sin(w * samples.motion.time)
+    inside = np.abs(samples.motion.time - 4) < 3.4
+    np.testing.assert_allclose(samples.motion.vdot[inside, 0], expected[inside], atol=1e-4 * w**2)
+    np.testing.assert_allclose(samples.motion.vdot[:, 0], expected, atol=1e-2 * w**2)
+
+
+def test_a_log_that_brings_accelerations_keeps_them():
+    log = sines(np.arange(0, 8, 0.004), (0.5,))
+    samples = preprocess([replace(log, vdot=np.full_like(log.q, 7.0))], TEN_HZ)
+    np.testing.assert_allclose(samples.motion.vdot, 7.0)
+
+
+def test_a_gap_is_never_filtered_across():
+    time = np.concatenate([np.arange(0, 3, 0.004), np.arange(5, 9, 0.004), np.arange(9.5, 12, 0.004)])
+    log = sines(time)
+    levels = np.select([time < 4, time < 9.2], [0.0, 100.0], -50.0)
+    log = replace(log, tau=np.column_stack([levels, log.tau[:, 1]]))
+    samples = preprocess([log], TEN_HZ)
+    assert [samples.motion.time[run.start].round(2) for run in samples.motion.runs()] == [0.05, 5.05, 9.55]
+    for run, level in zip(samples.motion.runs(), (0.0, 100.0, -50.0), strict=True):
+        np.testing.assert_allclose(samples.tau[run, 0], level, atol=1e-9)
+    apart = preprocess([log.select(run) for run in log.runs()], TEN_HZ)
+    for name in ("time", "q", "v", "vdot", "starts"):
+        np.testing.assert_array_equal(getattr(samples.motion, name), getattr(apart.motion, name))
+    np.testing.assert_array_equal(samples.tau, apart.tau)
+
+
+def test_smoothing_a_prediction_keeps_runs_apart_too():
+    time = np.concatenate([np.arange(0, 3, 0.004), np.arange(5, 9, 0.004)])
+    samples = preprocess([sines(time)], TEN_HZ)
+    steps = np.zeros_like(samples.motion.q)
+    steps[samples.motion.starts[1] :] = 1.0
+    np.testing.assert_allclose(smooth(samples, steps), steps, atol=1e-9)
+
+
+def test_jittered_stamps_are_put_on_an_even_grid():
+    rng = np.random.default_rng(0)
+    time = np.arange(0, 8, 0.01) + rng.uniform(-0.003, 0.003, 800)
+    log = sines(time, (1.0,))
+    motion = preprocess([log], TEN_HZ).motion
+    steps = np.diff(motion.time)
+    np.testing.assert_allclose(steps, steps[0], rtol=1e-6)
+    np.testing.assert_allclose(motion.q[:, 0], np.sin(2 * np.pi * motion.time), atol=2e-3)
+    # taken as if they were even, the same samples are wrong by ten times as much
+    even = replace(log, time=time[0] + np.arange(800) * np.diff(time).mean())
+    wrong = preprocess([even], TEN_HZ).motion
+    assert np.abs(wrong.q[:, 0] - np.sin(2 * np.pi * wrong.time)).max() > 5e-3
+
+
+def test_the_period_of_even_and_of_jittered_stamps():
+    time = np.arange(0, 1, 0.01)
+    assert uniform_period(time) == pytest.approx(0.01)
+    alternating = np.cumsum(np.tile([0.01, 0.012], 100))  # 10 or 12 ms, as the UR10e's controller stamps
+    assert uniform_period(alternating) == pytest.approx(0.011, rel=1e-2)
+
+
+def stop_and_go(seconds: tuple[float, ...] = (2.0, 2.0, 2.0), speed: float = 0.5) -> MotionLog:
+    """At rest, at a constant speed, at rest; 250 Hz, a little noise on v."""
+    v = np.concatenate([np.full(int(s * 250), speed * (k % 2)) for k, s in enumerate(seconds)])[:, None]
+    q = np.cumsum(v, axis=0) * 0.004
+    v = v + 1e-3 * np.random.default_rng(1).normal(size=v.shape)
+    return MotionLog(np.arange(len(v)) * 0.004, q, v, np.sign(q), name="stop")
+
+
+def test_moving_keeps_half_a_period_away_from_standstill():
+    samples = preprocess([stop_and_go()], TEN_HZ)
+    moving = samples.motion.time[samples.moving[:, 0]]
+    # at 2 s and 4 s the speed steps; smeared by the filter it crosses the dead zone up to 0.1 s before
+    assert moving.min() >= 2.0 - 0.1 + 0.05
+    assert moving.max() <= 4.0 + 0.1 - 0.05
+    inside = (samples.motion.time > 2.06) & (samples.motion.time < 3.94)
+    assert samples.moving[inside, 0].all()
+
+
+def test_a_reversal_is_dilated_by_half_a_period_of_the_corner():
+    time = np.arange(0, 10, 0.004)
+    log = sines(time, (0.25,))
+    samples = preprocess(
+        [replace(log, v=log.v + 1e-3 * np.random.default_rng(2).normal(size=log.v.shape))], TEN_HZ
+    )
+    for reversal in (1.0, 3.0, 5.0, 7.0, 9.0):
+        near = np.abs(samples.motion.time - reversal) < 0.05
+        assert near.any() and not samples.moving[near].any()
+        assert samples.moving[np.abs(samples.motion.time - reversal - 0.5) < 0.2].all()
+
+
+def test_the_dead_zone_follows_the_noise():
+    log = sines(np.arange(0, 10, 0.004), (0.25,))
+    rng = np.random.default_rng(3)
+    shares = []
+    for level in (1e-3, 1e-1, 1.0):
+        noisy = replace(log, v=log.v + level * rng.normal(size=log.v.shape))
+        shares.append(float(preprocess([noisy], TEN_HZ).moving.mean()))
+    assert shares[0] > 0.9 and shares[0] > shares[1] + 0.02 and shares[1] > shares[2] + 0.2
+
+
+def test_a_joint_that_rests_never_counts_as_moving():
+    log = stop_and_go(speed=0.0)
+    assert not preprocess([log], TEN_HZ).moving.any()
+
+
+def test_short_runs_are_dropped_and_long_ones_kept():
+    time = np.concatenate([np.arange(0, 3, 0.004), np.arange(5, 5.2, 0.004), np.arange(6, 9, 0.004)])
+    samples = preprocess([sines(time)], TEN_HZ)
+    assert len(samples.motion.starts) == 2
+    assert not ((samples.motion.time > 4) & (samples.motion.time < 5.5)).any()
+
+
+def test_no_run_long_enough_is_an_error_that_says_how_long_it_must_be():
+    time = np.concatenate([k + np.arange(0, 0.2, 0.004) for k in range(5)])
+    with pytest.raises(LogError, match=r"^sines: .*lasts 0\.196 s; .* 10 Hz .* at least 0\.3 s"):
+        preprocess([sines(time)], TEN_HZ)
+
+
+def test_without_a_filter_samples_stay_and_accelerations_are_needed():
+    log = sines(np.arange(0, 3, 0.004))
+    with pytest.raises(LogError, match=r"sines: .* vdot1\.\.vdot2"):
+        preprocess([log], Conditioning(cutoff_hz=0))
+    full = replace(log, vdot=log.v)
+    samples = preprocess([full, full], Conditioning(cutoff_hz=0))
+    np.testing.assert_array_equal(samples.tau, np.vstack([log.tau, log.tau]))
+    np.testing.assert_array_equal(samples.motion.starts, [0, log.samples])
+    assert samples.moving.all()
+    assert smooth(samples, samples.tau) is samples.tau
+
+
+def test_a_prediction_is_smeared_like_the_measurement():
+    # friction steps at a reversal; the filter smears the measured step, so the predicted one must be smeared
+    log = sines(np.arange(0, 20, 0.004), (0.25,))
+    samples = preprocess([replace(log, tau=np.sign(log.v))], TEN_HZ)
+    predicted = np.sign(samples.motion.v)
+    sharp = np.sqrt(np.mean((samples.tau - predicted) ** 2))
+    smeared = np.sqrt(np.mean((samples.tau - smooth(samples, predicted)) ** 2))
+    assert smeared < 0.5 * sharp
+
+
+def test_a_corner_beyond_half_the_sample_rate_is_no_filter():
+    x = np.random.default_rng(0).normal(size=(50, 2))
+    np.testing.assert_array_equal(LowPass(60.0, 0.01)(x), x)
+    assert np.std(LowPass(5.0, 0.01)(x)) < 0.6 * np.std(x)
+
+
+@pytest.mark.parametrize("samples", [2, 30, 400])
+def test_the_low_pass_is_scipys_zero_phase_one(samples: int):
+    x = np.random.default_rng(1).normal(size=(samples, 2, 3))
+    padding = min(samples - 1, int(np.ceil(1.5 / (10.0 * 0.004))))
+    expected = sosfiltfilt(butter(4, 10.0, fs=250.0, output="sos"), x, axis=0, padlen=padding)
+    np.testing.assert_allclose(LowPass(10.0, 0.004)(x), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_runs_of_any_length_are_filtered_one_by_one():
+    x = np.random.default_rng(2).normal(size=(230, 2))
+    low_pass = LowPass(10.0, 0.004)
+    runs = [slice(0, 60), slice(60, 100), slice(100, 160), slice(170, 230)]
+    expected = x.copy()
+    for run in runs:
+        expected[run] = low_pass(x[run])
+    np.testing.assert_allclose(low_pass.each(x, runs), expected, rtol=1e-12, atol=1e-12)

@@ -1,0 +1,170 @@
+"""Motions and torques within limits, judged by Drake's inverse dynamics."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exact_model import ExactModel
+from exact_parts import model_of
+from numpy.testing import assert_allclose
+
+from armloop.drake.control.bounded_feedforward import bounded_reference
+from armloop.drake.control.bounded_program import TOLERANCE
+from armloop.drake.experiments.scenarios import load_plant, load_tracking
+from armloop.drake.experiments.tracking import run_tracking
+from armloop.drake.plant.exact import exact_model
+from armloop.dynamics import Dynamics
+from armloop.experiment.excitation import MotionRanges, fourier_reference, places_reference
+from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import load_arm
+from armloop.util.errors import InputError, ScenarioError
+
+PLACES = [[0.9, -0.7, 0.02, -0.3], [-0.6, 0.9, 0.02, 0.4]]
+
+
+@pytest.fixture(scope="module")
+def scara():
+    return load_plant("scara")
+
+
+@pytest.fixture(scope="module")
+def hurry(scara):
+    return places_reference(PLACES, scara.config.ranges, dwell=0.2, pace=2.5)
+
+
+@pytest.fixture(scope="module")
+def effort(scara, hurry):
+    """Three quarters of the largest torque that is asked for; what holds the vertical joint is not touched."""
+    peaks = np.abs(torques(scara, hurry)).max(axis=0)
+    return np.where(scara.arm.revolute, 0.75 * peaks, 50.0)
+
+
+def torques(plant, reference):
+    exact = ExactModel(plant.arm, plant.config.friction)
+    t = np.arange(0.0, reference.duration, 0.01)
+    return np.array([exact.feedforward(*state, 3) for state in zip(*reference.evaluate(t), strict=True)])
+
+
+def test_torques_keep_the_limits(scara, hurry, effort):
+    model = exact_model(scara.arm, scara.config.friction)
+    bounded = bounded_reference(hurry, model, effort)
+    asked, kept = torques(scara, hurry), torques(scara, bounded)
+    assert (np.abs(asked) > effort).any(axis=0).tolist() == [True, True, False, True]
+    # which of the Stribeck levels acts depends on the deviation's own speed
+    doubt = np.array([f.static - f.coulomb for f in scara.config.friction])
+    assert np.all(np.abs(kept) < 1.01 * effort + doubt)
+    assert (np.abs(kept) > 1.02 * effort).mean() < 0.02
+    t = np.linspace(0, hurry.duration, 20_001)
+    assert np.all(np.abs(bounded.torque(t)) <= (1 + TOLERANCE) * effort)
+    # positions, velocities and accelerations belong together
+    q, v, _ = bounded.evaluate(t)
+    assert_allclose(np.gradient(q, t, axis=0)[2:-2], v[2:-2], atol=5e-3)
+
+
+def test_torques_keep_their_rates_too(scara):
+    scenario = load_tracking("torque_limits:weak_and_slow")
+    hurry, rate = scenario.reference, scenario.rate
+    effort = np.array([joint.effort for joint in scenario.plant.arm.joints])
+    model = exact_model(scara.arm, scara.config.friction)
+    bounded = bounded_reference(hurry, model, effort, rate)
+    t = np.arange(0.0, hurry.duration, 1e-3)
+    tau = bounded.torque(t)
+    change = np.abs(np.diff(tau, axis=0)) / 1e-3
+    turning = [0, 1, 3]
+    # a part of an effort per knot of 10 ms is what the solver knows a rate by
+    assert np.all(change <= rate + TOLERANCE * effort / 0.01)
+    assert np.all(np.abs(tau) <= (1 + TOLERANCE) * effort)
+    assert np.all(change.max(axis=0)[turning] > 0.99 * rate[turning])
+    free = bounded_reference(hurry, model, effort)
+    assert np.all((np.abs(np.diff(free.torque(t), axis=0)) / 1e-3).max(axis=0)[turning] > 1.5 * rate[turning])
+    # where a joint slides, the torques are those of the motion
+    exact = ExactModel(scara.arm, scara.config.friction)
+    state = bounded.evaluate(bounded.deviation.time)
+    sliding = (np.abs(hurry.evaluate(bounded.deviation.time)[1]) > 0.1) & (np.abs(state[1]) > 0.1)
+    expected = np.array([exact.feedforward(*x, 3) for x in zip(*state, strict=True)])
+    assert_allclose(bounded.torques[sliding], expected[sliding], atol=0.02 * effort.max())
+
+
+def test_limits_that_do_not_bind_change_nothing(scara, hurry, effort):
+    model = exact_model(scara.arm, scara.config.friction)
+    t = np.linspace(0, hurry.duration, 200)
+    free = bounded_reference(hurry, model, 100 * effort)
+    assert_allclose(free.evaluate(t)[0], hurry.evaluate(t)[0], atol=1e-6)
+
+
+def test_what_gravity_alone_exceeds_is_refused():
+    plant = load_plant("three_axis")
+    stretched = places_reference([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], plant.config.ranges, dwell=0.3, pace=1.0)
+    with pytest.raises(InputError, match="no motion near the reference keeps the torque limits"):
+        bounded_reference(
+            stretched, exact_model(plant.arm, plant.config.friction), np.array([30.0, 0.5, 20.0])
+        )
+
+
+def test_within_limits_the_arm_follows_better_than_clipped(hurry, effort):
+    built_in = load_tracking("torque_limits")
+    plant = built_in.plant
+    assert [joint.effort for joint in plant.arm.joints] == [3.0, 1.75, 50.0, 1.0]
+    joints = tuple(
+        dataclasses.replace(j, effort=float(e)) for j, e in zip(plant.arm.joints, effort, strict=True)
+    )
+    scenario = dataclasses.replace(
+        built_in,
+        plant=dataclasses.replace(plant, arm=dataclasses.replace(plant.arm, joints=joints)),
+        reference=hurry,
+        score=(0.0, hurry.duration),
+    )
+    compared(scenario)
+
+
+def test_within_its_rates_the_arm_follows_better_than_clipped():
+    scenario = load_tracking("torque_limits:slow_drives")
+    for result in compared(scenario).values():
+        assert np.all(np.abs(np.diff(result.tau, axis=0)) <= 1e-3 * scenario.rate * (1 + 1e-9))
+
+
+def compared(scenario):
+    model = exact_model(scenario.plant.arm, scenario.plant.config.friction)
+    results = run_tracking(
+        dataclasses.replace(scenario, controllers=("pid_step3", "bounded")), {"model": model}
+    )
+    clipped, bounded = results["pid_step3"], results["bounded"]
+    turning = [0, 1, 3]
+    assert np.all(clipped.metrics.clipped[turning] > 0.01)
+    assert np.all(bounded.metrics.clipped[turning] < clipped.metrics.clipped[turning])
+    assert np.all(bounded.largest[turning] < clipped.largest[turning])
+    assert np.all(bounded.eta[turning] < clipped.eta[turning])
+    return results
+
+
+def test_what_is_wrong_with_limits_is_told(tmp_path):
+    path = tmp_path / "mine.yaml"
+    for fields, message in (
+        ("effort: [1.0, 2.0]", "limits.effort has 2 numbers"),
+        ("effort: [0.0]", r"limits.effort\[1\] is 0.0; it must be a finite number above 0"),
+        ("effort: [9.0], used: 2.0", "limits.used is 2.0"),
+        ("rate: [9.0, -1.0, 9.0]", r"limits.rate\[2\] is -1.0; it must be a finite number above 0"),
+        ("used: 0.9", "limits needs an effort or a rate"),
+    ):
+        path.write_text(f"plant: three_axis\nlimits: {{{fields}}}\n")
+        with pytest.raises(ScenarioError, match=rf"mine.yaml: {message}"):
+            load_tracking(path)
+
+
+@pytest.mark.parametrize("kind", ["cubic", "quadratic", "viscous_forward", "root"])
+def test_friction_that_is_not_linear_in_the_speed_is_in_the_torques(kind):
+    arm = load_arm("three_axis")
+    friction = (FrictionTerm("sign", 0.3), FrictionTerm("viscous", 0.5), FrictionTerm(kind, 1.5))
+    model = model_of(arm, friction=friction)
+    reference = fourier_reference(MotionRanges.of(arm), 4.0, 2)
+    dynamics, t = Dynamics(model), np.arange(0.0, 4.0, 0.01)
+    asked = np.abs(dynamics.torque(*reference.evaluate(t)))
+    effort = np.where([False, False, True], 0.85, 1.5) * asked.max(axis=0)
+    bounded = bounded_reference(reference, model, effort)
+    knots = bounded.deviation.time
+    assert (asked > effort).any(axis=0).tolist() == [False, False, True]
+    state = bounded.evaluate(knots)
+    # where no sign is open the torques told are those of the motion told, to second order in what the last round moved
+    slides = (np.abs(state[1]) > 0.1) & (np.abs(reference.evaluate(knots)[1]) > 0.1)
+    error = np.abs(bounded.torques - dynamics.torque(*state))[slides]
+    assert error.max() < 2e-3 * asked.max()

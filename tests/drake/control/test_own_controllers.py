@@ -1,0 +1,85 @@
+"""A control law of a user's own runs in a scenario under its name, and what is none is refused in one line."""
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+
+from armloop.cli import main
+from armloop.drake import Controller, add_arm_under, register_controller
+from armloop.drake.control.controllers import REGISTRY
+from armloop.drake.experiments.scenarios import load_tracking
+from armloop.drake.experiments.tracking import controllers_for, run_tracking, track
+from armloop.drake.plant.exact import exact_model
+from armloop.reports.words import controller
+from armloop.util.errors import InputError, ScenarioError
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "own_controller.md"
+
+
+@pytest.fixture(autouse=True)
+def sliding_mode():
+    """The page's controller, registered as the page does it; forgotten after the test."""
+    REGISTRY.forget()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
+    names: dict = {}
+    exec(code, names)
+    yield names["SlidingMode"]
+    REGISTRY.forget()
+
+
+@pytest.fixture(scope="module")
+def short():
+    scenario = load_tracking("three_axis_tracking")
+    reference = dataclasses.replace(scenario.reference, duration=1.5)
+    return dataclasses.replace(
+        scenario, reference=reference, score=(0.5, 1.5), controllers=("pid", "sliding_mode")
+    )
+
+
+def test_it_runs_beside_the_listed_ones_and_gets_the_model(short):
+    assert controllers_for(short, {}) == ["pid"]
+    model = exact_model(short.plant.arm, short.plant.config.friction)
+    results = run_tracking(short, {"sliding_mode": model}, processes=1)
+    assert list(results) == ["pid", "sliding_mode"]
+    assert np.all(results["sliding_mode"].eta < 0.1 * results["pid"].eta)
+    assert controller("sliding_mode") == "sliding mode"
+    with pytest.raises(
+        ValueError, match="no model for the controller sliding_mode; the models given are: none"
+    ):
+        track(short, "sliding_mode", {})
+
+
+@pytest.mark.slow
+def test_a_scenario_file_and_a_command_know_it_by_its_name(tmp_path, short, capsys):
+    model = tmp_path / "model.json"
+    exact_model(short.plant.arm, short.plant.config.friction).save(model)
+    places = "[[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]]"
+    (tmp_path / "mine.yaml").write_text(
+        "plant: three_axis\ncontrollers: [sliding_mode]\nscore: []\n"
+        f"reference: {{kind: places, dwell: 0.1, places: {places}}}\n"
+    )
+    line = ["track", str(tmp_path / "mine.yaml"), "--model", f"model={model}", "--json"]
+    assert main(line) == 0
+    assert list(json.loads(capsys.readouterr().out)["controllers"]) == ["sliding_mode"]
+    REGISTRY.forget()
+    with pytest.raises(ScenarioError, match="controllers: sliding_mode; there are: pid, pid_step1"):
+        load_tracking(tmp_path / "mine.yaml")
+
+
+def test_what_is_no_controller_is_refused(sliding_mode):
+    with pytest.raises(InputError, match="must be a subclass of armloop"):
+        register_controller(dict)
+    with pytest.raises(InputError, match="Nothing lacks law; define them in the class"):
+        register_controller(type("Nothing", (Controller,), {"name": "nothing"}))
+    with pytest.raises(InputError, match="the name 'pid' is that of a listed controller"):
+        register_controller(type("Mine", (sliding_mode,), {"name": "pid"}))
+
+
+def test_a_law_with_other_ports_is_refused(short):
+    with pytest.raises(ValueError, match="mine: has the input ports none; a control law has state"):
+        add_arm_under(DiagramBuilder(), short.plant, LeafSystem(), short.reference, name="mine")

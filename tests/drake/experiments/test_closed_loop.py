@@ -1,0 +1,66 @@
+"""Diagrams of a user's own, from the exported parts."""
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from armloop.drake import PidGains, add_arm_with_controller
+from armloop.experiment.excitation import FourierReference, paper_reference
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import ReconstructedModel, load_model
+from armloop.model.components import RigidBody
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters
+
+
+def test_an_arm_under_pid_in_a_diagram_of_ones_own():
+    reference = paper_reference()
+    builder = DiagramBuilder()
+    loop = add_arm_with_controller(builder, "three_axis", PidGains.paper(3), reference)
+    log = LogVectorOutput(loop.plant.GetOutputPort("state"), builder, 1e-3)
+    simulator = Simulator(builder.Build())
+    loop.start_on_reference(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.5)
+    q = log.FindLog(simulator.get_context()).data()[:3].T
+    error = np.abs(q - loop.reference.tables[0][: len(q)])
+    assert len(q) == 501
+    assert 1e-4 < error.max() < 0.2
+
+
+def test_a_model_file_takes_the_place_of_nothing(tmp_path):
+    """The same lines with a model: what PID alone leaves of the error nearly goes away."""
+    arm = load_arm("three_axis")
+    laws = [(0.557, 2.65, 0.1671), (0.757, 1.82, 0.2271), (0.585, 3.14, 0.1755)]
+    friction = FrictionLaw(
+        tuple(
+            (
+                FrictionTerm("sign", fc + drop),
+                FrictionTerm("stribeck", -drop, 0.1),
+                FrictionTerm("viscous", fv),
+            )
+            for fc, fv, drop in laws
+        )
+    )
+    body = RigidBody(nominal_parameters(arm), ("m1",), np.array([1.0]))
+    ReconstructedModel(arm, (body,), friction).save(tmp_path / "model.json")
+
+    largest = {}
+    for model in (None, load_model(tmp_path / "model.json", arm)):
+        builder = DiagramBuilder()
+        loop = add_arm_with_controller(builder, "three_axis", PidGains.paper(3), paper_reference(), model)
+        simulator = Simulator(builder.Build())
+        loop.start_on_reference(simulator.get_mutable_context())
+        simulator.AdvanceTo(0.5)
+        state = loop.plant.GetOutputPort("state").Eval(
+            loop.plant.GetMyContextFromRoot(simulator.get_context())
+        )
+        largest[model is None] = np.abs(state[:3] - loop.reference.tables[0][500]).max()
+    assert largest[False] < 0.01 * largest[True]
+
+
+def test_reference_and_gains_must_fit_the_arm():
+    still = FourierReference(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1)), np.ones((2, 1)), 1.0)
+    with pytest.raises(ValueError, match="three_axis has 3 joints; the gains are for 3, the reference for 2"):
+        add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), still)

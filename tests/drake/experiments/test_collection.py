@@ -1,0 +1,145 @@
+"""Collected data against the plant's own mechanics and friction: settled, sliding, as noisy as stated."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.data.log import read_log, write_log
+from armloop.drake.experiments.collection import collect, measure_run
+from armloop.drake.experiments.scenarios import load_plan, load_plant, plant_for
+from armloop.drake.plant.config import Instruments
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.experiment.design import Limits, Series, nominal_torque
+from armloop.robot.kinematics import nominal_parameters, regressor
+
+TINY = dataclasses.replace(
+    load_plan("quick"), static_poses=4, velocity_segments=8, trajectories=1, trajectory_duration=5.0
+)
+IDEAL = Instruments(encoder_counts=0, torque_noise=0.0)
+
+
+def tiny(name, **changes):
+    plant = load_plant(name)
+    config = dataclasses.replace(plant.config, **changes)
+    return plant, config, collect(plant.arm, config, TINY, seed=3)
+
+
+def law(plant, q, v, vdot):
+    tau = regressor(plant.arm, q, v, vdot) @ nominal_parameters(plant.arm)
+    return tau + np.stack([f.force(v[:, j]) for j, f in enumerate(plant.config.friction)], axis=1)
+
+
+@pytest.mark.parametrize("name", ["three_axis", "scara"])
+def test_settled_segments_hold_the_law(name):
+    plant, _, logs = tiny(name, instruments=IDEAL)
+    for condition, runs in (("static", 8), ("constant_velocity", 8)):
+        log = logs[condition]
+        assert len(log.runs()) == runs
+        for rows in log.runs():
+            # Really at constant speed: no stick-slip at 0.1 deg/s, no transient left.
+            part = log.select(rows)
+            assert_allclose(part.v, np.tile(part.v.mean(axis=0), (len(part.v), 1)), rtol=0.03, atol=2e-7)
+            assert np.all(np.abs(part.v) > 5e-5)
+            expected = law(plant, part.q, part.v, 0 * part.v)
+            assert_allclose(part.tau, expected, atol=2e-3 * np.abs(expected).max() + 1e-3)
+    creep = np.abs(logs["static"].v)
+    nominal = np.where(plant.arm.revolute, np.deg2rad(0.1), 1e-4)
+    assert_allclose(creep, np.tile(nominal, (len(creep), 1)), rtol=0.03)
+
+
+def test_varying_part_holds_the_law_while_sliding():
+    plant, _, logs = tiny("three_axis", instruments=IDEAL)
+    log = logs["varying"]
+    vdot = np.gradient(log.v, log.time, axis=0)
+    sliding = np.all(np.abs(log.v) > 0.05, axis=1)
+    sliding[:2] = sliding[-2:] = False
+    difference = (log.tau - law(plant, log.q, log.v, vdot))[sliding]
+    assert np.sqrt((difference**2).mean(axis=0)).max() < 0.02
+
+
+def test_instruments_add_what_they_say():
+    _, _, real = tiny("three_axis")
+    _, _, ideal = tiny("three_axis", instruments=IDEAL)
+    for condition in real:
+        count = 2 * np.pi / 2**19
+        assert_allclose(np.round(real[condition].q / count) * count, real[condition].q, atol=1e-8)
+        assert np.abs(real[condition].q - ideal[condition].q).max() < 0.6 * count
+        noise = real[condition].tau - ideal[condition].tau
+        rms = np.sqrt((ideal[condition].tau ** 2).mean(axis=0))
+        assert_allclose(noise.std(axis=0), 0.01 * rms, rtol=0.2)
+
+
+def test_collection_is_repeatable_tells_its_progress_and_can_be_written(tmp_path):
+    plant = load_plant("three_axis")
+    plan = dataclasses.replace(TINY, static_poses=1, velocity_segments=2, trajectories=0)
+    seen = []
+    logs = collect(plant.arm, plant.config, plan, 1, lambda what, done: seen.append((what, done)))
+    assert [what for what, _ in seen] == ["constant_velocity"] * 2 + ["static"] * 2
+    done = [part for _, part in seen]
+    assert done == sorted(done) and done[-1] == pytest.approx(1.0)
+    again = collect(plant.arm, plant.config, plan, 1, processes=2)
+    assert np.array_equal(logs["static"].tau, again["static"].tau)
+    assert not np.array_equal(logs["static"].tau, collect(plant.arm, plant.config, plan, 2)["static"].tau)
+    write_log(tmp_path / "static.csv", logs["static"])
+    assert np.array_equal(read_log(tmp_path / "static.csv").q, logs["static"].q)
+
+
+def test_dwelling_hides_friction():
+    plant = load_plant("three_axis")
+    plan = dataclasses.replace(TINY, dwell=True, velocity_segments=0, trajectories=0)
+    logs = collect(plant.arm, plant.config, plan, 1)
+    assert list(logs) == ["static"]
+    assert len(logs["static"].runs()) == 4
+    assert np.abs(logs["static"].v).max() < 2e-3  # one encoder count over the window
+
+
+def test_measured_run_carries_the_effect_and_does_not_name_it():
+    plant = load_plant("three_axis")
+    clean, loaded = (
+        measure_run(plant.arm, plant.config, 5, duration=5.0, effects=effects)
+        for effects in ((), (UndeclaredEffect("torque_offset", 2, {"offset": 0.7}),))
+    )
+    assert clean.name == loaded.name
+    assert len(clean.runs()) == 1
+    assert 1 / clean.period == pytest.approx(500.0)
+    assert (loaded.tau - clean.tau).mean(axis=0) == pytest.approx([0.0, 0.7, 0.0], abs=0.01)
+
+
+def test_any_urdf_has_a_plant(tmp_path):
+    path = tmp_path / "two.urdf"
+    path.write_text(
+        """<robot name="two"><link name="base"/>
+        <link name="a"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+        <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <link name="b"><inertial><mass value="0.5"/>
+        <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="turn" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
+        <joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
+        <limit lower="0" upper="0.3" velocity="0.5" effort="60"/></joint></robot>"""
+    )
+    plant = plant_for(path)
+    logs = collect(plant.arm, plant.config, TINY, 0)
+    for rows in logs["static"].runs():
+        part = logs["static"].select(rows)
+        expected = law(
+            plant, part.q, np.sign(part.v.mean(axis=0)) * [np.deg2rad(0.1), 1e-4] + 0 * part.v, 0 * part.v
+        )
+        assert_allclose(part.tau.mean(axis=0), expected.mean(axis=0), rtol=0.02, atol=0.03)
+
+
+def test_a_motion_of_the_designed_family_is_followed():
+    """What `armloop excite` chooses from: fitted into all limits, from rest to rest."""
+    plant = load_plant("scara")
+    series = Series(4, 6, 6.0)
+    effort = np.array([joint.effort for joint in plant.arm.joints])
+    draft = series.reference(np.random.default_rng(3).normal(size=(4, series.free)))
+    made = Limits(plant.config.ranges, 0.8 * effort, nominal_torque(plant.arm)).fitted(draft, 1e-3)
+    log = measure_run(plant.arm, plant.config, 1, reference=made)
+    q, v, _ = made.evaluate(log.time)
+    assert log.time[-1] > 5.99
+    assert np.all(np.abs(v).max(axis=0) > 0.3 * plant.config.ranges.velocity)
+    assert np.abs(log.q - q).max() < 2e-4
+    assert np.sqrt(np.mean((log.v - v) ** 2, axis=0)).max() < 5e-3
+    assert np.all(np.abs(log.tau).max(axis=0) < effort)

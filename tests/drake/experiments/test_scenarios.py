@@ -1,0 +1,228 @@
+"""Scenario files: the built-in ones load, and what is wrong with one is said in one line."""
+
+import runpy
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.drake.control.controllers import LISTED
+from armloop.drake.experiments.scenarios import load_plan, load_plant, load_tracking, plant_names
+from armloop.experiment.excitation import fourier_reference, write_reference
+from armloop.util.errors import ScenarioError
+from armloop.util.resources import scenario_path
+
+OWN = """
+own_plant:
+  arm: three_axis
+  friction:
+    - {static: 1.0, coulomb: 0.8, stribeck_velocity: 0.1, viscous: 1.0}
+    - {static: 1.0, coulomb: 0.8, stribeck_velocity: 0.1, viscous: 1.0}
+    - {coulomb: 0.5, static: 0.5}
+"""
+
+
+def load(tmp_path, text):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    return load_tracking(path)
+
+
+def test_built_in_plants():
+    assert plant_names() == ["scara", "three_axis"]
+    three = load_plant("three_axis")
+    assert [f.coulomb for f in three.config.friction] == [0.557, 0.757, 0.585]
+    assert_allclose([f.static / f.coulomb for f in three.config.friction], 1.3, rtol=1e-4)
+    # Table 3
+    assert_allclose(three.config.ranges.upper, [np.pi / 2, np.pi / 3, np.pi])
+    assert_allclose(three.config.ranges.velocity, np.pi / 2)
+    assert_allclose(three.config.ranges.acceleration, np.pi)
+    # Table 1
+    ranges = load_plant("scara").config.ranges
+    assert_allclose(ranges.lower, [-np.pi / 2, -np.pi / 2, 0, -np.pi / 2], atol=1e-7)
+    assert_allclose(ranges.acceleration, [np.pi / 2, np.pi / 2, 0.2, np.pi / 2])
+
+
+@pytest.mark.parametrize("name", ["paper", "dwell", "quick"])
+def test_built_in_plans(name):
+    plan = load_plan(name)
+    assert plan.dwell == (name == "dwell")
+    assert plan.static_speed == pytest.approx(np.deg2rad(0.1))
+
+
+def test_built_in_tracking():
+    scenario = load_tracking("three_axis_tracking")
+    assert_allclose(np.stack([scenario.gains.kp, scenario.gains.ki, scenario.gains.kd])[:, 0], [80, 8, 2])
+    assert scenario.score == (20.0, 40.0)
+    assert scenario.controllers == ("pid", "pid_step1", "pid_step3")
+    assert scenario.plant.name == "three_axis"
+
+
+def test_own_plant_and_urdf_beside_the_scenario(tmp_path):
+    scenario = load(tmp_path, OWN + "kd: [2.0, 3.0, 2.5]\nscore: [0.0, 20.0]\n")
+    assert scenario.plant.config.friction[0].static == 1.0
+    assert_allclose(scenario.gains.kd, [2.0, 3.0, 2.5])
+    (tmp_path / "beside.urdf").write_text(scenario.plant.arm.urdf)
+    assert load(tmp_path, OWN.replace("arm: three_axis", "arm: beside.urdf")).plant.arm.n == 3
+    scara = OWN.replace("three_axis", "scara").rstrip() + "\n    - {coulomb: 0.1, static: 0.1}\n"
+    assert load(tmp_path, scara + "reference: {kind: fourier, duration: 40.0}\n").reference.duration == 40.0
+
+
+TWO = """
+slow:
+  plant: three_axis
+  reference: {kind: places, dwell: 0.5, places: [[0.0, 0.0, 0.0], [0.3, -0.2, 0.1]], pace: 0.5}
+  score: []
+mine:
+  plant: three_axis
+  score: [0.0, 20.0]
+"""
+
+
+def test_a_file_may_hold_several_scenarios(tmp_path):
+    assert load(tmp_path, TWO).score == (0.0, 20.0)  # the one named as the file
+    path = tmp_path / "mine.yaml"
+    slow = load_tracking(f"{path}:slow")
+    assert slow.name == "mine:slow" and slow.score == (0.0, slow.reference.duration)
+    (tmp_path / "other.yaml").write_text(TWO)
+    assert load_tracking(tmp_path / "other.yaml").name == "other:slow"  # else the first
+    with pytest.raises(ScenarioError, match=r"mine.yaml: there is no scenario 'fast'; there are: slow, mine"):
+        load_tracking(f"{path}:fast")
+    with pytest.raises(ScenarioError, match=r"mine.yaml: slow: field 'Kp' is unknown"):
+        load_tracking(f"{_written(path, TWO.replace('  score: []', '  Kp: []'))}:slow")
+    with pytest.raises(ScenarioError, match=r"holds one scenario without a name; leave out :slow"):
+        load_tracking(f"{_written(path, 'plant: three_axis')}:slow")
+    assert set(load_tracking("three_axis_tracking:all_controllers").controllers) == {*LISTED} - {"bounded"}
+
+
+def _written(path, text):
+    path.write_text(text)
+    return path
+
+
+def test_places_keep_the_ranges_speeds_and_rest(tmp_path):
+    load(tmp_path, TWO)
+    scenario = load_tracking(f"{tmp_path / 'mine.yaml'}:slow")
+    ranges = scenario.plant.config.ranges
+    t = np.linspace(0, scenario.reference.duration, 4001)
+    q, v, vdot = scenario.reference.evaluate(t)
+    assert_allclose(q[[0, -1]], [[0, 0, 0], [0.3, -0.2, 0.1]])
+    assert_allclose(v[(t < 0.5) | (t > t[-1] - 0.5)], 0.0, atol=1e-12)
+    used = [
+        np.abs(v).max() / (0.5 * ranges.velocity[0]),
+        np.abs(vdot).max() / (0.25 * ranges.acceleration[0]),
+    ]
+    assert max(used) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_arm_may_be_left_to_the_user(tmp_path):
+    text = OWN.replace("  arm: three_axis\n", "") + "score: [0.0, 20.0]\n"
+    with pytest.raises(ScenarioError, match=r"own_plant: arm is missing; give .* or by --arm"):
+        load(tmp_path, text)
+    assert load_tracking(tmp_path / "mine.yaml", "three_axis").plant.arm.name == "three_axis"
+    with pytest.raises(ScenarioError, match="friction has 3 joints; scara has 4"):
+        load_tracking(tmp_path / "mine.yaml", "scara")
+    with pytest.raises(ScenarioError, match="--arm is for scenarios with own_plant"):
+        load_tracking("three_axis_tracking", "scara")
+    with pytest.raises(ScenarioError, match="ur10e_tracking: own_plant: arm is missing"):
+        load_tracking("ur10e_tracking")
+
+
+def test_a_reference_from_a_file(tmp_path):
+    made = fourier_reference(load_plant("scara").config.ranges, 6.0, seed=4)
+    write_reference(tmp_path / "mine.csv", made, 200.0)
+    scara = "plant: scara\nscore: [1.0, 6.0]\nreference: {kind: csv, file: mine.csv}\n"
+    scenario = load(tmp_path, scara)
+    assert scenario.reference.duration == 6.0
+    t = np.linspace(0, 6, 777)
+    for ours, theirs in zip(scenario.reference.evaluate(t), made.evaluate(t), strict=True):
+        assert_allclose(ours, theirs, atol=1e-6)
+    with pytest.raises(ScenarioError, match=r"reference.file: .*mine.csv: column q4 is of a joint"):
+        load(tmp_path, scara.replace("plant: scara", "plant: three_axis"))
+    with pytest.raises(ScenarioError, match=r"reference\.file is missing"):
+        load(tmp_path, "plant: scara\nreference: {kind: csv}\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("plant: nowhere\n", "plant: 'nowhere' is unknown; there are: scara, three_axis"),
+        ("kp: [80]\n", "plant: give either"),
+        (OWN + "plant: three_axis\n", "plant: give either"),
+        ("plant: three_axis\nKp: [80]\n", "field 'Kp' is unknown"),
+        ("plant: three_axis\nkp: 80\n", "kp is 80; it must be a list"),
+        ("plant: three_axis\nkp: [high]\n", r"kp\[1\] is 'high'; it must be a finite number"),
+        (
+            "plant: three_axis\nkp: [80, 80]\n",
+            "kp has 2 numbers; it must have one number or one per joint, 3",
+        ),
+        ("plant: three_axis\nki: [-1]\n", "must not be negative"),
+        ("plant: three_axis\nki: [.nan]\n", "must be a finite number"),
+        ("plant: three_axis\nscore: [30, 50]\n", "score is .* in 0 to 40 s"),
+        ("plant: three_axis\ncontrollers: [lqr]\n", "controllers: lqr; there are: pid"),
+        ("plant: three_axis\nreference: {kind: circle}\n", "reference.kind is 'circle'"),
+        ("plant: three_axis\nbandwidth: 0\n", "bandwidth is 0; it must be a finite number above 0"),
+        (
+            "plant: three_axis\nreference: {kind: places}\n",
+            "reference.places must be two or more places of 3",
+        ),
+        (
+            "plant: three_axis\nreference: {kind: places, places: [[0, 0, 0], [0, 0, 0]]}\n",
+            "reference.places: place 2 is the same",
+        ),
+        ("plant: three_axis\nreference: {unit: 1.0}\n", "joint 1 would go from"),
+        ("plant: three_axis\nreference: {periods: 0}\n", "reference.periods is 0"),
+        ("plant: scara\n", "reference: the paper's is for 3 joints; scara has 4"),
+        ("plant: three_axis\nrandom_seed: soon\n", "random_seed is 'soon'; it must be a whole number"),
+        (OWN.replace("three_axis", "nowhere"), "own_plant: arm: .*no such file"),
+        (OWN.replace("arm: three_axis", "arm: scara"), "friction has 3 joints; scara has 4"),
+        (
+            OWN.replace("coulomb: 0.8", "coulomb: 8.0"),
+            "friction of joint 1: static 1.0 must be at least coulomb",
+        ),
+        (OWN.replace("viscous", "viscosity"), r"friction\[1\]: field 'viscosity' is unknown"),
+        (OWN + "  time_step: 0.5\n", "time_step is 0.5; it must be"),
+        (OWN + "  encoder_counts: -1\n", "encoder_counts is -1"),
+        (
+            OWN + "  ranges: {lower: [0], upper: [1], velocity: [1], acceleration: [1]}\n",
+            "ranges.lower has 1 numbers",
+        ),
+        ("[1, 2]\n", "must be a mapping"),
+        ("plant: [\n", "unreadable YAML"),
+    ],
+)
+def test_faults_are_told_in_one_line(tmp_path, text, message):
+    with pytest.raises(ScenarioError, match=message) as caught:
+        load(tmp_path, text)
+    assert "mine.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_names_are_told():
+    with pytest.raises(ScenarioError, match="no such scenario"):
+        load_tracking("nowhere.yaml")
+    with pytest.raises(ScenarioError, match="there are: dwell, paper, quick"):
+        load_plan("huge")
+    with pytest.raises(ScenarioError, match="there are: scara, three_axis"):
+        load_plant("puma")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "three_axis_tracking",
+        "scara_pick_and_place",
+        "ur10e_tracking",
+        "payload_pickup",
+        "friction_wear",
+        "torque_limits",
+    ],
+)
+def test_the_scenarios_script_is_the_command(monkeypatch, name):
+    calls = []
+    monkeypatch.setattr("armloop.cli.main", lambda arguments: calls.append(arguments) or 0)
+    monkeypatch.setattr("sys.argv", [f"{name}.py", "--model", "step3=mine.json"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(scenario_path(name).with_suffix(".py")), run_name="__main__")
+    assert ended.value.code == 0
+    assert calls == [["track", name, "--model", "step3=mine.json"]]

@@ -1,0 +1,198 @@
+"""Tracking with an exact model: the loop itself, without the errors of a reconstruction."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exact_model import ExactModel
+from exact_parts import scara_terms
+from numpy.testing import assert_allclose
+from pydrake.systems.framework import DiagramBuilder
+
+from armloop.drake.control.controllers import LISTED
+from armloop.drake.experiments.scenarios import load_tracking
+from armloop.drake.experiments.tracking import add_controlled_arm, controllers_for, run_tracking, track
+from armloop.drake.plant.exact import exact_model
+from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.experiment.excitation import FourierReference
+from armloop.model.components import SparseTerms
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return load_tracking("three_axis_tracking")
+
+
+@pytest.fixture(scope="module")
+def exact(scenario):
+    return ExactModel(scenario.plant.arm, scenario.plant.config.friction)
+
+
+@pytest.fixture(scope="module")
+def short(scenario):
+    """The same loop for two seconds."""
+    reference = dataclasses.replace(scenario.reference, duration=2.0)
+    return dataclasses.replace(scenario, reference=reference, score=(1.0, 2.0))
+
+
+@pytest.mark.slow
+def test_exact_model_gives_the_designs_figures(scenario, exact):
+    """Mean absolute errors in deg over the second period of 20 s; the paper has 1.10, 1.21, 1.23 for PID."""
+    results = run_tracking(scenario, {"model": exact})
+    assert list(results) == ["pid", "pid_step1", "pid_step3"]
+    assert_allclose(results["pid"].eta, [1.10, 1.21, 1.23], rtol=0.15)
+    assert_allclose(results["pid_step1"].eta, [0.63, 0.37, 0.70], rtol=0.1)
+    assert np.all(results["pid_step3"].eta < 0.005)
+    assert results["pid"].scored == slice(20_000, 40_000)
+
+
+def test_order_of_controllers_on_a_short_run(short, exact):
+    results = run_tracking(short, {"model": exact, "again": exact}, processes=2)
+    assert list(results) == ["pid", "pid_step1", "pid_step3", "pid_again"]
+    # Joint 2 carries the weight: in the first seconds the integrator has not yet taken it over.
+    assert results["pid"].eta[1] > 3 * results["pid_step1"].eta[1]
+    assert np.all(results["pid_step3"].eta < 0.01)
+    assert_allclose(results["pid_again"].eta, results["pid_step3"].eta)
+    assert results["pid"].unit == ("deg",) * 3
+
+
+def test_run_is_repeatable_and_consistent(short):
+    first, again = track(short, "pid", {}), track(short, "pid", {})
+    assert np.array_equal(first.q, again.q)
+    error = np.abs(np.rad2deg(first.q_ref - first.q))[first.scored]
+    assert_allclose(first.eta, error.mean(axis=0))
+    assert_allclose(first.largest, error.max(axis=0))
+    assert_allclose(first.rms, np.sqrt((error**2).mean(axis=0)))
+
+
+def test_an_undeclared_payload_costs_and_knowing_it_pays(short, exact):
+    payload = UndeclaredEffect("payload", None, {"mass": 0.5, "com": [0.02, 0.0, 0.0]})
+    knowing = ExactModel(short.plant.arm, short.plant.config.friction, [payload])
+    results = run_tracking(short, {"model": exact, "augmented": knowing}, [payload], processes=1)
+    assert results["pid_step3"].eta[1] > 0.5
+    assert np.all(results["pid_augmented"].eta < 0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("", "pid"),
+        ("model", "pid pid_step1 pid_step3"),
+        ("computed_torque", "pid computed_torque"),
+        ("step2", "pid pid_step2"),
+        ("step3", "pid pid_step3"),
+        ("step3 step1", "pid pid_step1 pid_step3"),
+        ("augmented", "pid pid_augmented"),
+        ("mine model step1", "pid pid_step1 pid_step3 pid_mine"),
+    ],
+)
+def test_controllers_that_have_a_model_run(short, given, expected):
+    assert controllers_for(short, dict.fromkeys(given.split())) == expected.split()
+
+
+def test_a_model_asked_for_runs_even_if_the_scenario_does_not_list_its_controller(short):
+    scenario = dataclasses.replace(short, controllers=("pid",))
+    assert controllers_for(scenario, dict.fromkeys(["step1", "model"])) == ["pid", "pid_step1"]
+
+
+def test_all_controllers_of_a_scenario(short):
+    """Exact inverse dynamics come first, computed torque with the same model is close, each with its metrics."""
+    brief = dataclasses.replace(
+        short,
+        controllers=LISTED,
+        reference=dataclasses.replace(short.reference, duration=0.6),
+        score=(0.1, 0.6),
+    )
+    assert controllers_for(brief, {}) == ["pid", "exact"]
+    model = exact_model(brief.plant.arm, brief.plant.config.friction)
+    results = run_tracking(brief, {"model": model})
+    assert list(results) == list(LISTED)
+    assert np.all(results["exact"].eta < 0.01) and np.all(results["computed_torque"].eta < 0.1)
+    assert_allclose(results["exact"].eta, results["pid_step3"].eta)
+    # without the inertia a little worse than with it, far better than without friction's shape
+    assert results["exact"].eta.mean() < results["pid_step2"].eta.mean() < results["pid_step1"].eta.mean()
+    metrics = results["pid"].metrics
+    rows = results["pid"].scored
+    assert_allclose(metrics.effort, np.sqrt((results["pid"].tau[rows] ** 2).mean(axis=0)))
+    assert np.all(metrics.stick <= 0.5)
+
+
+def test_computed_torque_is_as_stiff_as_pid_and_needs_every_inertia():
+    """A model that lacks the light vertical joint's inertia would leave that joint to itself."""
+    scenario = load_tracking("scara_pick_and_place")
+    arm, friction = scenario.plant.arm, scenario.plant.config.friction
+    *others, inertia = scara_terms(arm)
+    poor = SparseTerms(3, inertia.index, inertia.coefficients * [1.0, 1.0, 0.0, 1.0])
+    model = dataclasses.replace(exact_model(arm, friction), components=(*others, poor))
+    builder = DiagramBuilder()
+    law = add_controlled_arm(builder, scenario, "computed_torque", {"model": model}).controller
+    context = law.CreateDefaultContext()
+    q0 = scenario.reference.evaluate([0.0])[0][0]
+    for port, value in (("q_ref", q0), ("v_ref", 0 * q0), ("vdot_ref", 0 * q0)):
+        law.GetInputPort(port).FixValue(context, value)
+
+    def torque(q):
+        law.GetInputPort("state").FixValue(context, np.r_[q, 0 * q])
+        return law.GetOutputPort("tau").Eval(context)
+
+    h = 1e-5
+    stiffness = [(torque(q0 - h * e) - torque(q0 + h * e))[j] / (2 * h) for j, e in enumerate(np.eye(4))]
+    turning = [0, 1, 3]
+    assert_allclose(np.array(stiffness)[turning], scenario.gains.kp[turning], rtol=0.02)
+    # a tenth of the sampling rate is the most, 100 rad/s: 2000 N/m of 0.2 kg are just that
+    assert 1000 < stiffness[2] < 2010
+    stated = dataclasses.replace(scenario, bandwidth=20.0)
+    law = add_controlled_arm(DiagramBuilder(), stated, "computed_torque", {"model": model}).controller
+    assert_allclose(law._gains[0], 400.0)
+
+
+class Steps:
+    """A model that writes down which of its steps was asked for."""
+
+    def __init__(self):
+        self.asked = set()
+
+    def feedforward(self, q, v, vdot, step):
+        self.asked.add(step)
+        return np.zeros(3)
+
+
+def test_step1_and_step3_have_models_of_their_own(short):
+    blink = dataclasses.replace(
+        short, reference=dataclasses.replace(short.reference, duration=0.01), score=(0.0, 0.01)
+    )
+    models = {name: Steps() for name in ("model", "step1", "augmented")}
+    run_tracking(blink, models, processes=1)
+    assert {name: model.asked for name, model in models.items()} == {
+        "model": {3},
+        "step1": {1},
+        "augmented": {3},
+    }
+
+
+def test_a_controller_without_a_model_is_refused(short):
+    with pytest.raises(
+        ValueError, match="no model for the controller pid_step3; the models given are: step1"
+    ):
+        track(short, "pid_step3", {"step1": Steps()})
+
+
+def test_a_model_that_is_not_finite_stops_the_run(short):
+    class Broken:
+        def feedforward(self, q, v, vdot, step):
+            return np.full(3, np.nan)
+
+    with pytest.raises(RuntimeError, match="not finite"):
+        track(short, "pid_step3", {"model": Broken()})
+
+
+def test_integral_removes_a_constant_error(short):
+    """Held at a pose against gravity, the integrator takes over what the proportional part left."""
+    still = FourierReference(
+        np.array([0.0, 0.5, 0.3]), np.zeros((3, 1)), np.zeros((3, 1)), np.ones((3, 1)), 3.0
+    )
+    gains = dataclasses.replace(short.gains, ki=np.full(3, 80.0))
+    scenario = dataclasses.replace(short, reference=still, gains=gains, score=(2.5, 3.0))
+    result = track(scenario, "pid", {})
+    early, late = (np.abs(result.q_ref - result.q)[row, 1] for row in (200, -1))
+    assert late < 0.25 * early

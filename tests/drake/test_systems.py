@@ -1,0 +1,104 @@
+"""The small systems of the tracking loop: ports by name, laws by hand."""
+
+import numpy as np
+import pytest
+from exact_parts import model_of
+from numpy.testing import assert_allclose
+from pydrake.systems.framework import DiagramBuilder
+
+from armloop.drake.control.feedforward import Feedforward
+from armloop.drake.control.pid import PidController, PidGains
+from armloop.drake.control.reference import ReferenceSource
+from armloop.drake.experiments.closed_loop import add_arm_with_controller
+from armloop.drake.plant.nearest_friction import nearest_friction
+from armloop.experiment.excitation import paper_reference
+from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import load_arm
+
+
+class Recorder:
+    """A model that gives q + 10 v + 100 vdot, by steps."""
+
+    def feedforward(self, q, v, vdot, step):
+        return q + 10 * v * (step > 1) + 100 * vdot * (step > 2)
+
+
+@pytest.mark.parametrize(("step", "expected"), [(1, 1.0), (2, 21.0), (3, 321.0)])
+def test_feedforward_takes_the_reference_on_named_ports(step, expected):
+    system = Feedforward(Recorder(), step, n=2)
+    context = system.CreateDefaultContext()
+    for name, value in (("q_ref", 1.0), ("v_ref", 2.0), ("vdot_ref", 3.0)):
+        system.GetInputPort(name).FixValue(context, np.full(2, value))
+    assert_allclose(system.GetOutputPort("tau_ff").Eval(context), expected)
+
+
+def test_reference_source_holds_between_periods():
+    reference = paper_reference()
+    source = ReferenceSource(reference, 1e-2)
+    context = source.CreateDefaultContext()
+    for t, sampled in ((0.0, 0.0), (1.0, 1.0), (7.1302, 7.13), (100.0, 40.0)):
+        context.SetTime(t)
+        values = [source.GetOutputPort(name).Eval(context) for name in ("q_ref", "v_ref", "vdot_ref")]
+        assert_allclose(values, [row[0] for row in reference.evaluate(sampled)], atol=1e-12)
+
+
+def pid_torque(resolution, q=0.1):
+    pid = PidController(PidGains([80.0, 40.0], [8.0, 4.0], [2.0, 1.0]), 0.5, resolution)
+    context = pid.CreateDefaultContext()
+    pid.GetInputPort("q_ref").FixValue(context, [0.3, 0.0])
+    pid.GetInputPort("v_ref").FixValue(context, [1.0, 0.0])
+    pid.GetInputPort("tau_ff").FixValue(context, [5.0, -5.0])
+    pid.GetInputPort("state").FixValue(context, [q, 0.2, 0.4, -1.0])
+    context.SetDiscreteState(np.array([0.25, 0.5]))
+    updated = pid.EvalUniquePeriodicDiscreteUpdate(context).value()
+    return pid.GetOutputPort("tau").Eval(context), updated
+
+
+def test_pid_law_and_its_integral():
+    """Eq. (35): 80 e + 8 int + 2 de + ff, and the integral grows by e times the period."""
+    tau, integral = pid_torque(0.0)
+    assert_allclose(tau, [80 * 0.2 + 8 * 0.25 + 2 * 0.6 + 5.0, -40 * 0.2 + 4 * 0.5 + 1.0 - 5.0])
+    assert_allclose(integral, [0.25 + 0.5 * 0.2, 0.5 - 0.5 * 0.2])
+
+
+def test_pid_reads_q_through_the_encoder():
+    exact, _ = pid_torque(0.0, q=0.1)
+    coarse, _ = pid_torque(0.1, q=0.131)
+    assert_allclose(coarse, exact)
+
+
+@pytest.mark.parametrize(
+    "bad", [([80.0], [8.0], [-2.0]), ([80.0, 80.0], [8.0], [2.0]), ([np.inf], [8.0], [2.0])]
+)
+def test_gains_are_checked(bad):
+    with pytest.raises(ValueError, match="at least 0, one per joint"):
+        PidGains(*bad)
+
+
+def test_feedforward_knows_the_joints_of_its_model():
+    model = model_of(load_arm("three_axis"))
+    assert Feedforward(model).get_output_port().size() == 3
+    with pytest.raises(ValueError, match="knows its joints"):
+        Feedforward(model, 4)
+    with pytest.raises(ValueError, match="has 3 joints"):
+        Feedforward(model, n=1)
+    with pytest.raises(ValueError, match="say its number"):
+        Feedforward(Recorder())
+
+
+def test_a_controlled_arm_of_a_urdf_has_the_friction_of_its_model(repository):
+    urdf = repository / "urdf" / "three_axis.urdf"
+    model = model_of(load_arm(urdf))
+    gains, reference = PidGains.paper(3), paper_reference()
+    found = add_arm_with_controller(DiagramBuilder(), urdf, gains, reference, model).plant.friction
+    for f in found:
+        assert_allclose([f.static, f.coulomb, f.stribeck_velocity, f.viscous], [0.72, 0.55, 0.1, 2.65])
+    without = add_arm_with_controller(DiagramBuilder(), urdf, gains, reference).plant.friction
+    assert without != found
+    # a law of another form: the nearest of Eq. (34)
+    laws = (("hysteresis", 0.4, 1e-3), ("stribeck_peak", 0.3, 0.1), ("root", 0.2), ("viscous", 1.0))
+    other = tuple(FrictionTerm(*law) for law in laws)
+    v = np.linspace(0.05, 1.0, 50)
+    true = 0.4 + 0.3 * np.exp(-((v / 0.1) ** 2)) + 0.2 * np.sqrt(v) + v
+    for near in nearest_friction(model_of(load_arm(urdf), friction=other)):
+        assert np.abs(near.force(v) - true).max() < 0.05 * true.max()

@@ -1,0 +1,93 @@
+"""Loop margins against a loop solved by hand, and against what the simulated loop does."""
+
+import numpy as np
+import pytest
+from exact_parts import model_of
+from numpy.testing import assert_allclose
+from scipy.optimize import brentq
+
+from armloop.drake.control.pid import PidGains
+from armloop.drake.plant.friction import JointFriction
+from armloop.drake.tuning.loop_analysis import loop_margins, model_posture, posture_model
+from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import load_arm
+
+
+@pytest.fixture
+def flywheel(tmp_path):
+    """One joint, 0.1 kg m^2, no gravity load."""
+    path = tmp_path / "flywheel.urdf"
+    path.write_text(
+        """<robot name="flywheel"><link name="base"/><link name="wheel"><inertial><mass value="1"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="j" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 0
+        1"/></joint> </robot>"""
+    )
+    return load_arm(path)
+
+
+def test_flywheel_against_the_transfer_function(flywheel):
+    """A damped wheel with a held torque, solved by hand: v decays by a = exp(-d h / I) in one period."""
+    inertia, d, kp, ki, kd, h = 0.1, 2.0, 80.0, 8.0, 2.0, 1e-3
+    a = np.exp(-d * h / inertia)
+
+    def loop(w):
+        z = np.exp(1j * w * h)
+        velocity = (1 - a) / d / (z - a)
+        position = ((1 - a) * inertia / d * velocity + (h - (1 - a) * inertia / d) / d) / (z - 1)
+        return (kp + ki * h / (z - 1)) * position + kd * velocity
+
+    (margins,) = loop_margins(
+        flywheel, [JointFriction(viscous=d)], PidGains([kp], [ki], [kd]), [0.0], period=h
+    )
+    crossing = brentq(lambda w: abs(loop(w)) - 1, 1.0, 1e3)
+    assert margins.phase_margin == pytest.approx(180 + np.rad2deg(np.angle(loop(crossing))), abs=0.05)
+    assert margins.gain_margin == pytest.approx(-1 / loop(np.pi / h).real, rel=1e-3)
+    w = np.geomspace(0.01, 3000, 20000)
+    assert margins.sensitivity_peak == pytest.approx(np.abs(1 / (1 + loop(w))).max(), rel=1e-3)
+    assert abs(loop(margins.bandwidth) / (1 + loop(margins.bandwidth))) == pytest.approx(
+        np.sqrt(0.5), rel=0.02
+    )
+
+
+def test_posture_model_of_the_three_axis_arm():
+    """At zero, joint 2 stands at its largest gravity torque: no stiffness; hanging, it is a pendulum."""
+    arm = load_arm("three_axis")
+    friction = [JointFriction(viscous=v) for v in (2.65, 1.82, 3.14)]
+    M, F, G = posture_model(arm, friction, [0, 0, 0])
+    assert_allclose(G, 0, atol=1e-6)
+    assert_allclose(np.diag(F), [2.65, 1.82, 3.14])
+    assert_allclose(M, M.T)
+    _, _, G = posture_model(arm, friction, [0, -np.pi / 2, 0])
+    assert_allclose(G[1, 1], 7.377120, rtol=1e-5)
+
+
+def test_friction_of_an_identified_model_is_linearised_by_its_derivative():
+    arm = load_arm("three_axis")
+    law = [
+        ("sign", 0.6, 0.0),
+        ("viscous", 0.5, 0.0),
+        ("quadratic", 0.3, 0.0),
+        ("root", 0.2, 0.0),
+        ("viscous_forward", 0.4, 0.0),
+    ]
+    model = model_of(arm, friction=tuple(FrictionTerm(kind, c, p) for kind, c, p in law))
+    M, F, G = model_posture(model, [0.1, 0.3, -0.5])
+    # At 1 rad/s: c, 2 c v, c / (2 sqrt(v)), and c one way alone.
+    assert_allclose(F, (0.5 + 0.6 + 0.1 + 0.2) * np.eye(3), atol=1e-6)
+    truth = posture_model(arm, [JointFriction()] * 3, [0.1, 0.3, -0.5])
+    assert_allclose(M, truth[0], atol=1e-9)
+    assert_allclose(G, truth[2], atol=1e-4)
+
+
+def test_the_papers_gains_are_comfortable():
+    arm = load_arm("three_axis")
+    friction = [JointFriction(viscous=v) for v in (2.65, 1.82, 3.14)]
+    margins = loop_margins(arm, friction, PidGains.paper(3), [0.0, 0.3, -0.5])
+    assert all(m.phase_margin > 35 and m.gain_margin > 2 and m.sensitivity_peak < 2 for m in margins)
+    assert all(10 < m.bandwidth < 1000 for m in margins)
+    # With a derivative gain of 200 N*m*s/rad at 1 kHz joint 3 rings up: its gains must shrink, however
+    # little.
+    wild = loop_margins(arm, friction, PidGains([80.0] * 3, [8.0] * 3, [200.0] * 3), [0.0, 0.3, -0.5])
+    assert wild[2].gain_margin == np.inf
+    assert 0.02 < wild[2].gain_reduction < 0.5

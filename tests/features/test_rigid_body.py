@@ -1,0 +1,143 @@
+"""Base parameters: counts known from the literature, torques kept exactly, readable sums, the three steps."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion
+from armloop.features.rigid_body import BaseParameters, full_columns, parameter_names
+from armloop.robot.arm import Arm, Joint, load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+
+UR10E = Path(__file__).parents[3] / "shared" / "data" / "ur10e" / "ur10e.urdf"
+
+
+def an_arm(kinds, poses, axes, gravity=(0.0, 0.0, -9.81)):
+    n = len(kinds)
+    rng = np.random.default_rng(1)
+    X_PF = np.tile(np.eye(4), (n, 1, 1))
+    X_PF[:, :3, 3] = poses
+    mass, com = rng.uniform(1, 3, n), rng.uniform(-0.2, 0.2, (n, 3))
+    shifted = [m * ((c @ c) * np.eye(3) - np.outer(c, c)) for m, c in zip(mass, com, strict=True)]
+    return Arm(
+        name="test",
+        joints=tuple(Joint(f"joint{i + 1}", kind) for i, kind in enumerate(kinds)),
+        X_PF=X_PF,
+        axis=np.array(axes, dtype=float),
+        mass=mass,
+        com=com,
+        inertia=np.array(shifted) + 0.02 * np.eye(3),
+        gravity=np.array(gravity),
+    )
+
+
+def upright_pendulum(gravity=(0.0, 0.0, -9.81)):
+    """Two links in a vertical plane, the second 0.5 m along x of the first."""
+    return an_arm(["revolute"] * 2, [[0, 0, 0], [0.5, 0, 0]], [[0, 1, 0]] * 2, gravity)
+
+
+def scara():
+    poses, axes = [[0, 0, 0.3], [0.4, 0, 0], [0.3, 0, 0], [0, 0, 0]], [[0, 0, 1]] * 4
+    return an_arm(["revolute", "revolute", "prismatic", "revolute"], poses, axes)
+
+
+def some_motion(n, samples=40, seed=5):
+    q, v, vdot = np.random.default_rng(seed).normal(size=(3, samples, n))
+    return Motion(np.arange(float(samples)), q, v, vdot, np.array([0]))
+
+
+def test_two_links_in_a_plane_by_hand():
+    base = BaseParameters.of_arm(upright_pendulum())
+    assert base.names == ["mx1 + 0.5 m2", "mz1", "Iyy1 + 0.25 m2", "mx2", "mz2", "Iyy2"]
+
+
+def test_rotor_inertias_merge_where_the_link_already_shows_them():
+    base = BaseParameters.of_arm(upright_pendulum(), rotors=True)
+    assert base.names[2] == "Iyy1 + 0.25 m2 + J1"
+    assert base.names[-1] == "J2"  # rotor 2 is not felt at joint 1, link 2's inertia is
+    assert base.count == 7
+
+
+def test_without_gravity_a_first_moment_about_the_first_axis_is_not_seen():
+    base = BaseParameters.of_arm(upright_pendulum(gravity=(0.0, 0.0, 0.0)))
+    assert base.names == ["Iyy1 + 0.25 m2", "mx2", "mz2", "Iyy2"]
+
+
+@pytest.mark.parametrize("make", [upright_pendulum, scara])
+@pytest.mark.parametrize("rotors", [False, True])
+def test_torques_are_kept_exactly(make, rotors):
+    arm = make()
+    base = BaseParameters.of_arm(arm, rotors=rotors)
+    motion = some_motion(arm.n)
+    full = np.concatenate([nominal_parameters(arm), 0.1 * np.arange(1, arm.n + 1) if rotors else []])
+    tau = full_columns(arm, motion, rotors) @ full
+    columns = base.columns(arm, motion)
+    np.testing.assert_allclose(columns @ base.from_full(full), tau, atol=1e-10)
+    assert np.linalg.matrix_rank(columns.reshape(-1, base.count), tol=1e-6) == base.count
+
+
+def test_full_parameters_come_back_with_the_same_base():
+    arm = scara()
+    base = BaseParameters.of_arm(arm)
+    full = nominal_parameters(arm)
+    values = base.from_full(full)
+    np.testing.assert_allclose(base.from_full(base.to_full(values)), values, atol=1e-12)
+    np.testing.assert_allclose(base.to_full(values, nominal=full), full, atol=1e-12)
+
+
+def test_the_three_steps_add_up_and_are_what_they_say():
+    arm = scara()
+    base = BaseParameters.of_arm(arm, rotors=True)
+    motion = some_motion(arm.n)
+    gravity, velocity, acceleration = base.step_columns(arm, motion)
+    np.testing.assert_allclose(gravity + velocity + acceleration, base.columns(arm, motion), atol=1e-12)
+    doubled = Motion(motion.time, motion.q, 2 * motion.v, 3 * motion.vdot, motion.starts)
+    gravity2, velocity2, acceleration2 = base.step_columns(arm, doubled)
+    np.testing.assert_allclose(gravity2, gravity, atol=1e-12)
+    np.testing.assert_allclose(velocity2, 4 * velocity, atol=1e-10)
+    np.testing.assert_allclose(acceleration2, 3 * acceleration, atol=1e-10)
+
+
+def test_a_motion_that_excites_one_joint_tells_less_apart():
+    arm = upright_pendulum()
+    motion = some_motion(2)
+    still = np.array([[0.0, 1.0]])
+    one_joint = Motion(motion.time, motion.q * still, motion.v * still, motion.vdot * still, motion.starts)
+    seen = BaseParameters.of_columns(full_columns(arm, one_joint), tolerance=1e-6)
+    assert seen.count < BaseParameters.of_arm(arm).count
+    full = nominal_parameters(arm)
+    tau = full_columns(arm, one_joint) @ full
+    np.testing.assert_allclose(seen.columns(arm, one_joint) @ seen.from_full(full), tau, atol=1e-9)
+
+
+def test_an_exciting_motion_tells_as_much_apart_as_there_is():
+    arm = scara()
+    seen = BaseParameters.of_columns(full_columns(arm, some_motion(4, samples=300)), tolerance=1e-8)
+    assert seen.count == BaseParameters.of_arm(arm).count
+
+
+def test_the_same_arm_always_gives_the_same_sums():
+    first, second = BaseParameters.of_arm(scara()), BaseParameters.of_arm(scara())
+    np.testing.assert_array_equal(first.kept, second.kept)
+    np.testing.assert_array_equal(first.grouping, second.grouping)
+    other_motion = BaseParameters.of_arm(scara(), seed=9)
+    np.testing.assert_array_equal(first.kept, other_motion.kept)
+    np.testing.assert_allclose(first.grouping, other_motion.grouping, atol=1e-9)
+
+
+def test_names_of_full_parameters():
+    assert parameter_names(2, rotors=True)[::10] == ["m1", "m2", "J1"]
+
+
+@pytest.mark.skipif(
+    not UR10E.exists(), reason="the measured UR10e set is not beside the project (../shared/data)"
+)
+def test_a_ur10e_has_thirty_six_base_parameters():
+    arm = load_arm(UR10E)
+    base = BaseParameters.of_arm(arm)
+    assert base.count == 36
+    motion = some_motion(arm.n)
+    full = nominal_parameters(arm)
+    tau = regressor(arm, motion.q, motion.v, motion.vdot) @ full
+    np.testing.assert_allclose(base.columns(arm, motion) @ base.from_full(full), tau, atol=1e-7)

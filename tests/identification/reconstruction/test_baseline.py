@@ -1,0 +1,31 @@
+"""The baseline a later run is weighed by comes from the condition that the model explains worst."""
+
+import numpy as np
+import pytest
+from synthetic import rigid_torque, three_axis
+
+from armloop.data.motion import Motion, Samples
+from armloop.identification.reconstruction import Options
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.tally import Tally
+from armloop.laws.friction import FrictionLaw
+from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
+
+
+def test_easy_data_do_not_make_the_baseline_look_better():
+    arm = three_axis()
+    body = RigidBody(nominal_parameters(arm), ("m1",), np.ones(1))
+    model = ReconstructedModel(arm, (body,), FrictionLaw(((), (), ())))
+    q, v, vdot = np.random.default_rng(1).uniform(-1, 1, (3, 400, 3))
+    motion = Motion(np.arange(400.0), q, v, vdot, np.array([0]))
+    labels = np.repeat([1, 3], 200)
+    error = np.where(labels == 3, 0.5, 0.01)[:, None]
+    samples = Samples(motion, rigid_torque(arm, q, v, vdot) + error, np.ones((400, 3), dtype=bool), 1.0)
+    held_out = np.arange(400) % 2 == 0
+    chunk = Chunk.of(samples, Options(), held_out=held_out)
+    sorted_out = Tally.of(chunk, model, lambda motion: labels)
+    assert sorted_out.baseline()["rmse"] == pytest.approx([0.5] * 3)
+    together = Tally.of(chunk, model, None).baseline()["rmse"]
+    assert together == pytest.approx([np.sqrt((0.5**2 + 0.01**2) / 2)] * 3)

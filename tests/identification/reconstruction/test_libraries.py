@@ -1,0 +1,262 @@
+"""Where no library is asked for, the best that is an arm is taken, on blocks that judge nothing else."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import conditioned_samples, fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess
+from armloop.dynamics import check_physics
+from armloop.dynamics.physics import PhysicsChecks
+from armloop.features.lagrangian import candidates as energies
+from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.libraries import (
+    LIBRARIES,
+    Contender,
+    candidates,
+    choose,
+    comparison_notes,
+    contender,
+    named,
+)
+from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
+from armloop.identification.reconstruction.stepwise import stepwise
+from armloop.model import ReconstructedModel
+from armloop.regression.sparse import Sparse
+from armloop.robot.arm import Arm
+from armloop.util.errors import ExcitationError, InputError
+from armloop.util.progress import silent
+
+OPTIONS = Options(standard_errors=False)
+PLAIN = Options(standard_errors=False, parts=False)
+GOOD = PhysicsChecks(0.1, (0.0,), 0.0, 0.0, (0.0,), (0.0,), (0.0,), None)
+BAD = replace(GOOD, least=-0.1, negative=0.3)
+
+
+def a_run(seed: int) -> MotionLog:
+    motion = fourier_motion(24.0, 125.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    return measured(motion, tau, seed)
+
+
+@pytest.fixture(scope="module")
+def logs() -> list[MotionLog]:
+    return [a_run(1), a_run(2)]
+
+
+@pytest.fixture(scope="module")
+def result(logs: list[MotionLog]) -> Reconstruction:
+    # low orders: the waves of the first order alone cannot describe this arm, and are quick to regress
+    import armloop.identification.reconstruction.stepwise as room
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(room, "_orders", lambda revolute, parts, second, options: ((1, second[-1]),))
+        return reconstruct(logs, three_axis(), options=OPTIONS)
+
+
+def entry(
+    library: str, nrmse: float, coefficients: int, checks: PhysicsChecks, spread: float = 0.0
+) -> Contender:
+    noise = spread * np.random.default_rng(len(library)).normal(size=12)
+    made = SimpleNamespace()
+    kind: Any = SimpleNamespace(name=library)
+    return Contender(kind, made, "", (nrmse,), coefficients, checks, nrmse**2 + noise)  # type: ignore[arg-type]
+
+
+def taken(*entries: Contender) -> str:
+    (one,) = [entry.name for entry in choose(entries) if entry.chosen]
+    return one
+
+
+def test_all_three_are_compared_and_the_report_says_so(result: Reconstruction) -> None:
+    assert [one.name for one in result.libraries] == ["double-feature-set", "rigid-body", "lagrangian"]
+    assert result.model.history["library"] == "rigid-body" and "library rigid-body" in result.notes[0]
+    answer = result.to_dict()["libraries"]
+    assert [one["chosen"] for one in answer] == [False, True, False]
+    for one in answer:
+        assert one["coefficients"] > 10 and len(one["selection_nrmse"]) == 3
+        assert {"passed", "mass_matrix", "friction", "yaw", "faults"} <= set(one["physics"])
+    assert check_physics(result.model).passed and answer[1]["physics"]["passed"]
+
+
+def test_what_is_no_arm_is_not_taken_however_little_it_leaves() -> None:
+    assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, GOOD)) == "b"
+    # none is: the best one, with its faults told
+    assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, BAD)) == "a"
+
+
+def test_fewer_coefficients_are_taken_where_the_difference_is_within_its_scatter() -> None:
+    apart = entry("many", 0.020, 40, GOOD), entry("few", 0.022, 15, GOOD)
+    assert taken(*apart) == "many"
+    alike = entry("many", 0.020, 40, GOOD, 1e-3), entry("few", 0.0201, 15, GOOD, 1e-3)
+    assert taken(*alike) == "few"
+
+
+def test_a_library_that_the_logs_do_not_carry_is_left_out_with_the_reason() -> None:
+    def refused(library: str):
+        raise ExcitationError("the motion leaves 9 of 12 inertial parameters undetermined")
+
+    out = contender(named("lagrangian"), refused)
+    assert taken(out, entry("b", 0.02, 9, GOOD)) == "b"
+    assert out.to_dict() == {"library": "lagrangian", "chosen": False, "refused": out.refused}
+    with pytest.raises(InputError, match="lagrangian: the motion leaves 9 of 12"):
+        choose([out])
+
+
+def test_a_library_is_one_object(logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever registers one has it chosen by name, compared where it suits, and told what it does not know."""
+
+    class Own(RigidBodyLibrary):
+        name = "own"
+        own_friction = "its friction is its own"
+
+        def suits(self, arm: Arm) -> bool:
+            return arm.n < 3
+
+    monkeypatch.setitem(LIBRARIES, "own", Own())
+    found = reconstruct(logs[:1], three_axis(), library="own", options=PLAIN)
+    assert found.model.history["library"] == "own" and [one.name for one in found.libraries] == ["own"]
+    assert "own" not in [one.name for one in candidates(three_axis(), PLAIN)]
+    with pytest.raises(
+        InputError, match=r"its friction is its own; laws are chosen with --library rigid-body or lag"
+    ):
+        reconstruct(logs, three_axis(), library="own", options=replace(PLAIN, friction=("viscous",)))
+    with pytest.raises(
+        InputError, match=r"method 'sindy' works on the library double-feature-set, not on 'own'"
+    ):
+        reconstruct(logs, three_axis(), method="sindy", library="own")
+
+
+def test_a_library_of_more_candidates_than_independent_torques_is_not_tried() -> None:
+    """Torque below 5 Hz takes 20 values a second: three joints' in one second are fewer than the energies' candidates."""
+    log = a_run(1)
+    short = log.select(slice(0, int(1 / log.period)))
+    why = named("lagrangian").undetermined(three_axis(), [short], 5.0)
+    assert why == f"{energies(three_axis()).count} candidates, but 59 independent values of torque"
+    assert named("lagrangian").undetermined(three_axis(), [log], 5.0) == ""
+    assert named("rigid-body").undetermined(three_axis(), [short], 5.0) == ""
+    note, *_ = comparison_notes(
+        [
+            Contender(named("rigid-body"), SimpleNamespace(), chosen=True),
+            Contender(named("lagrangian"), refused=why),
+        ]  # type: ignore[arg-type]
+    )
+    assert note.startswith(
+        "library rigid-body: the only one that the logs can determine; lagrangian not tried ("
+    )
+
+
+def test_blocks_choose_the_library_or_judge_the_model_and_neither_is_fitted(logs: list[MotionLog]) -> None:
+    samples = preprocess(logs, three_axis_conditioning())
+    chunk = Chunk.of(samples, OPTIONS)
+    selection, test = chunk.judging("selection"), chunk.judging("test")
+    assert selection.any() and test.any() and not (selection & test).any()
+    np.testing.assert_array_equal(selection | test, chunk.held_out)
+    assert not (chunk.validation & chunk.held_out).any()
+    # judges keep away from samples that were fitted or chose
+    near = chunk.judging("test", 0.2)
+    time, others = samples.motion.time, np.flatnonzero(~test)
+    run = np.searchsorted(samples.motion.starts, np.arange(len(time)), side="right")
+    for k in np.flatnonzero(near)[::7]:
+        same = others[run[others] == run[k]]
+        assert np.abs(time[same] - time[k]).min() > 0.2
+
+
+def three_axis_conditioning():
+    from armloop.identification.reconstruction.reconstruct import default_conditioning
+
+    return default_conditioning("rigid-body")
+
+
+def test_nothing_that_is_chosen_or_fitted_sees_the_blocks_that_judge(
+    logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Torques of the blocks that judge are replaced by noise: not a digit of what judges the libraries changes."""
+    seen: dict[bool, list[Contender]] = {}
+    original = Chunk.of
+
+    def run(spoil: bool) -> Reconstruction:
+        def of(samples, options, first=0, held_out=None):
+            chunk = original(samples, options, first, held_out)
+            if not spoil:
+                return chunk
+            rows = chunk.judging("test")
+            tau = np.where(
+                rows[:, None], 50 * np.random.default_rng(0).normal(size=samples.tau.shape), samples.tau
+            )
+            return original(replace(samples, tau=tau), options, first, held_out)
+
+        monkeypatch.setattr(Chunk, "of", staticmethod(of))
+        found = reconstruct(logs, three_axis(), options=replace(OPTIONS, friction=("coulomb", "viscous")))
+        seen[spoil] = found.libraries
+        return found
+
+    plain, spoilt = run(False), run(True)
+    for a, b in zip(seen[False], seen[True], strict=True):
+        assert a.nrmse == b.nrmse and a.chosen == b.chosen
+        assert a.attempt is not None and b.attempt is not None
+        for one, other in zip(a.attempt.found.components, b.attempt.found.components, strict=True):
+            assert one.to_dict() == other.to_dict()
+        assert a.attempt.found.friction == b.attempt.found.friction
+    assert min(spoilt.held_out.moving["rmse"]) > 20 * max(plain.held_out.moving["rmse"])
+
+
+def test_a_condition_with_too_few_samples_does_not_end_it() -> None:
+    samples = conditioned_samples((400, 400, 400), noise=0.01)
+    moving = samples.moving.copy()
+    moving[:398, 1] = False  # of the static samples joint 2 has two
+    found = stepwise(
+        three_axis(),
+        replace(samples, moving=moving),
+        np.zeros(len(moving), dtype=bool),
+        Options(max_order=1),
+        silent,
+    )
+    (note,) = [note for note in found.notes if "regressed together instead" in note]
+    assert "step 1: joint 2 has 2 usable samples, at least 30 are needed" in note
+    assert [report.step for report in found.reports] == [1, 2, 3]
+
+
+def test_checks_find_what_is_no_arm(result: Reconstruction) -> None:
+    model = result.model
+    body = model.components[0]
+    upside = replace(model, components=(replace(body, parameters=-body.parameters),))  # type: ignore[type-var]
+    checks = check_physics(upside)
+    assert (
+        not checks.definite
+        and checks.negative > 0.5
+        and "M(q) is not positive definite at" in checks.faults()[0]
+    )
+    law = replace(
+        model.friction,
+        terms=tuple(
+            tuple(replace(t, coefficient=-t.coefficient) for t in terms) if j == 1 else terms
+            for j, terms in enumerate(model.friction.terms)
+        ),
+    )
+    drives = check_physics(replace(model, friction=law))
+    assert drives.definite and not drives.passive and drives.driving[1] > 0.5 and drives.driving[2] == 0
+    assert any("friction drives joint 2" in line for line in drives.faults())
+
+
+def test_a_double_feature_set_that_turns_with_the_base_or_pulls_unevenly_is_told(
+    result: Reconstruction,
+) -> None:
+    waves = next(one.attempt for one in result.libraries if one.name == "double-feature-set")
+    assert waves is not None
+    made = waves.model()
+    assert isinstance(made, ReconstructedModel)
+    checks = check_physics(made)
+    assert not checks.passed and checks.faults()
+
+
+def test_what_only_the_double_feature_set_knows_asks_for_it() -> None:
+    assert not Options(folds=4, physical=False).of_double_feature_set
+    assert (
+        Options(sparse=Sparse("lasso")).of_double_feature_set and Options(max_order=1).of_double_feature_set
+    )

@@ -1,0 +1,50 @@
+"""What a step regresses: what is left of a torque that passed a filter, by friction that passed it, too."""
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, three_axis
+
+from armloop.data.motion import Samples
+from armloop.data.signals import smooth
+from armloop.features.double_feature_set import Factors
+from armloop.features.wave_moments import WaveProducts
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.found import Found
+from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.sums import Choice, Columns
+from armloop.laws.friction import FrictionTerm
+
+LAW = [FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0), FrictionTerm("stribeck", -0.2, 0.1)]
+
+
+@pytest.fixture(scope="module")
+def chunk() -> Chunk:
+    """Reversing joints whose torque is friction alone, as a filter of 10 Hz leaves it."""
+    motion = fourier_motion(10.0, 250.0, 1)
+    moving = np.ones_like(motion.q, dtype=bool)
+    samples = Samples(motion, np.zeros_like(motion.q), moving, 1 / 250, cutoff_hz=10.0)
+    tau = smooth(samples, Found(three_axis(), friction=[LAW] * 3).law.torque(motion))
+    return Chunk.of(Samples(motion, tau, moving, 1 / 250, cutoff_hz=10.0), Options())
+
+
+def test_a_step_inherits_friction_as_the_filter_smears_it(chunk: Chunk) -> None:
+    usable = Choice(None, (1, 2, 3), Found(three_axis(), friction=[LAW] * 3))(chunk)
+    assert len(usable.tau) > 100
+    assert np.abs(usable.rest).max() < 1e-12
+    # what is not smeared is off by much of the step where a joint reverses
+    rough = usable.tau - Found(three_axis(), friction=[LAW] * 3).law.torque(usable.motion)
+    assert np.abs(rough).max() > 0.3
+
+
+def test_friction_columns_are_smeared_like_the_torque(chunk: Chunk) -> None:
+    usable = Choice(None, (1, 2, 3), Found(three_axis(), friction=[[], [], []]))(chunk)
+    columns = Columns(WaveProducts(Factors(3, ()), np.zeros((0, 1), dtype=np.intp)), (tuple(LAW),) * 3)
+    beside = columns.beside(usable)
+    assert beside.shape == (len(usable.tau), 9)
+    weights = np.array([term.coefficient for term in LAW])
+    for j in range(3):
+        own = beside[:, columns.span(j)]
+        np.testing.assert_allclose(own @ weights, usable.tau[:, j], atol=1e-12)
+        np.testing.assert_allclose(columns.chosen(usable, j, np.arange(3)), own, atol=1e-14)
+        some = usable.take(np.arange(5, 50))
+        np.testing.assert_allclose(columns.chosen(some, j, np.arange(3)), own[5:50], atol=1e-14)

@@ -1,0 +1,71 @@
+"""Scores are RMSE and nRMSE per joint, with standstill apart from motion."""
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import LowPass
+from armloop.identification.scoring import residual, score
+from armloop.laws.friction import FrictionLaw
+from armloop.model import ReconstructedModel
+from armloop.model.components import SparseTerms
+
+
+def constant_model(level: float = 1.0) -> ReconstructedModel:
+    """Predicts the same torque on every joint, whatever the motion."""
+    terms = SparseTerms(1, np.array([[0]]), np.full((1, 3), level))
+    return ReconstructedModel(three_axis(), (terms,), FrictionLaw(((), (), ())))
+
+
+def samples_of(tau: np.ndarray, moving: np.ndarray, cutoff_hz: float = 0.0) -> Samples:
+    zero = np.zeros_like(tau)
+    motion = Motion(np.arange(len(tau)) * 0.02, zero, zero, zero, np.array([0]))
+    return Samples(motion, tau, moving, 0.02, cutoff_hz)
+
+
+def test_scores_by_hand():
+    tau = np.array([[1.0, 4, 1], [1, -2, 1], [5, 1, 1], [9, 1, 1]])
+    moving = np.array([[1, 1, 1], [1, 1, 1], [0, 1, 1], [0, 0, 1]], dtype=bool)
+    result = score(constant_model(), samples_of(tau, moving))
+    # joint 1 moves in two rows without error and stands with errors 4 and 8
+    assert result.moving["rmse"] == pytest.approx([0.0, np.sqrt((9 + 9) / 3), 0.0])
+    assert result.standstill["rmse"][0] == pytest.approx(np.sqrt((16 + 64) / 2))
+    assert result.standstill["rmse"][1] == pytest.approx(0.0)
+    assert result.standstill["rmse"][2] is None and result.standstill["nrmse"][2] is None
+    assert result.overall["rmse"][0] == pytest.approx(np.sqrt(80 / 4))
+    assert result.moving["nrmse"][1] == pytest.approx(np.sqrt(18 / 3) / np.sqrt((16 + 4 + 1) / 3))
+    assert result.rms == pytest.approx([1.0, np.sqrt(7), 1.0])
+    assert result.samples == 4
+
+
+def test_some_rows_only():
+    tau = np.array([[1.0, 1, 1], [3, 1, 1], [1, 1, 1]])
+    result = score(
+        constant_model(), samples_of(tau, np.ones_like(tau, dtype=bool)), np.array([False, True, False])
+    )
+    assert result.samples == 1
+    assert result.overall["rmse"] == pytest.approx([2.0, 0.0, 0.0])
+    assert result.overall["nrmse"][0] == pytest.approx(2 / 3)
+
+
+def test_the_answer_has_the_published_shape():
+    answer = score(constant_model(), samples_of(np.ones((30, 3)), np.ones((30, 3), dtype=bool))).to_dict()
+    assert set(answer) == {"rmse", "nrmse", "moving", "standstill", "samples"}
+    assert set(answer["moving"]) == set(answer["standstill"]) == {"rmse", "nrmse"}
+
+
+def test_a_torque_that_is_zero_has_no_relative_error():
+    result = score(constant_model(), samples_of(np.zeros((30, 3)), np.ones((30, 3), dtype=bool)))
+    assert result.overall["rmse"] == pytest.approx([1.0] * 3) and result.overall["nrmse"] == [None] * 3
+
+
+def test_the_prediction_passes_the_filter_of_the_measurement():
+    rng = np.random.default_rng(0)
+    q = np.sign(rng.normal(size=(200, 3)))
+    terms = SparseTerms(1, np.array([[7], [8], [9]]), np.eye(3))  # tau = q
+    model = ReconstructedModel(three_axis(), (terms,), FrictionLaw(((), (), ())))
+    motion = Motion(np.arange(200) * 0.02, q, 0 * q, 0 * q, np.array([0]))
+    smeared = LowPass(5.0, 0.02)(q)
+    samples = Samples(motion, smeared, np.ones_like(q, dtype=bool), 0.02, 5.0)
+    np.testing.assert_allclose(residual(model, samples), 0.0, atol=1e-12)

@@ -1,0 +1,73 @@
+"""Correlation times are those of the process, across gaps and through samples left out."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from armloop.data.motion import Motion
+from armloop.identification.uncertainty.blocking import (
+    block_length,
+    correlation_time,
+    covered_time,
+    independent_blocks,
+)
+
+
+def motion(lengths, period=0.01):
+    N = sum(lengths)
+    starts = np.cumsum([0, *lengths[:-1]])
+    return Motion(np.arange(N) * period, *np.zeros((3, N, 1)), starts)
+
+
+def noise(N, seconds, period=0.01, seed=0):
+    a = np.exp(-period / seconds)
+    return lfilter([np.sqrt(1 - a**2)], [1, -a], np.random.default_rng(seed).normal(size=N))
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.3])
+def test_exponential_correlation(seconds):
+    x = noise(40000, seconds)
+    found = correlation_time(x, np.ones(len(x), bool), motion([len(x)]), 0.01)
+    assert found == pytest.approx(2 * seconds, rel=0.15)
+
+
+def test_white_noise_is_correlated_over_one_sample_or_over_the_distance_of_those_used():
+    x = np.random.default_rng(0).normal(size=20000)
+    every = np.ones(len(x), bool)
+    assert correlation_time(x, every, motion([len(x)]), 0.01) == pytest.approx(0.01, rel=0.1)
+    tenth = np.arange(len(x)) % 10 == 0
+    assert correlation_time(x, tenth, motion([len(x)]), 0.01) == pytest.approx(0.1, rel=0.1)
+
+
+def test_gaps_and_samples_left_out_do_not_matter():
+    cut = []
+    for seed in range(4):
+        x, used = noise(40000, 0.1, seed=seed), np.random.default_rng(seed).uniform(size=40000) < 0.5
+        cut.append(correlation_time(np.where(used, x, 99.0), used, motion([400] * 100), 0.01))
+    assert np.mean(cut) == pytest.approx(0.2, rel=0.15)
+
+
+def test_pairs_never_reach_across_a_gap():
+    # two runs, each constant: within them all is correlated, across them nothing may be known
+    x = np.where(np.arange(2000) < 1000, 1.0, -1.0)
+    found = correlation_time(x, np.ones(2000, bool), motion([1000, 1000]), 0.01)
+    assert found == pytest.approx(2 * 500 * 0.01, rel=0.01)  # up to the longest lag looked at
+
+
+def test_blocks_are_ten_correlation_times_unless_there_would_be_too_few():
+    assert block_length(1.0, 1000.0) == pytest.approx(10.0)
+    assert block_length(1.0, 200.0) == pytest.approx(5.0)
+    assert block_length(1.0, 20.0) == pytest.approx(2.0)
+
+
+def test_blocks_end_with_their_run_and_are_not_too_many():
+    numbers = independent_blocks(motion([150, 150, 700]), 2.5)
+    np.testing.assert_array_equal(np.unique(numbers[:300]), [0, 1])
+    assert numbers[149] < numbers[150] and numbers[299] < numbers[300]
+    assert independent_blocks(motion([5] * 3000), 1.0)[-1] + 1 <= 1000
+
+
+def test_the_time_covered_leaves_gaps_out():
+    time = np.concatenate([np.arange(100) * 0.01, 50 + np.arange(100) * 0.01])
+    assert covered_time(time, np.ones(200, bool)) == pytest.approx(1.98)
+    assert covered_time(time, np.arange(200) % 5 == 0) == pytest.approx(1.9)

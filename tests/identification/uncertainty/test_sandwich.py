@@ -1,0 +1,88 @@
+"""The covariance is the delete-one-block jackknife of the stacked regressions, inherited steps included."""
+
+import numpy as np
+import pytest
+
+from armloop.identification.uncertainty.sandwich import Equations
+
+
+def two_steps(blocks=12, rows=30, seed=0):
+    """Columns of two regressions, the second on its own samples and on top of the first; correlated errors."""
+    rng = np.random.default_rng(seed)
+    block = np.repeat(np.arange(2 * blocks), rows)
+    first = block < blocks
+    X, Z = rng.normal(size=(len(block), 2)), rng.normal(size=(len(block), 1)) + 0.5
+    X[:, 1] += Z[:, 0]  # what the second step adds looks like what the first one found
+    shock = 0.3 * rng.normal(size=2 * blocks)[block]
+    y = X @ [1.0, -2.0] + np.where(first, 0.0, Z[:, 0] * 0.7) + shock + 0.1 * rng.normal(size=len(block))
+    return block, first, X, Z, y
+
+
+def solve(keep, first, X, Z, y):
+    a, b = keep & first, keep & ~first
+    inherited = np.linalg.lstsq(X[a], y[a], rcond=None)[0]
+    return np.concatenate([inherited, np.linalg.lstsq(Z[b], y[b] - X[b] @ inherited, rcond=None)[0]])
+
+
+def equations(block, first, X, Z, y):
+    theta = solve(np.ones(len(y), bool), first, X, Z, y)
+    B = block.max() + 1
+    jacobian, score, count = np.zeros((B, 3, 3)), np.zeros((B, 3)), np.zeros((B, 3))
+    both = np.column_stack([X, Z])
+    for b in range(B):
+        rows = block == b
+        one, two = rows & first, rows & ~first
+        jacobian[b, :2, :2] = X[one].T @ X[one]
+        jacobian[b, 2:] = Z[two].T @ both[two]
+        score[b, :2] = X[one].T @ (y[one] - X[one] @ theta[:2])
+        score[b, 2:] = Z[two].T @ (y[two] - both[two] @ theta)
+        count[b] = one.sum(), one.sum(), two.sum()
+    spread = np.array([np.var(y[first] - X[first] @ theta[:2]), np.var(y[~first] - both[~first] @ theta)])
+    stage = np.array([0, 0, 1])
+    return theta, Equations(jacobian, score, count, stage, spread[stage])
+
+
+def test_the_covariance_is_that_of_refits_without_one_block():
+    data = two_steps()
+    _, sums = equations(*data)
+    block, rest = data[0], data[1:]
+    refits = np.array([solve(block != b, *rest) for b in range(sums.blocks)])
+    moved = refits - refits.mean(axis=0)
+    by_hand = moved.T @ moved * (sums.blocks - 1) / sums.blocks
+    np.testing.assert_allclose(sums.covariance(), by_hand, rtol=1e-6)
+    np.testing.assert_allclose(sums.step(), 0.0, atol=1e-8)
+
+
+def test_what_a_step_inherits_adds_to_its_uncertainty():
+    data = two_steps()
+    _, sums = equations(*data)
+    second = sums.jacobian[:, 2:, 2:]
+    alone = Equations(second, sums.score[:, 2:], sums.count[:, 2:], np.zeros(1, int), sums.variance[2:])
+    assert sums.covariance()[2, 2] > 1.2 * alone.covariance()[0, 0]
+
+
+def test_correlation_within_blocks_widens_and_independence_does_not():
+    rng = np.random.default_rng(1)
+    B, rows = 200, 25
+    x = np.ones((B, rows))
+    for shock, wide in ((0.0, (0.9, 1.1)), (1.0, (3.0, 5.0))):
+        e = rng.normal(size=(B, rows)) + shock * rng.normal(size=(B, 1))
+        e -= e.mean()
+        sums = Equations(
+            (x * x).sum(axis=1)[:, None, None],
+            (x * e).sum(axis=1)[:, None],
+            np.full((B, 1), float(rows)),
+            np.zeros(1, int),
+            np.array([np.mean(e**2)]),
+        )
+        # equal blocks: sqrt(1 + 25 * shock^2 / (1 + shock^2)) is 3.67
+        ratio = np.sqrt(sums.covariance()[0, 0] / sums.independent_covariance()[0, 0])
+        assert wide[0] < ratio < wide[1]
+
+
+def test_degrees_of_freedom_count_the_blocks_that_matter():
+    even = Equations(np.ones((40, 1, 1)), np.zeros((40, 1)), np.ones((40, 1)), np.zeros(1, int), np.ones(1))
+    assert even.degrees_of_freedom()[0] == pytest.approx(39)
+    few = np.where(np.arange(40) < 5, 1.0, 1e-6)[:, None, None]
+    uneven = Equations(few, np.zeros((40, 1)), np.ones((40, 1)), np.zeros(1, int), np.ones(1))
+    assert uneven.degrees_of_freedom()[0] == pytest.approx(4, rel=0.01)

@@ -1,0 +1,140 @@
+"""The effects of rigid bodies, a payload and a tilt, against potential energies and power balance."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_arm import PAYLOAD, TILT, X_TOOL, an_arm, fitted
+from scipy.spatial.transform import Rotation
+from synthetic import fourier_motion
+
+from armloop.data.motion import Motion
+from armloop.laws.effects import Context, effect
+from armloop.laws.effects.payload import Payload
+from armloop.regression.embedded import solve
+from armloop.regression.moments import Moments
+from armloop.robot.arm import Arm
+from armloop.robot.kinematics import link_motion
+
+
+def potential_energy(
+    arm: Arm, q: np.ndarray, mass: float, com_link: np.ndarray, gravity: np.ndarray
+) -> float:
+    """Of a point mass on the last link, by walking along the chain with rotation vectors."""
+    R, p = np.eye(3), np.zeros(3)
+    for i in range(arm.n):
+        p = p + R @ arm.X_PF[i, :3, 3]
+        R = R @ arm.X_PF[i, :3, :3] @ Rotation.from_rotvec(q[i] * arm.axis[i]).as_matrix()
+    return float(-mass * gravity @ (p + R @ com_link))
+
+
+def by_differences(f: Callable[[np.ndarray], float], q: np.ndarray) -> np.ndarray:
+    step = 1e-6 * np.eye(len(q))
+    return np.array([(f(q + d) - f(q - d)) / 2e-6 for d in step])
+
+
+def test_a_payload_at_rest_is_the_slope_of_its_potential_energy_and_the_tool_frame_counts():
+    arm = an_arm()
+    com_link = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+    for q in np.random.default_rng(0).uniform(-1.5, 1.5, (5, 3)):
+        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
+        expected = by_differences(
+            lambda q: potential_energy(arm, q, PAYLOAD["mass"], com_link, arm.gravity), q
+        )
+        np.testing.assert_allclose(Payload().torque(Context(arm, rest), PAYLOAD)[0], expected, atol=1e-7)
+
+
+def test_a_payload_in_motion_is_mass_times_acceleration():
+    # power balance: v·tau = d/dt of the kinetic energy, which needs no regressor
+    arm = an_arm()
+    motion = fourier_motion(1.0, 1000.0, seed=8)
+    com = X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+    without_gravity = replace(arm, gravity=np.zeros(3))
+    tau = Payload().torque(Context(without_gravity, motion), PAYLOAD)
+    w = link_motion(arm, motion.q, motion.v, motion.vdot).w[-1].T
+    step = 1e-6
+
+    def centre(q: np.ndarray) -> np.ndarray:
+        return np.array([potential_energy(arm, q, 1.0, com, -e) for e in np.eye(3)])
+
+    speed = np.array(
+        [
+            (centre(q + step * v) - centre(q - step * v)) / (2 * step)
+            for q, v in zip(motion.q, motion.v, strict=True)
+        ]
+    )
+    energy = 0.5 * PAYLOAD["mass"] * (speed**2).sum(axis=1) + 0.5 * PAYLOAD["own_inertia"] * (w**2).sum(
+        axis=1
+    )
+    power = (tau * motion.v).sum(axis=1)
+    rate = np.gradient(energy, 1e-3)
+    np.testing.assert_allclose(power[5:-5], rate[5:-5], atol=1e-4 * np.abs(rate).max())
+
+
+def test_a_payload_is_found_from_its_columns(context):
+    tau = Payload().torque(context, PAYLOAD)
+    x = np.array([PAYLOAD["mass"], *(PAYLOAD["mass"] * com_in_link()), PAYLOAD["own_inertia"]])
+    np.testing.assert_allclose(Payload().columns(context, 0.0) @ Payload().embed(x)[0], tau, atol=1e-10)
+    found = Payload().estimates(context.arm, x, np.zeros((5, 5)), 0.0)
+    for key, value in PAYLOAD.items():
+        np.testing.assert_allclose(found[key].value, value, rtol=1e-9, err_msg=key)
+    # what the ten columns reveal without any constraint: mass and centre as far as the motion shows them
+    start = fitted(Payload(), context, tau, 0.0)
+    again = Payload().torque(context, {k: e.value for k, e in start.items()})
+    assert np.abs(again - tau).max() < 0.2 * np.abs(tau).max()
+
+
+def com_in_link() -> np.ndarray:
+    return X_TOOL[:3, :3] @ np.array(PAYLOAD["com"]) + X_TOOL[:3, 3]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_slope_of_the_payloads_constraint_is_that_of_finite_differences(seed):
+    rng = np.random.default_rng(seed)
+    x = np.array([rng.uniform(0.3, 4), *rng.uniform(-0.4, 0.4, 3), rng.uniform(1e-3, 0.05)])
+    _, J = Payload().embed(x)
+    for k in range(5):
+        h = 1e-6 * np.eye(5)[k]
+        slope = (Payload().embed(x + h)[0] - Payload().embed(x - h)[0]) / 2e-6
+        np.testing.assert_allclose(J[:, k], slope, atol=1e-7)
+
+
+def test_a_payload_is_always_a_possible_body():
+    rng = np.random.default_rng(5)
+    for x in rng.normal(size=(20, 5)):
+        beta, _ = Payload().embed(x)
+        mass, moment = beta[0], beta[1:4]
+        tensor = np.array(
+            [[beta[4], beta[7], beta[8]], [beta[7], beta[5], beta[9]], [beta[8], beta[9], beta[6]]]
+        )
+        c = moment / mass
+        about_centre = np.linalg.eigvalsh(tensor - mass * (c @ c * np.eye(3) - np.outer(c, c)))
+        assert mass > 0 and about_centre.min() > -1e-9 * np.abs(tensor).max()
+
+
+def test_a_tilt_at_rest_is_the_slope_of_the_potential_energy_under_turned_gravity():
+    base = an_arm()
+    # rolled about the base's x axis, then pitched about the level y axis
+    R_WB = Rotation.from_euler("xy", [TILT["roll"], TILT["pitch"]]).as_matrix()
+    only_last = np.zeros(30)
+    mass, com = 1.3, np.array([0.1, -0.2, 0.05])
+    only_last[20:24] = [mass, *(mass * com)]
+    for q in np.random.default_rng(1).uniform(-1.5, 1.5, (4, 3)):
+        rest = Motion(np.zeros(1), q[None], np.zeros((1, 3)), np.zeros((1, 3)), np.array([0]))
+        level, turned = (
+            by_differences(lambda q, g=g: potential_energy(base, q, mass, com, g), q)
+            for g in (base.gravity, R_WB.T @ base.gravity)
+        )
+        got = effect("gravity_tilt", None).torque(Context(base, rest, only_last), TILT)[0]
+        np.testing.assert_allclose(got, turned - level, atol=1e-7)
+
+
+def test_a_tilt_is_found_from_its_columns(context):
+    tilt = effect("gravity_tilt", None)
+    columns = tilt.columns(context, 0.0)
+    moments = Moments.of(columns.reshape(-1, columns.shape[2]), tilt.torque(context, TILT).ravel())
+    x = solve(moments, [tilt], [columns.shape[2]])[1][0]
+    found = tilt.estimates(context.arm, x, np.zeros((2, 2)), 0.0)
+    for key, value in TILT.items():
+        assert found[key].value == pytest.approx(value, rel=1e-4)

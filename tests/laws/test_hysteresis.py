@@ -1,0 +1,68 @@
+"""The stop operator against its law, sample by sample, and its limiting cases."""
+
+import time
+
+import numpy as np
+import pytest
+
+from armloop.laws.hysteresis import stop_operator
+
+
+def sample_by_sample(q, width, starts):
+    z = np.zeros_like(q)
+    for k in range(1, len(q)):
+        if k not in starts:
+            z[k] = np.clip(z[k - 1] + q[k] - q[k - 1], -width, width)
+    return z / width
+
+
+@pytest.mark.parametrize("samples", [1, 2, 3, 17, 64, 1001])
+def test_it_is_the_recursion(samples):
+    q = np.random.default_rng(samples).normal(size=(samples, 3)).cumsum(axis=0)
+    for width in (1e-3, 0.7, 5.0, 1e6):
+        np.testing.assert_allclose(stop_operator(q, width), sample_by_sample(q, width, [0]), atol=1e-11)
+
+
+def test_a_run_begins_relaxed():
+    q = np.random.default_rng(0).normal(size=200).cumsum()
+    starts = [0, 40, 41, 150]
+    z = stop_operator(q, 0.8, starts)
+    np.testing.assert_allclose(z, sample_by_sample(q, 0.8, starts), atol=1e-12)
+    np.testing.assert_allclose(z[41:150], stop_operator(q[41:150], 0.8), atol=1e-12)
+
+
+def test_sliding_it_is_the_direction_and_reversing_it_is_a_spring():
+    q = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0.97, 31)[1:]])
+    z = stop_operator(q, 0.02)
+    np.testing.assert_allclose(z[3:101], 1.0)
+    np.testing.assert_allclose(z[101:], 1 - (1 - q[101:]) / 0.02, atol=1e-9)
+
+
+def test_a_closed_path_dissipates_and_never_gives_energy():
+    angle = np.linspace(0, 6 * np.pi, 6001)
+    q = 0.1 * np.sin(angle)
+    z = stop_operator(q, 0.01)
+    last_turn = slice(4000, 6001)
+    work = float(np.sum(0.5 * (z[last_turn][1:] + z[last_turn][:-1]) * np.diff(q[last_turn])))
+    assert work == pytest.approx(4 * 0.1 - 4 * 0.01, rel=1e-2)  # area of the loop of a stop
+
+
+def test_a_long_log_takes_a_moment():
+    q = np.random.default_rng(1).normal(size=(100_000, 6)).cumsum(axis=0)
+    begin = time.perf_counter()
+    stop_operator(q, 1.0)
+    fast = time.perf_counter() - begin
+    begin = time.perf_counter()
+    sample_by_sample(q[:2000], 1.0, [0])
+    slow = 50 * (time.perf_counter() - begin)
+    assert fast < 0.5 * slow
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
+def test_a_width_that_is_none_is_refused(width):
+    with pytest.raises(ValueError, match="width"):
+        stop_operator(np.zeros(3), width)
+
+
+def test_no_samples_no_states():
+    assert stop_operator(np.zeros((0, 2)), 0.1).shape == (0, 2)

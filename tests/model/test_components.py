@@ -1,0 +1,23 @@
+"""A rigid body's torques are those of its regressor, whichever way they are computed."""
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion
+from armloop.features.rigid_body import full_columns
+from armloop.model.components import RigidBody
+from armloop.robot.arm import load_arm
+
+
+@pytest.mark.parametrize("rotors", [False, True])
+@pytest.mark.parametrize("name", ["three_axis", "scara"])
+def test_a_rigid_body_is_its_regressor_times_its_parameters(name: str, rotors: bool) -> None:
+    arm, rng = load_arm(name), np.random.default_rng(4)
+    q, v, vdot = rng.normal(size=(3, 30, arm.n))
+    motion = Motion(np.arange(30.0), q, v, vdot, np.array([0]))
+    still = Motion(motion.time, q, np.zeros_like(q), np.zeros_like(q), motion.starts)
+    parameters = rng.normal(size=(11 if rotors else 10) * arm.n)
+    body = RigidBody(parameters, (), np.zeros(0))
+    for step, same in ((3, motion), (1, still)):
+        expected = full_columns(arm, same, rotors) @ parameters
+        np.testing.assert_allclose(body.torque(arm, motion, step), expected, rtol=1e-12, atol=1e-12)

@@ -1,0 +1,207 @@
+"""A URDF that Drake reads becomes an arm, grippers and branches on request; one that cannot be is refused in one line."""
+
+import os
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armloop.cli import main
+from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.errors import ArmError, InputWarning
+
+LINK = """<link name="{0}"><inertial><origin xyz="0.1 0 0.02"/><mass value="{1}"/>
+<inertia ixx="{2}" iyy="{3}" izz="{4}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+
+
+def link(name: str, mass: object = 2.0, ixx: object = 0.03, iyy: object = 0.04, izz: object = 0.05) -> str:
+    return LINK.format(name, mass, ixx, iyy, izz)
+
+
+def joint(
+    name: str, parent: str, child: str, kind: str = "revolute", more: str = "", limit: str | None = None
+) -> str:
+    limit = 'lower="-2" upper="2" velocity="3" effort="50"' if limit is None else limit
+    return f"""<joint name="{name}" type="{kind}"><origin xyz="0.3 0 0.1" rpy="0.2 0.1 -0.3"/>
+<parent link="{parent}"/><child link="{child}"/><axis xyz="0 1 0"/><limit {limit}/>{more}</joint>"""
+
+
+PARTS = [
+    link("base"), joint("j1", "base", "l1"), link("l1"), joint("j2", "l1", "l2", "continuous"), link("l2"),
+    joint("finger_a", "l2", "fa", "prismatic"), link("fa", 0.1),
+    joint("finger_b", "l2", "fb", "prismatic", '<mimic joint="finger_a"/>'), link("fb", 0.1),
+]  # fmt: skip
+
+
+def write(path: Path, *parts: str) -> Path:
+    path.write_text(f"<robot name='arm'>{''.join(parts)}</robot>")
+    return path
+
+
+GOOD = "".join(PARTS[:5])
+
+WRONG: dict[str, tuple[str, str]] = {
+    "a mass with a unit": (GOOD.replace('value="2.0"', 'value="1kg"', 1), r"link 'base': <mass> value='1kg'"),
+    "a decimal comma": (GOOD.replace('value="2.0"', 'value="1,5"'), r"link 'base': <mass> value='1,5'"),
+    "a negative mass": (GOOD.replace('value="2.0"', 'value="-1"'), r"link 'base': <mass> value=-1 must not be neg"),
+    "NaN mass": (GOOD.replace('value="2.0"', 'value="nan"'), r"<mass> value='nan' is not a finite number"),
+    "no mass": (GOOD.replace('<mass value="2.0"/>', ""), r"link 'base': <inertial> has no <mass>"),
+    "no inertia": (link("base").split("<inertia ")[0] + "</inertial></link>" + "".join(PARTS[1:5]), r"has no <inertia>"),
+    "part of an inertia": (GOOD.replace('ixx="0.03" ', ""), r"link 'base': <inertia> has no ixx"),
+    "text for an inertia": (GOOD.replace('ixx="0.03"', 'ixx="big"'), r"<inertia> ixx='big' is not a finite"),
+    "a negative inertia": (GOOD.replace('ixx="0.03"', 'ixx="-0.03"'), r"not positive definite: .*-0.03"),
+    "an indefinite inertia": (GOOD.replace('ixy="0"', 'ixy="0.2"'), r"<inertia> is not positive definite"),
+    "lower above upper": (GOOD.replace('lower="-2" upper="2"', 'lower="2" upper="-2"'), r"lower=2 is not below upper=-2"),
+    "lower equal to upper": (GOOD.replace('lower="-2" upper="2"', 'lower="1" upper="1"'), r"--lock j1=1"),
+    "no velocity": (GOOD.replace('velocity="3"', 'velocity="0"'), r"joint 'j1': <limit> velocity=0 must be positive"),
+    "a negative velocity": (GOOD.replace('velocity="3"', 'velocity="-3"'), r"<limit> velocity=-3 must be positive"),
+    "a negative effort": (GOOD.replace('effort="50"', 'effort="-5"'), r"<limit> effort=-5"),
+    "huge limits": (GOOD.replace('upper="2"', 'upper="1e300"'), r"<limit> upper=1e\+300 is no limit"),
+    "NaN limit": (GOOD.replace('upper="2"', 'upper="nan"'), r"<limit> upper='nan' is not a finite number"),
+    "text for a limit": (GOOD.replace('upper="2"', 'upper="2rad"'), r"<limit> upper='2rad'"),
+    "an axis of two": (GOOD.replace('xyz="0 1 0"', 'xyz="0 1"'), r"joint 'j1': <axis> xyz='0 1' must be three"),
+    "an axis of four": (GOOD.replace('xyz="0 1 0"', 'xyz="0 1 0 0"'), r"<axis> xyz='0 1 0 0' must be three"),
+    "an axis without length": (GOOD.replace('xyz="0 1 0"', 'xyz="0 0 0"'), r"joint 'j1': <axis> has no length"),
+    "an origin of two": (GOOD.replace('xyz="0.3 0 0.1"', 'xyz="0.3 0"'), r"joint 'j1': <origin> xyz='0.3 0' must"),
+    "an origin of text": (GOOD.replace('rpy="0.2 0.1 -0.3"', 'rpy="a b c"'), r"joint 'j1': <origin> rpy='a b c'"),
+    "a NaN origin": (GOOD.replace('xyz="0.1 0 0.02"', 'xyz="nan 0 0"'), r"link 'base': <origin> xyz='nan 0 0'"),
+    "a parent that is not there": (GOOD.replace('parent link="l1"', 'parent link="l9"'), r"parent link 'l9' is not decl"),
+    "a child that is not there": (GOOD.replace('child link="l2"', 'child link="l9"'), r"child link 'l9' is not declared"),
+    "no child": (GOOD.replace('<child link="l2"/>', ""), r"joint 'j2': has no <child|joint 'j2' has no <child"),
+    "a name of 300 characters": (GOOD.replace("l1", "x" * 300), r"a name of 300 characters"),
+    "two links of one name": (GOOD + link("l2"), r"link 'l2' is declared twice"),
+    "an unknown type": (GOOD.replace('"continuous"', '"rotary"'), r"joint 'j2': type 'rotary' is unknown"),
+    "xacro": (GOOD + '<xacro:macro name="a"/>', r"holds xacro .*xacro in.xacro > out.urdf"),
+    "a xacro expression": (GOOD.replace('value="2.0"', 'value="${m}"'), r"holds xacro"),
+    "forty joints": (
+        link("l0") + "".join(link(f"l{k + 1}") + joint(f"j{k}", f"l{k}", f"l{k + 1}") for k in range(40)),
+        r"40 moving joints, at most 16 .*--lock",
+    ),
+    "fingers": ("".join([*PARTS[:7], joint("f2", "l2", "fb", "prismatic"), PARTS[8]]), r"2 moving joints follow .*--tip"),
+    "a mimic": ("".join(PARTS), r"joint 'finger_b' mimics 'finger_a'.*--lock finger_b=0"),
+    "a loop": (GOOD + joint("back", "l2", "base", "fixed"), r"base link"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_what_cannot_be_is_refused_with_the_element(tmp_path: Path, fault: str) -> None:
+    body, expected = WRONG[fault]
+    path = write(tmp_path / "bad.urdf", body)
+    with pytest.raises(ArmError, match=expected) as caught:
+        load_arm(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ") and "\n" not in message and len(message) < 400
+
+
+def test_entities_are_not_expanded_and_bytes_are_checked(tmp_path: Path) -> None:
+    path = tmp_path / "bad.urdf"
+    bomb = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>'
+    path.write_text(bomb)
+    with pytest.raises(ArmError, match="entities, which are not expanded"):
+        load_arm(path)
+    path.write_bytes(b"<robot name='\xff\xfe'/>")
+    with pytest.raises(ArmError, match="not a text in UTF-8"):
+        load_arm(path)
+    with pytest.raises(ArmError, match="cannot be read"):
+        load_arm("a" * 300 + ".urdf")
+    with pytest.raises(ArmError, match=r"cannot be read|no such file"):
+        load_arm("a\0b.urdf")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may enter every folder")
+def test_a_folder_without_permission_is_one_line(tmp_path: Path) -> None:
+    folder = tmp_path / "closed"
+    folder.mkdir()
+    path = write(folder / "arm.urdf", GOOD)
+    folder.chmod(0)
+    try:
+        with pytest.raises(ArmError, match="cannot be read"):
+            load_arm(path)
+    finally:
+        folder.chmod(0o700)
+
+
+def test_doubtful_inertias_are_said_and_load(tmp_path: Path) -> None:
+    with pytest.warns(InputWarning, match=r"link 'l1': <inertia> is zero with a mass of 2 kg"):
+        arm = load_arm(write(tmp_path / "a.urdf", link("base"), PARTS[1], link("l1", 2.0, 0, 0, 0)))
+    assert arm.n == 1
+    with pytest.warns(InputWarning, match=r"principal moments 0.03, 0.04, 0.5 .*two add up"):
+        load_arm(write(tmp_path / "a.urdf", link("base"), PARTS[1], link("l1", izz=0.5)))
+    dummy = '<link name="base"/>' + PARTS[1] + '<link name="l1"/>'
+    assert load_arm(write(tmp_path / "a.urdf", dummy)).mass[0] == 0.0
+
+
+def test_a_base_welded_to_an_undeclared_world_is_read(tmp_path: Path) -> None:
+    weld = '<joint name="w" type="fixed"><origin xyz="0 0 0.5"/><parent link="world"/><child link="base"/></joint>'
+    plain = load_arm(write(tmp_path / "plain.urdf", GOOD))
+    welded = load_arm(write(tmp_path / "welded.urdf", GOOD, weld))
+    assert welded.n == plain.n == 2
+    np.testing.assert_allclose(welded.X_PF[0, :3, 3], plain.X_PF[0, :3, 3] + [0, 0, 0.5])
+
+
+@pytest.mark.measured
+def test_the_double_pendulum_as_published_is_read(measured: Path) -> None:
+    arm = load_arm(measured / "double_pendulum" / "double_pendulum.urdf")
+    assert [joint.name for joint in arm.joints] == ["Joint1", "Joint2"]
+    np.testing.assert_allclose(arm.mass, [0.5234602, 0.6255677], rtol=1e-6)
+
+
+def torque(arm, q: list[float], rest: list[float]) -> np.ndarray:
+    """Torque at rest with an acceleration of all joints."""
+    q, rest = np.atleast_2d(q), np.atleast_2d(rest)
+    return (regressor(arm, q, 0 * q, rest) @ nominal_parameters(arm))[0]
+
+
+def test_a_locked_joint_is_the_same_arm_held_there(tmp_path: Path) -> None:
+    three = write(tmp_path / "three.urdf", *PARTS[:5], joint("j3", "l2", "l3"), link("l3", 1.3))
+    whole = load_arm(three)
+    for name, kept, q in (("j3", [0, 1], [0.3, -0.4, 0.7]), ("j2", [0, 2], [0.3, 1.9, 0.2])):
+        locked = load_arm(three, lock={name: q[({0, 1, 2} - set(kept)).pop()]})
+        assert [joint.name for joint in locked.joints] == [whole.joints[k].name for k in kept]
+        accelerations = np.array([0.5, 0.5, 0.5])
+        accelerations[({0, 1, 2} - set(kept)).pop()] = 0.0
+        np.testing.assert_allclose(
+            torque(locked, [q[k] for k in kept], accelerations[kept].tolist()),
+            torque(whole, q, accelerations.tolist())[kept],
+            rtol=1e-9,
+        )
+    slider = write(tmp_path / "slider.urdf", *PARTS[:5], joint("s", "l2", "l3", "prismatic"), link("l3", 1.3))
+    np.testing.assert_allclose(
+        torque(load_arm(slider, lock={"s": 0.2}), [0.3, -0.4], [1.0, 2.0]),
+        torque(load_arm(slider), [0.3, -0.4, 0.2], [1.0, 2.0, 0.0])[:2],
+        rtol=1e-9,
+    )
+
+
+def test_the_tip_leaves_out_fingers_and_keeps_their_mass(tmp_path: Path) -> None:
+    path = write(tmp_path / "gripper.urdf", *PARTS)
+    arm = load_arm(path, tip="l2")
+    locked = load_arm(path, lock={"finger_a": 0.0, "finger_b": 0.0})
+    for one in (arm, locked):
+        assert [joint.name for joint in one.joints] == ["j1", "j2"]
+        assert one.mass[1] == pytest.approx(2.2)
+    np.testing.assert_allclose(arm.inertia, locked.inertia)
+    assert [element.get("type") for element in ElementTree.fromstring(arm.urdf).iter("joint")].count(
+        "fixed"
+    ) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--lock", "finger_a"], "--lock finger_a: give JOINT=VALUE"),
+        (["--lock", "finger_a=wide"], "--lock finger_a=wide: give JOINT=VALUE"),
+        (["--lock", "nobody=0"], "--lock nobody: no moving joint of this name; there are: j1, j2, finger_a"),
+        (["--lock", "finger_a=nan", "--tip", "l2"], "give a finite position"),
+        (["--tip", "hand"], "--tip hand: no link of this name; there are: base, l1, l2"),
+    ],
+)
+def test_options_that_name_nothing_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], expected: str
+) -> None:
+    path = write(tmp_path / "gripper.urdf", *PARTS)
+    assert main(["excite", str(path), "--out", str(tmp_path / "ref.csv"), *options]) == 2
+    error = capsys.readouterr().err
+    assert expected in error and error.count("\n") == 1

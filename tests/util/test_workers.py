@@ -1,0 +1,90 @@
+"""Whoever applies a function to chunks, the answers are the same and come in order."""
+
+import sys
+from collections.abc import Iterator
+from functools import reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.util import workers
+from armloop.util.errors import InputError, LogError
+from armloop.util.workers import Cluster, Processes, Serial, Workers
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Cluster]:
+    """Two processes of their own, reached by the address of their scheduler."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as processes:
+        client = Cluster(processes.scheduler_address)
+        yield client
+        client.close()
+
+
+@pytest.fixture(params=["serial", "processes", "cluster"])
+def anyone(request: pytest.FixtureRequest) -> Any:
+    if request.param == "cluster":
+        return request.getfixturevalue("cluster")
+    return Serial() if request.param == "serial" else Processes(2)
+
+
+def test_answers_come_in_order_and_sums_are_equal_to_the_bit(anyone: Workers) -> None:
+    chunks = [np.random.default_rng(seed).normal(size=100) for seed in range(30)]
+    for answer, chunk in zip(anyone.map(lambda x: 2 * x, chunks), chunks, strict=True):
+        np.testing.assert_array_equal(answer, 2 * chunk)
+    total, serial = (reduce(add, workers.map(lambda x: x**3, chunks)) for workers in (anyone, Serial()))
+    np.testing.assert_array_equal(total, serial)
+
+
+def test_a_fault_found_by_a_worker_is_the_users(anyone: Workers) -> None:
+    def check(x: float) -> float:
+        if x > 2:
+            raise LogError(f"file.csv: row {x:g} is wrong")
+        return x
+
+    with pytest.raises(LogError, match=r"file\.csv: row 3 is wrong"):
+        list(anyone.map(check, [1.0, 3.0, 2.0, 5.0]))
+    assert list(anyone.map(check, [1.0, 2.0])) == [1.0, 2.0]
+
+
+def test_processes_really_are_others_with_one_thread() -> None:
+    import os
+
+    from threadpoolctl import threadpool_info
+
+    def look(_: int) -> tuple[int, int]:
+        return os.getpid(), max(info["num_threads"] for info in threadpool_info())
+
+    answers = list(Processes(2).map(look, range(8)))
+    assert os.getpid() not in {process for process, _ in answers}
+    assert {threads for _, threads in answers} == {1}
+    assert Processes().jobs == len(os.sched_getaffinity(0))
+
+
+def test_without_dask_or_a_scheduler_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "PATIENCE", 0.3)
+    with pytest.raises(InputError, match=r"--scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers"):
+        Cluster("tcp://127.0.0.1:9")
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        Cluster("nonsense://x")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"install the extra: armloop\[dask\]"):
+        Cluster("tcp://127.0.0.1:9")
+
+
+def test_however_many_work_each_has_one_blas_thread() -> None:
+    """The number of threads decides in which order a product is summed, and so its last digits."""
+    import numpy as np
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads(chunk: int) -> int:
+        np.ones((2, 2)) @ np.ones((2, 2))
+        return max(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+
+    with threadpool_limits(2):
+        for workers in (Serial(), Processes(1), Processes(2)):
+            assert list(workers.map(threads, [0, 1])) == [1, 1]

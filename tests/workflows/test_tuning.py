@@ -1,0 +1,44 @@
+"""The tuning of a scenario, start to end, on a short reference."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from answers import answered
+
+from armloop.drake.experiments.scenarios import load_tracking
+from armloop.reports.plots.loops import bode_figure
+from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+from armloop.util.progress import silent
+from armloop.workflows import tune_scenario
+
+
+def test_files_tables_and_a_better_loop(tmp_path):
+    built_in = load_tracking("three_axis_tracking")
+    scenario = dataclasses.replace(
+        built_in, reference=dataclasses.replace(built_in.reference, duration=0.6), score=(0.1, 0.6)
+    )
+    answer, tuning = tune_scenario(scenario, 2 * np.pi * 5, 60.0, None, tmp_path, silent)
+    written = answered((tmp_path / "tune.json").read_text(), "tune")
+    assert {key: written[key] for key in answer} == answer
+    assert {"bode.png", "step.png"} <= {path.name for path in tmp_path.iterdir()}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 2 and "peak |S|" in page and "step off linear" in page
+    assert "http" not in page.split("<main", 1)[0].replace("http-equiv", "")
+    assert answer["present"]["gains"]["kp"] == [80.0] * 3
+    assert answer["present"]["stable"] and answer["proposed"]["stable"]
+    assert max(answer["present"]["step_deviation"] + answer["proposed"]["step_deviation"]) < 0.03
+    # stiffer gains follow better without a model
+    assert np.mean(answer["proposed"]["eta_deg"]["pid"]) < np.mean(answer["present"]["eta_deg"]["pid"])
+    assert min(m["phase_margin"] for m in answer["proposed"]["loop"]) == pytest.approx(60, abs=5)
+    # a phase margin is what is left to -180 deg
+    bode = bode_figure(tuning)
+    for j, margin in enumerate(tuning.present.margins):
+        phase = bode.axes[3 + j].lines[0].get_ydata()
+        gain = np.abs(tuning.present.loops[:, j])
+        last = np.flatnonzero(gain > 1)[-1]
+        assert np.interp(0, [-1, 1], phase[[last, last + 1]]) == pytest.approx(
+            margin.phase_margin - 180, abs=3
+        )
+    for table in (gains_table, margins_table, verified_table):
+        assert len(table(tuning).rows) == 6
