@@ -1,4 +1,4 @@
-"""Why two effects can look alike on one motion, and which motion would tell them apart."""
+"""Confounding: why two effects can look alike on one motion, and which motion would tell them apart."""
 
 from __future__ import annotations
 

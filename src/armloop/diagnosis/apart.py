@@ -1,4 +1,4 @@
-"""How far two effects are apart on a motion: what of the torque of one no mixture of the other can stand for."""
+"""Isolability of two effects on a motion: what of the torque of one no mixture of the other can stand for."""
 
 from __future__ import annotations
 

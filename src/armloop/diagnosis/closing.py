@@ -1,4 +1,4 @@
-"""What a diagnosis changes: the torque that a controller now adds, and the error on runs that nothing was fitted to."""
+"""Feedforward compensation of diagnosed effects: the torque a controller now adds, the error on runs not fitted to."""
 
 from __future__ import annotations
 

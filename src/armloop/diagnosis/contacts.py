@@ -1,4 +1,4 @@
-"""Events of a run: pushes on the arm and torques on a joint, each with its interval, found before everything else.
+"""Event detection: pushes on the arm and torques on a joint, each with its interval, found before everything else.
 
 An event shows as a stretch in which the residual is unlike what it is in like motion (:mod:`armloop.diagnosis.novelty`).
 It belongs to one log and would spoil the search for what is there all the time; so its samples are kept out of that.

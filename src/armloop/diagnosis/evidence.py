@@ -1,4 +1,4 @@
-"""A residual as evidence: what the model leaves on a run, weighed by what it leaves on its own baseline.
+"""Normalised residual: what the model leaves on a run, weighed by what it leaves on its own baseline.
 
 One weighted unit is the model's baseline residual of a joint, so joints compare, and the model's own
 shortcomings count as the noise they are. Blocks of the run are dealt into folds; whatever is judged is

@@ -1,4 +1,4 @@
-"""The motion to make next: one that tells what was found from what it may be mistaken for.
+"""Discriminating experiment: the motion to make next, which tells what was found from what it may be mistaken for.
 
 A diagnosis lists as alternatives what its run cannot tell from what was found. Here a reference within the arm's limits
 is designed on which, whichever of the two is there, the other fits badly (`armloop.experiment.design.unexplained`). Without

@@ -1,4 +1,4 @@
-"""Bursts of a run in which no joint slides: where its residual stands out from all the rest of the run.
+"""Outlier bursts of a run in which no joint slides: where its residual stands out from all the rest of the run.
 
 There is no like motion to compare with. What dry friction can hold is none of it; what exceeds that must exceed the most
 of the rest of the run.

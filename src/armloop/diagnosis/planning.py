@@ -1,4 +1,4 @@
-"""Designing a motion for a diagnosis: within limits, for whatever columns and criterion the purpose asks."""
+"""Experiment design for a diagnosis: a motion within limits, for whatever columns and criterion the purpose asks."""
 
 from __future__ import annotations
 

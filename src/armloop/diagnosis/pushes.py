@@ -1,4 +1,4 @@
-"""What an event was: a force on the tool, on a link, or a torque on one joint, by which explains its samples best."""
+"""Classification of events: a force on the tool, on a link, or a torque on one joint, by which explains its samples best."""
 
 from __future__ import annotations
 

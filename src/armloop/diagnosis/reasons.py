@@ -1,4 +1,4 @@
-"""What a reader must know before relying on a verdict, one true sentence with its number each."""
+"""Caveats of a verdict: what a reader must know before relying on it, one true sentence with its number each."""
 
 from __future__ import annotations
 

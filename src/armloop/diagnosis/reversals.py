@@ -1,4 +1,4 @@
-"""Reversals: what a joint does while it turns around, judged by itself.
+"""Friction at reversals: what a joint does while it turns around, judged by itself.
 
 The torque of a joint at rest is not determined by its motion, so standstill is kept out of training, baseline and
 search, with as much around it as the filter smears. A joint that turns around is not at rest, but it passes zero

@@ -1,4 +1,4 @@
-"""The alternatives of a diagnosis as laws with parameters: which torque may be mistaken for which."""
+"""Confounded hypotheses of a diagnosis as laws with parameters: which torque may be mistaken for which."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The search: add the effect that explains most on data not fitted, the simplest of equals, until none is left.
+"""Forward selection of effects: add what explains most on data not fitted, the simplest of equals, until none is left.
 
 Every time one is added, those found before are asked again whether, beside the others, they are still the
 simplest of those that do equally well: the first effect named may have stood for two.

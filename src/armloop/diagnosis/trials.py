@@ -1,4 +1,4 @@
-"""What is known of a run so far, and what every further effect would add to it."""
+"""State of the selection: what is known of a run so far, and what every further effect would add to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a residual sits: in which stretch of time, and under which condition of the motion most of it is found."""
+"""Localisation of a residual: in which stretch of time, and under which condition of the motion most of it is found."""
 
 from __future__ import annotations
 

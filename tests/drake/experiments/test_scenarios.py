@@ -207,22 +207,11 @@ def test_missing_names_are_told():
         load_plant("puma")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "three_axis_tracking",
-        "scara_pick_and_place",
-        "ur10e_tracking",
-        "payload_pickup",
-        "friction_wear",
-        "torque_limits",
-    ],
-)
-def test_the_scenarios_script_is_the_command(monkeypatch, name):
-    calls = []
-    monkeypatch.setattr("armloop.cli.main", lambda arguments: calls.append(arguments) or 0)
-    monkeypatch.setattr("sys.argv", [f"{name}.py", "--model", "step3=mine.json"])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(scenario_path(name).with_suffix(".py")), run_name="__main__")
-    assert ended.value.code == 0
-    assert calls == [["track", name, "--model", "step3=mine.json"]]
+def test_the_diagram_to_copy_follows_its_reference_better_with_a_model(capsys):
+    script = runpy.run_path(str(scenario_path("three_axis_tracking").with_name("closed_loop.py")))
+    script["main"](["--seconds", "0.3"])
+    alone, fed = (
+        [float(word) for word in line.replace("°", "").split()[-3:]]
+        for line in capsys.readouterr().out.splitlines()
+    )
+    assert all(with_model < 0.1 * without for with_model, without in zip(fed, alone, strict=True))
