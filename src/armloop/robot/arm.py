@@ -88,8 +88,16 @@ class Arm:
         """A line per joint: kind, limits of position, velocity and effort in SI units."""
         rows = [("joint", "kind", "from", "to", "unit", "velocity", "effort", "mass [kg]")]
         rows += [
-            (joint.name, joint.kind, f"{joint.lower:.4g}", f"{joint.upper:.4g}", joint.position_unit)
-            + (f"{joint.velocity:.4g}", f"{joint.effort:.4g}", f"{mass:.4g}")
+            (
+                joint.name,
+                joint.kind,
+                f"{joint.lower:.4g}",
+                f"{joint.upper:.4g}",
+                joint.position_unit,
+                f"{joint.velocity:.4g}",
+                f"{joint.effort:.4g}",
+                f"{mass:.4g}",
+            )
             for joint, mass in zip(self.joints, self.mass, strict=True)
         ]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
