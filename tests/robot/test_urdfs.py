@@ -105,3 +105,11 @@ def test_out_of_range_trajectories_fit():
 def test_tools():
     assert_allclose(load_arm("three_axis").X_tool[:3, 3], [0.35, 0, 0])
     assert_allclose(load_arm("scara").X_tool[:3, 3], [0, 0, -0.1])
+
+
+def test_an_arm_shows_itself_in_a_line_and_as_a_table():
+    arm = load_arm("scara")
+    assert repr(arm) == "<armloop.Arm scara: 4 joints, 4.13 kg moving>"
+    *_, first, second, third, fourth = str(arm).splitlines()
+    assert third.split()[:5] == ["joint_3", "prismatic", "-0.05", "0.3", "m"]
+    assert [line.split()[0] for line in (first, second, fourth)] == ["joint_1", "joint_2", "joint_4"]

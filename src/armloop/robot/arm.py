@@ -81,6 +81,29 @@ class Arm:
     gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
     urdf: str = ""
 
+    def __repr__(self) -> str:
+        return f"<armloop.Arm {self.name}: {self.n} joint{'s' if self.n > 1 else ''}, {self.mass.sum():.3g} kg moving>"
+
+    def __str__(self) -> str:
+        """A line per joint: kind, limits of position, velocity and effort in SI units."""
+        rows = [("joint", "kind", "from", "to", "unit", "velocity", "effort", "mass [kg]")]
+        rows += [
+            (
+                joint.name,
+                joint.kind,
+                f"{joint.lower:.4g}",
+                f"{joint.upper:.4g}",
+                joint.position_unit,
+                f"{joint.velocity:.4g}",
+                f"{joint.effort:.4g}",
+                f"{mass:.4g}",
+            )
+            for joint, mass in zip(self.joints, self.mass, strict=True)
+        ]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        return "\n".join([repr(self)[1:-1], "", *lines])
+
     @property
     def n(self) -> int:
         """Number of moving joints."""
