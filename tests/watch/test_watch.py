@@ -93,10 +93,18 @@ def test_the_same_logs_in_portions_give_the_same_bytes(
     assert [k for k in whole if mine[k] != whole[k]] == []
 
 
-def test_a_running_state_that_is_lost_or_broken_is_made_anew(watched: Path, fleet: Path) -> None:
+def test_a_running_state_that_is_broken_or_of_another_version_is_made_anew(
+    watched: Path, fleet: Path
+) -> None:
+    import pyarrow.parquet
+
     before = contents(watched)
     (watched / "running" / "arm=loaded.parquet").write_bytes(b"cut off")
-    (watched / "running" / "arm=rubbing.parquet").unlink()
+    older = watched / "running" / "arm=rubbing.parquet"
+    table = pyarrow.parquet.read_table(older, partitioning=None)
+    pyarrow.parquet.write_table(
+        table.replace_schema_metadata({"armloop": '{"asked": "an older version"}'}), older
+    )
     for arm in ("loaded", "rubbing"):
         (watched / "tested" / f"arm={arm}.json").unlink()
     watch(fleet / "models", [], watched, Options(full=False))

@@ -119,29 +119,33 @@ class Running:
             return None
         try:
             table = pyarrow.parquet.read_table(path, use_threads=False, partitioning=None)
-            about = json.loads(table.schema.metadata[b"armloop"])
+            return _state(table, store, arm, model)
         except (OSError, pyarrow.ArrowException, KeyError, TypeError, ValueError):
-            # it holds nothing that the sums do not
+            # cut off, or of another version: it holds nothing that the sums do not
             return None
-        heads = [
-            Head(when, name, log, programme, store.file(arm, day, log, model))
-            for when, name, log, programme, day in about["logs"]
-        ]
-        return Running(
-            asked=about["asked"],
-            seen=frozenset(about["seen"]),
-            count=about["count"],
-            seconds=about["seconds"],
-            history=_history(table, heads, about["columns"]),
-            numbers=table["number"].to_numpy().astype(np.intp),
-            reached=Reached(**about["reached"]),
-            most=np.array(_numbers(about["most"])),
-            alarms=tuple(about["alarms"]),
-            last=None if about["last"] is None else _read(about["last"]),
-            limit=about["limit"],
-            known=about["known"],
-            notes=tuple(about["notes"]),
-        )
+
+
+def _state(table: Any, store: Store, arm: str, model: str) -> Running:
+    about = json.loads(table.schema.metadata[b"armloop"])
+    heads = [
+        Head(when, name, log, programme, store.file(arm, day, log, model))
+        for when, name, log, programme, day in about["logs"]
+    ]
+    return Running(
+        asked=about["asked"],
+        seen=frozenset(about["seen"]),
+        count=about["count"],
+        seconds=about["seconds"],
+        history=_history(table, heads, about["columns"]),
+        numbers=table["number"].to_numpy().astype(np.intp),
+        reached=Reached(**about["reached"]),
+        most=np.array(_numbers(about["most"])),
+        alarms=tuple(about["alarms"]),
+        last=None if about["last"] is None else _read(about["last"]),
+        limit=about["limit"],
+        known=about["known"],
+        notes=tuple(about["notes"]),
+    )
 
 
 def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> History:
