@@ -1,5 +1,5 @@
 # make setup   create .venv with everything in it, from requirements.lock
-# make loop    the main job, start to end, in out/loop; `armloop loop --measured` is that on measured data
+# make loop    the main job, start to end, on a simulated and a measured arm, in out/loop
 # make test    style, types and tests
 # make docs    the documentation, tutorials executed, in out/site
 # make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel

@@ -45,8 +45,8 @@ sys.exit(status)
 """
 
 
-def simulate(root: Path, arms: int, logs: int, seconds: float) -> float:
-    """Write the fleet; return the hours of operation."""
+def simulate(root: Path, arms: int, logs: int, seconds: float) -> None:
+    """Write the fleet."""
     arm = three_axis()
     motions = [fourier_motion(seconds, 60.0, seed) for seed in range(MOTIONS)]
     rigid = [rigid_torque(arm, m.q, m.v, m.vdot) for m in motions]
@@ -68,7 +68,6 @@ def simulate(root: Path, arms: int, logs: int, seconds: float) -> float:
             log = measured(motion, tau + 0.02 * np.sqrt((tau**2).mean(axis=0)) * slow, 1000 * a + k)
             when = datetime(2026, 1, 1) + timedelta(hours=2.4 * k)
             write_log(root / "logs" / name / f"{when:%Y-%m-%dT%H-%M-%S}.parquet", log)
-    return arms * logs * seconds / 3600
 
 
 def watch(root: Path, store: str, jobs: int, logs: list[str]) -> tuple[float, float, float, dict]:
@@ -112,14 +111,23 @@ def run() -> None:
     parser.add_argument("--arms", type=int, default=100)
     parser.add_argument("--logs", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument(
+        "--logs-in", type=Path, default=None, help="folder in which simulate() has put such a fleet before"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         root = Path(temporary)
         began = time.perf_counter()
-        hours = simulate(root, options.arms, options.logs, options.seconds)
+        hours = options.arms * options.logs * options.seconds / 3600
+        if options.logs_in is None:
+            simulate(root, options.arms, options.logs, options.seconds)
+        else:
+            for part in ("models", "logs"):
+                (root / part).symlink_to(options.logs_in.resolve() / part)
         count = options.arms * options.logs
         print(
-            f"{count} logs of {options.arms} arms, {hours:.1f} h, simulated in {time.perf_counter() - began:.0f} s"
+            f"{count} logs of {options.arms} arms, {hours:.1f} h, simulated in {time.perf_counter() - began:.0f} s",
+            flush=True,
         )
         # a folder with a tenth of the arms: start-up and memory of a small fleet, by one worker
         few = root / "few"
@@ -136,7 +144,7 @@ def run() -> None:
         for path in raw[:20]:
             read_log(path)
         reading = (time.perf_counter() - began) / min(20, len(raw))
-        kept, given = size(root / "two" / "sums"), size(root / "logs")
+        kept, given = size(root / "two" / "sums"), size((root / "logs").resolve())
         found = sorted({alarm["arm"] for alarm in answer["new"]})
         worn = [f"arm{a:03d}" for a in range(min(WORN, options.arms))]
         rows = {

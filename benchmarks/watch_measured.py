@@ -28,7 +28,15 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from resampled import Blocks, Changing  # noqa: E402
-from watch_promise import EVERY_S, UNIT_SECONDS, delay, delays_header, false_alarms, false_alarms_header  # noqa: E402
+from watch_promise import (  # noqa: E402  # noqa: E402
+    EVERY_S,
+    HEALTHY,
+    UNIT_SECONDS,
+    delay,
+    delays_header,
+    false_alarms,
+    false_alarms_header,
+)
 
 from armloop.data.log import MotionLog, read_log  # noqa: E402
 from armloop.data.motion import Motion  # noqa: E402
@@ -48,7 +56,6 @@ Array = NDArray[np.float64]
 Law = Callable[[ReconstructedModel, Motion], Array]
 
 DATA = ROOT.parent / "shared" / "data"
-HEALTHY = 40
 
 
 @dataclass(frozen=True)
@@ -221,20 +228,23 @@ def found_after(
     def normal(index: Sequence[int]) -> Normal:
         return changing.normal(counts[list(index)], levels[list(index)])
 
-    # in portions, so that how the change came is judged with what there is a few days after the alarm
-    for end in range(HEALTHY + 20, HEALTHY + len(level) + 1, 20):
-        units = changing.units(counts[:end], levels[:end], EVERY_S)
-        if delay(label, model, units, HEALTHY, sizes, normal):
-            return
+    units = changing.units(counts, levels, EVERY_S)
+    if delay(label, model, units, HEALTHY, sizes, normal):
+        return
     values, tolerance = scores(changing.units(counts, 0.0 * levels, EVERY_S))
-    later, _ = scores(changing.units(counts, levels, EVERY_S))
+    later, _ = scores(units)
     moved = np.abs(later[-1] - values[-1])
+    # the spread of the units of one programme, which alone are compared
+    programme = units.programme
+    spread = np.array([np.nanstd(values[programme == one], axis=0) for one in np.unique(programme)]).mean(
+        axis=0
+    )
     with np.errstate(invalid="ignore", divide="ignore"):
         parts = np.nanmax(np.where(tolerance[-1] > 0, moved / tolerance[-1], np.nan))
-        spread = np.nanmax(moved / np.std(values, axis=0))
+        beyond = np.nanmax(np.where(spread > 0, (moved - tolerance[-1]) / spread, np.nan))
     print(
-        f"{label:38s} not found in {len(level)} units; at most {parts:.1f} of the tolerance and {spread:.1f} of the "
-        "healthy units' spread",
+        f"{label:38s} not found in {len(level)} units; at most {parts:.1f} of the tolerance; beyond it, "
+        f"{max(beyond, 0.0):.1f} of the spread of healthy units",
         flush=True,
     )
 
@@ -245,10 +255,10 @@ def changes(joints: int, which: str) -> list[tuple[Law, list[tuple[str, Array, l
     drift = 0.001 * np.arange(1, 301)
     sizes = [f"{100 * w:.1f} %" for w in drift]
     found: list[tuple[Law, list[tuple[str, Array, list[str]]]]] = [
-        (payload, [("load of 0.3 kg", np.full(60, 0.3), ["0.3 kg"] * 60)])
+        (payload, [("load of 0.3 kg", np.full(100, 0.3), ["0.3 kg"] * 100)])
     ]
     for j in chosen:
-        step = (f"friction of joint {j + 1} +5 %", np.full(60, 0.05), ["5 %"] * 60)
+        step = (f"friction of joint {j + 1} +5 %", np.full(100, 0.05), ["5 %"] * 100)
         found.append((friction_of(j), [step, (f"friction of joint {j + 1} +1 % a day", drift, sizes)]))
     return found
 

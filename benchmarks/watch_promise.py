@@ -34,7 +34,7 @@ from resampled import Blocks  # noqa: E402
 from armloop.model import ReconstructedModel  # noqa: E402
 from armloop.monitoring.alarms import find_alarms  # noqa: E402
 from armloop.monitoring.naming import Normal, later_part, name_change  # noqa: E402
-from armloop.monitoring.ranks import scan, threshold  # noqa: E402
+from armloop.monitoring.ranks import HORIZON, scan, threshold  # noqa: E402
 from armloop.monitoring.sums import log_sums  # noqa: E402
 from armloop.monitoring.trend import course  # noqa: E402
 from armloop.monitoring.units import Units, scores, streams  # noqa: E402
@@ -43,6 +43,8 @@ from armloop.monitoring.warmth import adjust, without_warmth  # noqa: E402
 Array = NDArray[np.float64]
 
 UNIT_SECONDS, HISTORY, EVERY_S = 600.0, 200, 8640.0
+#: Healthy units that a change is named against, and units after an alarm with which it is judged anew.
+HEALTHY, LATER = 40, 64
 PROMISED = (10.0, 100.0, 1000.0)
 
 
@@ -114,22 +116,27 @@ def delay(
     values = own if values is None else values
     listed = streams(units.columns, model.arm.n)
     mean_units = 1000.0 / (units.hours / units.count)
-    found = find_alarms(values, units.programme, tolerance, listed, mean_units).alarms
+    watched = find_alarms(values, units.programme, tolerance, listed, mean_units)
+    found = watched.alarms
     if not found:
         return False
     alarm = found[0]
-    before = range(max(0, alarm.since - changed), alarm.since)
-    window = later_part(alarm.since, alarm.unit)
-    named = name_change(model.arm, units.columns, normal(before), normal(window))
-    what = named[0].words if named else "not named"
-    others = ", ".join(place[0] for place in named[0].alternatives[:3]) if named else ""
-    here = [s for s, stream in enumerate(listed) if named and stream.place == named[0].place]
-    # as the command judges it: with what there is by then, here to the end of the portion in which the alarm came
-    form = course(units.when, values[:, here[0] if here else alarm.stream]).form
     late = alarm.unit - changed + 1
     size = sizes[late - 1] if late > 0 else "healthy"
-    line = f"{label:38s} {late:5d} {late / 10:5.1f} {size:>10s} {form:11s} {what}"
-    print(line + (f" (or {others})" if others else ""), flush=True)
+    print(f"{label:38s} {late:5d} {late / 10:5.1f} {size:>10s}", flush=True)
+    # as the command does it: named at once, and again with what there is by then
+    until = min([alarm.unit + LATER, units.count - 1, *(other.unit for other in found[1:2])])
+    before = normal(range(max(alarm.from_unit, alarm.since - HEALTHY), alarm.since))
+    for last in sorted({alarm.unit, until, *(alarm.unit + k for k in (8, 16) if alarm.unit + k < until)}):
+        named = name_change(model.arm, units.columns, before, normal(later_part(alarm.since, last)))
+        here = [s for s, stream in enumerate(listed) if named and stream.place == named[0].place]
+        span = slice(max(alarm.from_unit, alarm.since - HORIZON), last + 1)
+        shown = max(here or [alarm.stream], key=lambda s: float(watched.evidence[alarm.unit, s]))
+        form = course(units.when[span], values[span, shown], units.programme[span]).form
+        what = named[0].words if named else "not named"
+        others = ", ".join(place[0] for place in named[0].alternatives[:3]) if named else ""
+        more = f"with {last - alarm.unit} more" if last > alarm.unit else "at once"
+        print(f"{'':38s} {more:>22s} {form:11s} {what}" + (f" (or {others})" if others else ""), flush=True)
     return True
 
 

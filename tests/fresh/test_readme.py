@@ -6,6 +6,7 @@ import re
 import shutil
 import sys
 
+import numpy as np
 import pytest
 from page_commands import ROOT, armloop, blocks, commands, run
 
@@ -61,6 +62,23 @@ def test_every_command_and_the_python_run(done):
         assert len([line for line in example.splitlines() if line.strip()]) <= lines
     assert (done / "out" / "augmented.json").is_file() and (done / "out" / "arm.c").is_file()
     assert os.path.isfile(done / "out" / "track" / "tracking.json")
+
+
+@pytest.mark.slow
+def test_the_loop_finds_the_pushes_of_the_measured_run(done):
+    folder = done / "out" / "loop"
+    answer = json.loads((folder / "measured" / "measured.json").read_text(encoding="utf-8"))
+    checked(answer, FILES["measured"])
+    pushes = [effect for effect in answer["diagnosis"]["effects"] if effect["effect"] == "external_contact"]
+    assert 4 <= len(pushes) <= 6  # five times or so
+    for push in pushes:
+        p = {key: np.asarray(each["value"]) for key, each in push["parameters"].items()}
+        assert 0.2 < p["end"] - p["start"] < 2.0 and 15 < np.linalg.norm(p["force"]) < 70
+    before, after = (np.array(answer["rmse_while_pushed"][key]) for key in ("before", "after"))
+    assert (after[:3] < 0.6 * before[:3]).all()
+    assert max(answer["free_run"]["moving"]["nrmse"]) < 0.25
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "The same on measured data" in text and 'href="measured/report.html"' in text
 
 
 # Commands of the gallery that the README does not have, at a size that suits a test.

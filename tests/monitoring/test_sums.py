@@ -93,6 +93,12 @@ def test_step_and_drift_are_told_apart(seed: int) -> None:
     assert drift.form == "drift"
     assert drift.per_day == pytest.approx(0.25, rel=0.2)
     assert course(when[:6], noise[:6]).form == "cannot_tell"
+    # programmes whose levels differ by ten times the change
+    programme = rng.integers(0, 3, 40)
+    mixed = course(when, noise + (np.arange(40) >= 25) + 10.0 * programme, programme)
+    assert (mixed.form, mixed.began) == ("step", 25)
+    assert mixed.size == pytest.approx(1.0, abs=0.15)
+    assert course(when, noise + (np.arange(40) >= 25) + 10.0 * programme).form == "cannot_tell"
 
 
 def units_of(values: np.ndarray, temperature: np.ndarray, since: np.ndarray) -> Units:

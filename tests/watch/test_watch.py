@@ -138,6 +138,18 @@ def test_the_folder_of_one_arm_is_taken_for_its_logs(fleet: Path, tmp_path: Path
     assert "put it into a folder named after the arm" in outcome.aside[0]["reason"]
 
 
+def test_links_to_folders_are_followed_once(tmp_path: Path) -> None:
+    mounted = tmp_path / "mounted"
+    mounted.mkdir()
+    (mounted / "a.csv").touch()
+    (mounted / "again").symlink_to(mounted)
+    logs = tmp_path / "logs"
+    logs.mkdir()
+    (logs / "arm7").symlink_to(mounted)
+    (found,) = find_logs([logs])
+    assert (found.arm, found.path) == ("arm7", logs / "arm7" / "a.csv")
+
+
 def test_arm_programme_and_warmth_come_from_columns(fleet: Path, tmp_path: Path) -> None:
     import pyarrow
     import pyarrow.parquet

@@ -187,6 +187,10 @@ class ReconstructedModel:
         Found by least squares on random motion within the ranges the model was fitted on; where the
         torques do not reveal a parameter, the arm's nominal value stands.
         """
+        return self._inertial.copy()
+
+    @cached_property
+    def _inertial(self) -> Array:
         if "inertial" in self.history:
             return np.asarray(self.history["inertial"], dtype=float)
         n, rng = self.arm.n, np.random.default_rng(0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armloop.util.arrays import Array
 
@@ -39,38 +40,48 @@ class Course:
         return {"form": self.form, "size": self.size, "per_day": drift, "margin": self.margin}
 
 
-def course(when: Array, values: Array) -> Course:
+def course(when: Array, values: Array, programme: NDArray[np.intp] | None = None) -> Course:
     """Compare a step and a ramp, each with the begin that suits it best.
 
     Args:
         when: (U,) s; values: (U,) the coefficient; NaN where it is not known.
+        programme: (U,) units of one number have one level (fixed effects); all of them without it.
     """
     there = np.flatnonzero(np.isfinite(values))
     t, y = when[there] / _DAY, values[there]
     if len(y) < 2 * _FEWEST:
         return Course("cannot_tell", int(there[-1]) if len(there) else 0, 0.0, float("nan"), 0.0)
-    step = min((_step(t, y, k) for k in range(2, len(y) - 1)), key=lambda fit: fit[0])
-    drift = min((_ramp(t, y, k) for k in range(0, len(y) - 2)), key=lambda fit: fit[0])
+    level = np.zeros(len(y), dtype=np.intp) if programme is None else programme[there]
+    index = np.arange(len(y))
+    steps, ramps = index[2:-1], index[:-2]
+    step = _best(np.asarray(index >= steps[:, None], dtype=float), y, level)
+    drift = _best(np.maximum(t - t[ramps, None], 0.0), y, level)
     noise = 1e-18 * float(y @ y) + 1e-300
-    # both have three parameters: level, size, begin
+    # both have as many parameters: the levels, size, begin
     gap = len(y) * float(np.log((step[0] + noise) / (drift[0] + noise)))
     form = "drift" if gap > _DECIDES else "step" if gap < -_DECIDES else "cannot_tell"
-    _, size, began = drift if form == "drift" else step
-    slope = float("nan")
     if form == "drift":
-        elapsed = float(t[-1] - t[began])
-        slope = size / elapsed if elapsed > 0 else float("nan")
-    return Course(form, int(there[began]), size, slope, abs(gap))
+        began, slope = int(ramps[drift[2]]), drift[1]
+        return Course(form, int(there[began]), slope * float(t[-1] - t[began]), slope, abs(gap))
+    return Course(form, int(there[steps[step[2]]]), step[1], float("nan"), abs(gap))
 
 
-def _step(t: Array, y: Array, k: int) -> tuple[float, float, int]:
-    before, after = float(y[:k].mean()), float(y[k:].mean())
-    rest = np.concatenate([y[:k] - before, y[k:] - after])
-    return float(rest @ rest), after - before, k
+def _best(shapes: Array, y: Array, level: NDArray[np.intp]) -> tuple[float, float, int]:
+    """Least squares of y (U,) on each of K shapes (K, U) beside the levels: error², coefficient and index of the best."""
+    x, rest = _within(shapes, level), _within(y[None], level)[0]
+    size, along = (x**2).sum(axis=1), x @ rest
+    # a shape that is constant within every level says nothing
+    able = size > 1e-12 * (shapes**2).sum(axis=1)
+    beta = np.where(able, along / np.where(able, size, 1.0), 0.0)
+    left = ((rest - beta[:, None] * x) ** 2).sum(axis=1)
+    best = int(np.argmin(left))
+    return float(left[best]), float(beta[best]), best
 
 
-def _ramp(t: Array, y: Array, k: int) -> tuple[float, float, int]:
-    X = np.column_stack([np.ones(len(t)), np.maximum(t - t[k], 0.0)])
-    beta = np.linalg.lstsq(X, y, rcond=None)[0]
-    rest = y - X @ beta
-    return float(rest @ rest), float(beta[1] * (t[-1] - t[k])), k
+def _within(x: Array, level: NDArray[np.intp]) -> Array:
+    """Rows (K, U) less their mean over the units of each level."""
+    out = np.empty_like(x)
+    for one in np.unique(level):
+        here = level == one
+        out[:, here] = x[:, here] - x[:, here].mean(axis=1, keepdims=True)
+    return out

@@ -95,11 +95,18 @@ class LoopResult(Protocol):
     def notes(self) -> Sequence[str]: ...
 
 
-def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
+def loop_report(
+    result: LoopResult,
+    replay: str | None = "replay.html",
+    further: Sequence[Section] = (),
+    links: Sequence[tuple[str, str]] = (),
+) -> str:
     """One HTML page on a run of the loop.
 
     Args:
         replay: relative address of the recorded motion, or None where there is none.
+        further: sections on what was done beside the simulated arm.
+        links: words and relative addresses of further pages.
     """
     varying = _varying(result)
     sections = [
@@ -110,6 +117,7 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
         *diagnosis_sections(result.diagnosis, ["the second run"]),
         _truth_section(result),
         _control_again_section(result),
+        *further,
         _account_section(result),
     ]
     return render(
@@ -119,7 +127,7 @@ def loop_report(result: LoopResult, replay: str | None = "replay.html") -> str:
             f"arm changed that nobody declared. {_outcome(result)}",
             sections,
             _cards(result),
-            [("Watch the replay", replay)] if replay else [],
+            [*([("Watch the replay", replay)] if replay else []), *links],
             Picture(
                 loop_figure(result, varying),
                 "The loop, clockwise from the upper left, with the numbers and signals of this run.",

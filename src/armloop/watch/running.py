@@ -29,17 +29,21 @@ _MATRICES = ("moment", "size", "rows", "energy", "torque", "temperature")
 
 @dataclass(frozen=True)
 class Last:
-    """The last alarm, whose course is judged anew as long as it becomes clearer.
+    """The last alarm, which is named and its course judged anew as long as they become clearer.
 
     Attributes:
         name: its identifier.
         alarm: where it was, units counted from the arm's first.
+        evidence: of each stream at the alarm.
         stream: whose history shows the course.
+        named: units after the alarm with which it was last named.
     """
 
     name: str
     alarm: Alarm
+    evidence: tuple[float, ...]
     stream: int
+    named: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +97,9 @@ class Running:
             ],
             "columns": [column.key for column in units.columns],
             "reached": vars(self.reached),
-            "most": [value if np.isfinite(value) else None for value in self.most.tolist()],
+            "most": _finite(self.most.tolist()),
             "alarms": self.alarms,
-            "last": None
-            if self.last is None
-            else {"name": self.last.name, "alarm": vars(self.last.alarm), "stream": self.last.stream},
+            "last": None if self.last is None else _told(self.last),
             "limit": self.limit,
             "known": self.known,
             "notes": self.notes,
@@ -133,11 +135,9 @@ class Running:
             history=_history(table, heads, about["columns"]),
             numbers=table["number"].to_numpy().astype(np.intp),
             reached=Reached(**about["reached"]),
-            most=np.array([-np.inf if value is None else value for value in about["most"]]),
+            most=np.array(_numbers(about["most"])),
             alarms=tuple(about["alarms"]),
-            last=None
-            if about["last"] is None
-            else Last(about["last"]["name"], Alarm(**about["last"]["alarm"]), about["last"]["stream"]),
+            last=None if about["last"] is None else _read(about["last"]),
             limit=about["limit"],
             known=about["known"],
             notes=tuple(about["notes"]),
@@ -156,6 +156,23 @@ def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> Histo
         **{name: matrix(table[name]) for name in _MATRICES},
     )
     return History(tuple(heads), units, matrix(table["piece"]).astype(np.intp))
+
+
+def _finite(values: Sequence[float]) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values]
+
+
+def _numbers(values: Sequence[float | None]) -> list[float]:
+    return [-np.inf if value is None else value for value in values]
+
+
+def _told(last: Last) -> dict[str, Any]:
+    return {**vars(last), "alarm": vars(last.alarm), "evidence": _finite(last.evidence)}
+
+
+def _read(last: dict[str, Any]) -> Last:
+    told = {"alarm": Alarm(**last["alarm"]), "evidence": tuple(_numbers(last["evidence"]))}
+    return Last(**{**last, **told})
 
 
 def stored(store: Store, arm: str, model: str) -> dict[str, Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -73,10 +74,9 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
     found: dict[Path, LogFile] = {}
     for place in map(Path, places):
         if place.is_dir():
-            for path in sorted(place.rglob("*")):
-                if path.suffix in (CSV, PARQUET) and path.is_file() and not path.name.startswith("."):
-                    inside = path.relative_to(place).parts[:-1]
-                    found[path] = LogFile(path, inside[0] if inside else "", _programme(inside[1:]))
+            for path in _below(place):
+                inside = path.relative_to(place).parts[:-1]
+                found[path] = LogFile(path, inside[0] if inside else "", _programme(inside[1:]))
         elif place.is_file():
             found[place] = LogFile(place, place.resolve().parent.name, "")
         else:
@@ -84,6 +84,22 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
                 f"{place}: no such file or folder; --logs takes DIR/ARM/*.csv, files, or - for a list"
             )
     return [found[path] for path in sorted(found)]
+
+
+def _below(place: Path) -> Iterator[Path]:
+    """Logs below a folder, links to folders followed, each folder once."""
+    seen: set[str] = set()
+    for folder, inside, names in os.walk(place, followlinks=True):
+        inside.sort()
+        real = os.path.realpath(folder)
+        if real in seen:
+            inside.clear()
+            continue
+        seen.add(real)
+        for name in names:
+            path = Path(folder, name)
+            if path.suffix in (CSV, PARQUET) and not name.startswith(".") and path.is_file():
+                yield path
 
 
 def _programme(folders: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +31,9 @@ from armloop.watch.store import Store
 
 #: Healthy units before a change whose normal equations say what was there before, and seconds of logs that are diagnosed.
 _BEFORE, _DIAGNOSED = 40, 150.0
-#: Units after an alarm with which step and drift are told apart, and logs that are read at once.
-_AFTER, _AT_ONCE = 64, 256
+#: Units after an alarm with which step and drift are told apart; after how many its effect is named again, for few units
+#: tell joints and laws apart badly where healthy ones differ; and logs that are read at once.
+_AFTER, _AGAIN, _AT_ONCE = 64, (4, 8, 16, 32, 64), 256
 #: Friction falls by a fifth as joints warm (published for UR3 and UR5); a change within this part may be that.
 _WARM_UP = "friction falls by up to a fifth as a joint warms up; columns temperature or since_start would tell the two apart"
 
@@ -197,7 +198,7 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
     names, last = list(past.alarms), past.last
     for found in watched.alarms:
         alarm = found.moved(tested.before)
-        _judge(task, store, tested, last, alarm.unit)
+        _judge(task, store, model, tested, names, last, alarm.unit)
         name = _identifier(task.arm, history, tested.at(alarm.unit))
         earlier = store.alarm(task.arm, names[-1]) if names else None
         known = store.alarm(task.arm, name)
@@ -205,8 +206,8 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
         if known is None:
             store.add_alarm(task.arm, name, explained)
         names.append(name)
-        last = Last(name, alarm, stream)
-    _judge(task, store, tested, last, count - 1)
+        last = Last(name, alarm, tuple(watched.evidence[found.unit].tolist()), stream)
+    last = _judge(task, store, model, tested, names, last, count - 1)
     reached = watched.reached.moved(tested.before)
     kept = reached.begin
     if last is not None and last.alarm.unit + _AFTER >= count:
@@ -233,21 +234,58 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
     )
 
 
-def _judge(task: Task, store: Store, tested: Tested, last: Last | None, until: int) -> None:
-    """Judge anew how the last alarm's effect came, with what is known by now."""
+def _judge(
+    task: Task,
+    store: Store,
+    model: ReconstructedModel,
+    tested: Tested,
+    names: Sequence[str],
+    last: Last | None,
+    until: int,
+) -> Last | None:
+    """Name the last alarm's effect anew, and judge how it came, with what is known by now."""
     if last is None:
-        return
+        return None
     alarm = last.alarm
     first, until = max(alarm.from_unit, alarm.since - HORIZON), min(until, alarm.unit + _AFTER)
     known = store.alarm(task.arm, last.name)
     if known is None or tested.at(first) < tested.tail:
-        return
+        return last
+    judged = dict(known)
+    for later in (k for k in _AGAIN if last.named < k <= until - alarm.unit):
+        named = _name(task, model, tested, alarm, alarm.unit + later)
+        last = replace(last, named=later)
+        if named:
+            earlier = store.alarm(task.arm, names[-2]) if len(names) > 1 else None
+            judged |= _as_named(tested, named, earlier)
+            last = replace(last, stream=_main_column(tested, named, alarm, last.evidence))
     span = slice(tested.at(first), tested.at(until) + 1)
     units = tested.history.units
-    how = course(units.when[span], tested.adjusted.values[span, last.stream])
-    judged = {**known, "course": {**how.to_dict(), "of": _label(tested.listed[last.stream])}}
+    how = course(units.when[span], tested.adjusted.values[span, last.stream], units.programme[span])
+    judged["course"] = {**how.to_dict(), "of": _label(tested.listed[last.stream])}
     if judged != known:
         store.add_alarm(task.arm, last.name, judged)
+    return last
+
+
+def _name(task: Task, model: ReconstructedModel, tested: Tested, alarm: Alarm, until: int) -> list[Named]:
+    """What an alarm is, from the units up to one of them."""
+    before = [tested.at(u) for u in range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)]
+    window = [tested.at(u) for u in later_part(alarm.since, until)]
+    return name_change(
+        model.arm,
+        tested.history.units.columns,
+        _equations(tested, before, task.healthy) if before else None,
+        _equations(tested, window, task.healthy),
+    )
+
+
+def _as_named(tested: Tested, named: Sequence[Named], earlier: dict[str, Any] | None) -> dict[str, Any]:
+    return {
+        "effects": [one.to_dict() for one in named],
+        "alternatives": _warm_up(tested.adjusted, named),
+        "continues": _continues(earlier, named),
+    }
 
 
 def _identifier(arm: str, history: History, at: int) -> str:
@@ -282,21 +320,15 @@ def _explain(
 ) -> tuple[dict[str, Any], int]:
     """What an alarm says, and the stream whose history shows its course; one that is not new is not diagnosed again."""
     history, units = tested.history, tested.history.units
-    before = [tested.at(u) for u in range(max(alarm.from_unit, alarm.since - _BEFORE), alarm.since)]
     window = [tested.at(u) for u in later_part(alarm.since, alarm.unit)]
-    named = name_change(
-        model.arm,
-        units.columns,
-        _equations(tested, before, task.healthy) if len(before) else None,
-        _equations(tested, window, task.healthy),
-    )
+    named = _name(task, model, tested, alarm, alarm.unit)
     stream = tested.listed[alarm.stream]
-    column = _main_column(tested, named, alarm)
+    column = _main_column(tested, named, alarm, tested.watched.evidence[alarm.unit - tested.before].tolist())
     logs = sorted({int(units.log[u]) for u in window})
     at, since = tested.at(alarm.unit), tested.at(alarm.since)
     delay = float(units.seconds[since : at + 1].sum()) / 3600.0
     span = slice(tested.at(max(alarm.from_unit, alarm.since - HORIZON)), at + 1)
-    how = course(units.when[span], tested.adjusted.values[span, column])
+    how = course(units.when[span], tested.adjusted.values[span, column], units.programme[span])
     answer: dict[str, Any] = {
         "id": name,
         "arm": task.arm,
@@ -314,10 +346,8 @@ def _explain(
             "other_joint": stream.other_joint,
             "direction": "rose" if alarm.direction > 0 else "fell",
         },
-        "effects": [one.to_dict() for one in named],
+        **_as_named(tested, named, earlier),
         "course": {**how.to_dict(), "of": _label(tested.listed[column])},
-        "alternatives": _warm_up(tested.adjusted, named),
-        "continues": _continues(earlier, named),
         "notes": list(tested.notes),
     }
     if task.full and new:
@@ -343,12 +373,12 @@ def _label(stream: Stream) -> str:
     return f"{name} at joint {' and '.join(places)}" if places else name
 
 
-def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm) -> int:
+def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm, evidence: Sequence[float]) -> int:
     """The stream whose history shows the course: of the effect named, the one with most evidence at the alarm."""
     if not named:
         return alarm.stream
     own = [s for s, stream in enumerate(tested.listed) if stream.place == named[0].place]
-    return max(own, key=lambda s: tested.watched.evidence[alarm.unit - tested.before, s])
+    return max(own, key=lambda s: evidence[s])
 
 
 def _warm_up(adjusted: Adjusted, named: Sequence[Named]) -> list[dict[str, Any]]:

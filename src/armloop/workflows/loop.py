@@ -25,13 +25,16 @@ from armloop.laws.effects import EFFECTS
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm
 from armloop.util.files import write_figure, write_json, write_text
-from armloop.util.progress import Progress
+from armloop.util.progress import Progress, silent
 from armloop.util.workers import Pool
+from armloop.workflows.measured import MEASURED_FILES, run_measured
 from armloop.workflows.tracking import tracking_answer
 from armloop.workflows.undeclared import draw
 
 SCHEMA = "armloop/loop/1"
 SCENARIO = "three_axis_tracking"
+#: Folder of what is measured, beside what is simulated.
+MEASURED = "measured"
 #: What the loop writes, beside its logs.
 LOOP_FILES = (
     *(f"logs/{name}.csv" for name in (*CONDITIONS, "second_run")),
@@ -42,6 +45,7 @@ LOOP_FILES = (
     "loop.png",
     "replay.html",
     "report.html",
+    *(f"{MEASURED}/{name}" for name in MEASURED_FILES),
 )
 
 
@@ -78,24 +82,26 @@ class LoopResult:
 
 
 def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
-    """Run the loop on the three-axis arm, print its tables and write its files into ``folder``.
+    """Run the loop on the three-axis arm, print its tables and write its files into ``folder``; likewise on measured
+    logs of a UR5 (:mod:`armloop.workflows.measured`), in a process of its own while this one diagnoses and draws.
 
     What the diagnosis is given of the second run are two files: the model and the log.
     """
     from armloop.reports.diagnosis_tables import diagnosis_table
+    from armloop.reports.html import Section
     from armloop.reports.loop_report import loop_figure, loop_report
     from armloop.reports.tables import eta_table, score_table, steps_table
 
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant
     seconds: dict[str, float] = {}
-    with _Clock(seconds, "collect", progress, "1/6 measure: collecting three logs on the simulated arm"):
+    with _Clock(seconds, "collect", progress, "1/7 measure: collecting three logs on the simulated arm"):
         logs = collect(plant.arm, plant.config, load_plan("paper"), seed, processes=2)
         for name, log in logs.items():
             write_log(folder / "logs" / f"{name}.csv", log)
     with Pool(2) as workers:  # two cores, no more
         with _Clock(
-            seconds, "reconstruct", progress, "2/6 reconstruct: three steps, each inheriting the last"
+            seconds, "reconstruct", progress, "2/7 reconstruct: three steps, each inheriting the last"
         ):
             sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
             one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
@@ -106,26 +112,30 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             clusters = sort_samples(samples.motion)
         print(steps_table(reconstruction.reports), end="\n\n")
         print(score_table(reconstruction.held_out, plant.arm), end="\n\n", flush=True)
-        with _Clock(seconds, "track", progress, "3/6 control: tracking with three controllers"):
+        with _Clock(seconds, "track", progress, "3/7 control: tracking with three controllers"):
             undeclared = sealed.result()
             runs = [workers.submit(track, scenario, name, {"model": model}) for name in scenario.controllers]
             before_run = workers.submit(track, scenario, "pid_step3", {"model": model}, [undeclared])
             tracking = {name: run.result() for name, run in zip(scenario.controllers, runs, strict=True)}
+            # last in the queue: it has a core while the main process diagnoses and draws
+            pushed = workers.submit(_measured, folder / MEASURED)
             reference = one_shot.result()
         print(eta_table(tracking, paper=True), end="\n\n", flush=True)
         with _Clock(
-            seconds, "diagnose", progress, "4/6 measured again: tracing the residual of the second run"
+            seconds, "diagnose", progress, "4/7 measured again: tracing the residual of the second run"
         ):
             diagnosis = _diagnose(folder, progress)
         print(diagnosis_table(diagnosis), end="\n\n", flush=True)
         with _Clock(
-            seconds, "track_again", progress, "5/6 control better: tracking with the augmented model"
+            seconds, "track_again", progress, "5/7 control better: tracking with the augmented model"
         ):
             after_run = workers.submit(
                 track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared]
             )
             write_replay(folder / "replay.html", plant.arm, tracking)
             before, after = before_run.result(), after_run.result()
+        with _Clock(seconds, "measured", progress, "6/7 the same on measured data: a UR5 that was pushed"):
+            measured_words, measured_section = pushed.result()
     right = _is_right(diagnosis, undeclared)
     result = LoopResult(
         seed=seed,
@@ -149,9 +159,12 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}",
         flush=True,
     )
-    with _Clock(seconds, "report", progress, "6/6 writing the report"):
+    print(f"\nOn measured data (a UR5, currents as logged)\n\n{measured_words}\n", flush=True)
+    with _Clock(seconds, "report", progress, "7/7 writing the report"):
         write_json(folder / "loop.json", loop_answer(result, scenario))
-        write_text(folder / "report.html", loop_report(result))
+        sections = [Section.from_dict(measured_section)]
+        links = [("The pushed UR5", f"{MEASURED}/report.html")]
+        write_text(folder / "report.html", loop_report(result, further=sections, links=links))
         write_figure(folder / "loop.png", loop_figure(result))
     print(f"open {folder}/report.html  ({sum(seconds.values()):.0f} s)")
     return result
@@ -181,6 +194,15 @@ def _measure_with_effect(scenario: TrackingScenario, seed: int, path: Path) -> U
     effect = draw(scenario.plant.arm, seed)
     write_log(path, measure_run(scenario.plant.arm, scenario.plant.config, seed + 500, effects=[effect]))
     return effect
+
+
+def _measured(folder: Path) -> tuple[str, dict[str, Any]]:
+    """The measured part: its words for a terminal, and its section of the report, drawn."""
+    from armloop.reports.measured_report import measured_section, measured_words
+
+    folder.mkdir(exist_ok=True)
+    found = run_measured(folder, silent)
+    return measured_words(found), measured_section(found).to_dict()
 
 
 def _reconstruct(logs: list[MotionLog], arm: Arm, method: str) -> Reconstruction:

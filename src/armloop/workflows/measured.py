@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,9 @@ MEASURED_FILES = ("measured.json", "model.json", "report.html")
 _GAINS = [12.5, 12.5, 12.5, 9.2, 9.2, 9.2]  # N·m/A
 _TRAINED_ON = ("no1", "no2", "no8_singularity_free_1")
 _FREE, _PUSHED = "no9_singularity_free_nodist", "no9_singularity_free_wdist"
+#: What those who measured say of a further run of the pushed motion, with a force sensor at the tool: the record itself
+#: is not published with these logs. Smallest and largest, s and N.
+FORCE_RECORD = {"seconds": (0.4, 1.4), "force": (18.0, 51.0)}
 SCHEMA = "armloop/measured/1"
 
 
@@ -37,12 +40,14 @@ class MeasuredResult:
         free: its score on a free run of the motion that was pushed later, which it was not made of.
         diagnosis: of the pushed run.
         during: (n,) RMSE in the intervals found, before and after, N·m; NaN where nothing was found.
+        record: what a force sensor showed in another run of that motion.
     """
 
     model: ReconstructedModel
     free: Score
     diagnosis: Diagnosis
     during: dict[str, list[float]]
+    record: dict[str, tuple[float, float]] = field(default_factory=lambda: dict(FORCE_RECORD))
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``measured.json``."""

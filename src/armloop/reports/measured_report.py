@@ -1,0 +1,110 @@
+"""The loop's measured part in a terminal and in the loop's report: a model of free motion, and who pushed the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from armloop.diagnosis import Diagnosis
+from armloop.identification.scoring import Score
+from armloop.model import ReconstructedModel
+from armloop.reports.diagnosis_tables import diagnosis_table, events_table
+from armloop.reports.findings import findings, reasons
+from armloop.reports.html import Picture, Section
+from armloop.reports.plots import residual_time_figure
+from armloop.reports.tables import Table, make_table, score_table
+from armloop.reports.words import counted, number, percent
+
+_TITLE = "The same on measured data"
+
+
+class MeasuredResult(Protocol):
+    """What the measured part hands over.
+
+    ``model`` of free motion, ``free`` its score on a run it was not made of, ``diagnosis`` of the pushed run, ``during``
+    the RMSE per joint in the intervals found, before and after, and ``record`` what a force sensor showed in another run
+    of that motion: smallest and largest, seconds and N.
+    """
+
+    @property
+    def model(self) -> ReconstructedModel: ...
+    @property
+    def free(self) -> Score: ...
+    @property
+    def diagnosis(self) -> Diagnosis: ...
+    @property
+    def during(self) -> Mapping[str, list[float]]: ...
+    @property
+    def record(self) -> Mapping[str, tuple[float, float]]: ...
+
+
+def measured_words(result: MeasuredResult) -> str:
+    """All of it for a terminal."""
+    parts = [str(_free_table(result)), diagnosis_table(result.diagnosis)]
+    if result.diagnosis.contacts:
+        parts += [str(_pushes_table(result)), str(_during_table(result))]
+    return "\n\n".join(parts)
+
+
+def measured_section(result: MeasuredResult) -> Section:
+    """The part of the loop's report that is measured, not simulated."""
+    moving = float(np.nanmean(result.free.moving["nrmse"]))
+    text = [
+        "Everything above was simulated. This was not: a UR5's motor currents (Kufieta 2014), from three runs of free "
+        f"motion to a model, which leaves {percent(moving)} of the torque on a free run that it was not made of, mean of "
+        "the joints while they move. Then the same motion again, and during it something happened that nobody declared.",
+        *findings(result.diagnosis),
+    ]
+    contacts = result.diagnosis.contacts
+    caption = "The residual of the pushed run, joint by joint; shaded is when the diagnosis says that somebody pushed."
+    return Section(
+        _TITLE,
+        text,
+        [Picture(residual_time_figure(result.diagnosis), caption)],
+        [
+            _free_table(result),
+            *(
+                [events_table(result.diagnosis), _pushes_table(result), _during_table(result)]
+                if contacts
+                else []
+            ),
+        ],
+        notes=reasons(result.diagnosis),
+    )
+
+
+def _free_table(result: MeasuredResult) -> Table:
+    return score_table(result.free, result.model.arm, "The model on a free run that it was not made of")
+
+
+def _pushes_table(result: MeasuredResult) -> Table:
+    """Length and mean force of each push found, and the sensor's range in another run of the motion."""
+    rows: list[list[object]] = []
+    for k, contact in enumerate(result.diagnosis.contacts):
+        p = contact.added.parameters
+        start, end = (float(np.asarray(p[key].value)) for key in ("start", "end"))
+        if contact.added.effect.joint is None:
+            force = number(float(np.linalg.norm(np.asarray(p["force"].value))), 2)
+            rows.append([f"push {k + 1}", f"{end - start:.2f}", force])
+    seconds, forces = result.record["seconds"], result.record["force"]
+    rows.append(
+        [
+            "force sensor, another run of this motion",
+            f"{seconds[0]:g} to {seconds[1]:g}",
+            f"{forces[0]:g} to {forces[1]:g}",
+        ]
+    )
+    title = f"{counted(len(rows) - 1, 'push', 'pushes')} beside what a force sensor showed"
+    return make_table(["", "length [s]", "force [N]"], rows, title)
+
+
+def _during_table(result: MeasuredResult) -> Table:
+    rows = [
+        [f"{j + 1}  {joint.name}", before, after]
+        for j, (joint, before, after) in enumerate(
+            zip(result.model.arm.joints, result.during["before"], result.during["after"], strict=True)
+        )
+    ]
+    return make_table(["joint", "before", "after"], rows, "RMSE while it was pushed, N·m")
