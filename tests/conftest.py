@@ -12,12 +12,15 @@ import pytest  # noqa: E402
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MEASURED = REPOSITORY.parent / "shared" / "data"
+#: The files that take longest, first every command of the README and the site with its tutorials executed.
+LONGEST = ("fresh/test_readme.py", "diagnosis/test_diagnosis.py", "measured/test_ur10e.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take long, so that no process waits for another's last file."""
+    first = {REPOSITORY / "tests" / name: place for place, name in enumerate(LONGEST)}
     long = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in long)
+    items.sort(key=lambda item: (first.get(item.path, len(first)), item.path not in long))
 
 
 @pytest.fixture(scope="session")

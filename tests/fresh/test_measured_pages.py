@@ -33,7 +33,7 @@ def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path,
     assert "friction, presliding" in ladder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.measured
 def test_the_way_from_a_bag_to_a_simulator_and_c(tmp_path, measured):
     found = {

@@ -54,6 +54,7 @@ def test_the_arm_by_itself_has_but_the_ripple_of_its_gears(clean: Reconstruction
         assert part.predictable_left is not None and part.predictable_left < 0.002
 
 
+@pytest.mark.long
 def test_a_coupled_wrist_is_found_and_named(
     clean: Reconstruction, logs: list[MotionLog], ur10e: Path
 ) -> None:

@@ -13,7 +13,7 @@ import pytest
 from armloop.cli import main
 from armloop.model import load_model
 
-pytestmark = pytest.mark.measured
+pytestmark = [pytest.mark.measured, pytest.mark.long]
 
 GAINS = "11.75,11.98,9.83,10.75,10.55,10.9"
 LEFT_OUT = "noload_20_02_12-50sec_12harm.csv"

@@ -7,6 +7,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.robot.newton_euler import joint_torques
 
 ODD_ARM = """<robot name="odd">
   <link name="foot"><inertial><mass value="3"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -68,4 +69,14 @@ def test_chosen_links_are_columns_of_the_whole(odd_arm):
     q, v, vdot = np.random.default_rng(4).uniform(-1, 1, (3, 5, 3))
     np.testing.assert_array_equal(
         regressor(arm, q, v, vdot, links=[2]), regressor(arm, q, v, vdot)[:, :, 20:]
+    )
+
+
+def test_samples_are_carried_along_the_chain_each_by_itself():
+    """A run is longer than what is carried together; the recursion of single samples knows nothing of that."""
+    arm = load_arm("scara")
+    q, v, vdot = np.random.default_rng(4).normal(size=(3, 2100, arm.n))
+    tau = regressor(arm, q, v, vdot) @ nominal_parameters(arm)
+    np.testing.assert_allclose(
+        tau, joint_torques(arm, nominal_parameters(arm), q, v, vdot), atol=1e-12 * np.abs(tau).max()
     )

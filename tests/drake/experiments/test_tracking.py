@@ -35,7 +35,7 @@ def short(scenario):
     return dataclasses.replace(scenario, reference=reference, score=(1.0, 2.0))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_exact_model_gives_the_designs_figures(scenario, exact):
     """Mean absolute errors in deg over the second period of 20 s; the paper has 1.10, 1.21, 1.23 for PID."""
     results = run_tracking(scenario, {"model": exact})
