@@ -1,4 +1,4 @@
-"""Where modules of former names are now; importing one by its former name gives the same module and a warning.
+"""Aliases of moved modules: importing one by its former name gives the same module and a warning.
 
 ``armloop`` asks :func:`find_spec` for what no other finder knows, so that nothing of this is loaded before it is needed.
 """

@@ -1,4 +1,4 @@
-"""What a model lacks on a run, as an object."""
+"""Diagnosis as an object: what a model lacks on a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well a model predicts logs."""
+"""Prediction error of a model on logs, as an object."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a result shows itself: a line as ``repr``, a table as ``str``, a table and a figure in a notebook."""
+"""Display of results: a line as ``repr``, a table as ``str``, a table and a figure in a notebook."""
 
 from __future__ import annotations
 

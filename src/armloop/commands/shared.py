@@ -1,4 +1,4 @@
-"""What several commands do: check what they are given, read logs and models, tell how far they are."""
+"""Helpers of several commands: checks of what is given, reading of logs and models, progress."""
 
 from __future__ import annotations
 

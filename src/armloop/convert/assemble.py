@@ -1,4 +1,4 @@
-"""From recordings and their maps to one motion log: units, signs, joint order, time, and what is kept beside it."""
+"""Assembly of recordings and their maps to one motion log: units, signs, joint order, time, and what is kept beside it."""
 
 from __future__ import annotations
 

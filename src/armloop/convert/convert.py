@@ -1,4 +1,4 @@
-"""From sources in other people's formats to one motion log."""
+"""Conversion of sources in other people's formats to one motion log."""
 
 from __future__ import annotations
 

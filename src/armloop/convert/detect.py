@@ -1,4 +1,4 @@
-"""Which reader a source belongs to, by its name and what it holds."""
+"""Format detection: which reader a source belongs to, by its name and what it holds."""
 
 from __future__ import annotations
 

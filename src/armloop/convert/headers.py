@@ -1,4 +1,4 @@
-"""What the names of columns suggest: which are the time, positions, velocities and torques of which joint.
+"""Column inference from names: which are the time, positions, velocities and torques of which joint.
 
 Nothing here is certain. What comes out is a map to be looked at, with what it is unsure of.
 """

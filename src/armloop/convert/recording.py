@@ -1,4 +1,4 @@
-"""What a reader of a foreign format hands on: named columns of numbers, and what the format says about them."""
+"""Recording of a foreign format: named columns of numbers, and what the format says about them."""
 
 from __future__ import annotations
 

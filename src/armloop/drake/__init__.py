@@ -1,4 +1,4 @@
-"""Everything that runs in Drake: the plant with friction, data collection, controllers, tracking, replay.
+"""Drake systems and simulations: the plant with friction, data collection, controllers, tracking, replay.
 
 The only package that imports pydrake's systems. A diagram of one's own starts with `add_arm_with_controller`, or with
 the systems it is made of. Names that end in an underscore are templates, `Feedforward_[AutoDiffXd]` for instance.

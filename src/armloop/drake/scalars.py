@@ -1,4 +1,4 @@
-"""What the systems need for each of Drake's scalar types: elementary functions, and vectors of one type."""
+"""Scalar-type support: elementary functions for each of Drake's scalar types, and vectors of one type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an export gave, and the states it is compared at."""
+"""Result of an export, and the states it is compared at."""
 
 from __future__ import annotations
 

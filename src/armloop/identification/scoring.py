@@ -1,4 +1,4 @@
-"""How well a model predicts: RMSE and nRMSE per joint, moving samples and standstill apart.
+"""Prediction error of a model: RMSE and nRMSE per joint, moving samples and standstill apart.
 
 The torque of a joint at rest is not determined by the motion (friction holds it anywhere between two
 limits), so standstill says little about a model and is never mixed into the figures of the moving joint.

@@ -1,4 +1,4 @@
-"""Which terms a sparse regression keeps, and their coefficients, by one of the estimators."""
+"""Sparse regression by one of the estimators: the terms that are kept, and their coefficients."""
 
 from __future__ import annotations
 

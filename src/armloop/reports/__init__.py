@@ -1,4 +1,4 @@
-"""What a person reads: tables for the terminal, figures, and reports as one HTML file each.
+"""Reports: tables for the terminal, figures, and pages as one HTML file each.
 
 `tables` needs neither matplotlib nor jinja2; `plots` returns matplotlib figures; `html` renders sections;
 `reconstruction_report`, `diagnosis_report` and `loop_report` say what was done, why, and what came out. All

@@ -1,4 +1,4 @@
-"""What `armloop excite` prints: how informative the reference is beside random ones, and what it uses of the limits."""
+"""Tables of `armloop excite`: how informative the reference is beside random ones, and what it uses of the limits."""
 
 from __future__ import annotations
 

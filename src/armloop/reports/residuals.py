@@ -1,4 +1,4 @@
-"""What a diagnosis left on data it had not fitted, as series for figures, and the load and time to draw it against."""
+"""Held-out residuals of a diagnosis as series for figures, and the load and time to draw them against."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How numbers, units and names are written in tables, figures and reports."""
+"""Formatting of numbers, units and names in tables, figures and reports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers, names and lists as the files have them, with the bounds that all share."""
+"""Primitive types of the files: numbers, names and lists, with the bounds that all share."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What every package uses and no robot is needed for: errors, atomic writes, bounded reading, workers, checkpoints."""
+"""Utilities that no robot is needed for: errors, atomic writes, bounded reading, workers, checkpoints."""

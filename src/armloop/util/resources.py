@@ -1,4 +1,4 @@
-"""Where the arms and scenarios that come with armloop lie on the disk.
+"""Packaged resources: where the arms and scenarios that come with armloop lie on the disk.
 
 In a source checkout they are the top-level folders `urdf/` and `scenarios/`; in a wheel the same folders are
 packed inside the package. Both are found by walking from this file, so no build step is needed to edit them.

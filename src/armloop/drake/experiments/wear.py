@@ -1,4 +1,4 @@
-"""What worn or badly known friction does to tracking: Monte Carlo over the plant's friction, the model left as it is."""
+"""Monte Carlo over worn or badly known friction: tracking on drawn plants, the model left as it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One set of PID gains looked at from all sides: margins, a small step, tracking."""
+"""Evaluation of a set of PID gains: margins, a small step, tracking."""
 
 from __future__ import annotations
 

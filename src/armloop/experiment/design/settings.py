@@ -1,4 +1,4 @@
-"""What a user chooses about an exciting motion, and what follows from it."""
+"""Settings of an experiment design: what a user chooses about an exciting motion, and what follows from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the joints may do during a collection."""
+"""Motion ranges: what the joints may do during a collection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a motion to follow is, and whether it keeps within its ranges."""
+"""Reference trajectories: the protocol of a motion to follow, and whether it keeps within its ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How good a model is: the parts of the measured torque that it explains, that it could explain, and that is noise.
+"""Goodness of fit: the parts of the measured torque that a model explains, that it could explain, and that is noise.
 
 Only motions, torques and residuals come in, so that a reconstruction and the diagnosis of any run use the same
 measure.

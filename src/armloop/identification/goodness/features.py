@@ -1,4 +1,4 @@
-"""What a residual may depend on: the arm's state, the direction of its motion, its recent path, the load.
+"""Features of a residual: the arm's state, the direction of its motion, its recent path, the load.
 
 Nothing here contains the measured torque or the time, so a residual that these columns predict on data left out is
 a law that the model lacks, and not the noise's own memory.

@@ -1,4 +1,4 @@
-"""What a flexible regression predicts of a residual on data left out: ridge and boosted trees, stacked.
+"""Nonparametric regression of a residual, cross-validated: ridge and boosted trees, stacked.
 
 The ridge finds weak laws that are smooth in the columns, trees those with edges and products. How much each is to be
 believed is a non-negative weight, learnt on folds that are not judged (Breiman, Stacked regressions, Machine

@@ -1,4 +1,4 @@
-"""What a method found, before it becomes a model."""
+"""Result of a method, before it becomes a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a library of candidate functions says of itself; whoever chooses among libraries asks it, not its name."""
+"""Interface of a library of candidate functions; whoever chooses among libraries asks it, not its name."""
 
 from __future__ import annotations
 

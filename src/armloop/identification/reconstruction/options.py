@@ -1,4 +1,4 @@
-"""What a user can choose about a reconstruction, and what it reports back."""
+"""Options of a reconstruction, and what it reports back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One regression of all joints: shared columns beside each joint's own friction, as sums over folds of the data.
+"""Pooled regression of all joints: shared columns beside each joint's own friction, as sums over folds of the data.
 
 Every joint brings its normal equations on the shared columns and on all candidates of its friction, one set per
 fold. Any choice of friction terms is then solved, and judged on the folds held out, without touching a sample. So

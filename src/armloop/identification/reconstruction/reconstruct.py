@@ -1,4 +1,4 @@
-"""From logs to a model: condition the signals, hold data out, run a method, score what it predicts."""
+"""Reconstruction pipeline: preprocess logs, hold data out, run a method, score what it predicts."""
 
 from __future__ import annotations
 

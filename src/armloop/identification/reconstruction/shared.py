@@ -1,4 +1,4 @@
-"""What the libraries that serve all joints with shared coefficients have in common.
+"""Common parts of the libraries that serve all joints with shared coefficients.
 
 Which samples they regress, what the motion must show for that, and the friction that stands in until each joint's
 own is chosen.

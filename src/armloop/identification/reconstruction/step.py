@@ -1,4 +1,4 @@
-"""One step of the stepwise method: choose orders, choose terms, regress them; joint by joint.
+"""Regression of one step of the stepwise method: choose orders, choose terms, regress them; joint by joint.
 
 What earlier steps found is subtracted from the torque before (inheritance, Eq. 33). Friction columns of
 the joint itself stand beside the double feature set (Sect. 4.3); the Stribeck velocity is profiled over

@@ -1,4 +1,4 @@
-"""Which data are left out of a reconstruction, and which samples of them judge it.
+"""Train-test splits: which data are left out of a reconstruction, and which samples of them judge it.
 
 Data are left out of the *raw* logs, before any filter: what is left of a log falls into runs, and filters never
 reach across two runs. So no sample that is fitted contains anything of a torque that is left out. The other way

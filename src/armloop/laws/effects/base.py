@@ -1,4 +1,4 @@
-"""What every physical effect says of itself: where it sits, its law, its parameters and their bounds.
+"""Interface of a physical effect: where it sits, its law, its parameters and their bounds.
 
 An effect is fitted as coefficients of columns, linear for a fixed shape (the order of a ripple, say), and
 then turned into named physical parameters. The same object predicts its torque for a model that has it.

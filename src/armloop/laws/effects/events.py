@@ -1,4 +1,4 @@
-"""When an event took place: an interval of one log, told from other logs with the same clock."""
+"""Time window of an event: an interval of one log, told from other logs with the same clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a sparse estimator says of itself."""
+"""Interface of a sparse estimator."""
 
 from __future__ import annotations
 

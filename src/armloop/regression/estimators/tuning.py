@@ -1,4 +1,4 @@
-"""How an estimator's penalty is chosen: the error on parts of the data held out, or the criterion without them."""
+"""Choice of an estimator's penalty: the error on parts of the data held out, or the criterion without them."""
 
 from __future__ import annotations
 

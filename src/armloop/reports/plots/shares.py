@@ -1,4 +1,4 @@
-"""How much of the residual the effect found explains, and how much its rivals would."""
+"""Explained share of the residual: of the effect found, and of its rivals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that stay apart for colour-blind eyes, light frames, few lines.
+"""Style of all figures: colours that stay apart for colour-blind eyes, light frames, few lines.
 
 `INK`, `MUTED`, `GRID` and `SURFACE` are the colours of a light page; a report that is read on a dark page
 exchanges exactly these.

@@ -1,4 +1,4 @@
-"""How the controllers follow the reference, like Fig. 15 of the paper, and their η."""
+"""Tracking of the reference per controller, like Fig. 15 of the paper, and their η."""
 
 from __future__ import annotations
 
