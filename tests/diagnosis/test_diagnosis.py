@@ -313,6 +313,22 @@ def test_a_law_that_is_not_listed_is_said_to_be_unlisted(model: ReconstructedMod
     assert effect["rmse"]["with_form"] < 0.3 * effect["rmse"]["residual"]
 
 
+@pytest.mark.parametrize(("times", "verdict"), [(1.5, "unlisted_effect"), (0.8, "cannot_tell")])
+def test_a_law_needs_to_explain_what_a_listed_effect_must(
+    model: ReconstructedModel, times: float, verdict: str
+) -> None:
+    """A law of so many times what the model leaves on the worst tenth of its baseline."""
+
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 1, 0.5 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])
+
+    log = run(law, seed=6)
+    size = float(np.sqrt(np.mean(law(fourier_motion(30.0, 100.0, 6))[:, 0] ** 2)))
+    worst = [size / times, *model.baseline["rmse"][1:]]
+    careful = replace(model, baseline={**model.baseline, "worst": worst})
+    assert diagnose(careful, [log]).verdict == verdict
+
+
 def test_several_runs_are_judged_together_and_order_does_not_matter(model: ReconstructedModel) -> None:
     law, expected = CASES["viscous_friction", 2]
     logs = [run(law, seed, seconds=20.0) for seed in (11, 12)]
