@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import armloop.diagnosis.account as accounts
+from armloop.data.motion import Motion
+from armloop.diagnosis.contacts import _seen_whole
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import SIGNIFICANCE, is_worth, lead, lead_of
@@ -57,36 +59,58 @@ def test_what_shows_a_little_on_every_joint_adds_up(sizes: tuple[float, float], 
     assert is_worth(evidence, left(before, block, joint), left(after, block, joint)) == worth
 
 
+def accounted(by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch) -> accounts.Account:
+    """The account of a run of which effects leave so much without an event, and 100 beside what each look shows."""
+
+    def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
+        evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
+        outcome: Any = SimpleNamespace(added=list)
+        return accounts.Account(whole, contacts, evidence, outcome, None)
+
+    tau = np.zeros((4, 1))
+    samples = SimpleNamespace(tau=tau, motion=None)
+    model = SimpleNamespace(with_effects=lambda added: SimpleNamespace(predict=lambda motion: tau))
+    whole: Any = SimpleNamespace(model=model, samples=samples)
+    first, again = looks
+    monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
+    monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: 0.7)
+    monkeypatch.setattr(
+        accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
+    )
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [again])
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
+    monkeypatch.setattr(accounts, "smooth", lambda samples, tau: tau)
+    return accounts.best_account(whole, [first], True, lambda text: None)
+
+
 @pytest.mark.parametrize(("by_effects", "kept"), [(50.0, 0), (150.0, 1)])
 def test_an_event_gives_way_to_effects_that_leave_less_of_the_whole_run(
     by_effects: float, kept: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fast for once, a joint's drag looks like a push there; the push leaves what the drag does elsewhere."""
     event = SimpleNamespace(share=0.9)
+    assert len(accounted(by_effects, [event, event], monkeypatch).contacts) == kept
 
-    def of(whole: object, contacts: list[object], progress: object) -> SimpleNamespace:
-        return SimpleNamespace(
-            contacts=contacts,
-            evidence=SimpleNamespace(rows=np.zeros((4, 1), dtype=bool)),
-            outcome=SimpleNamespace(added=list),
-            unlisted=None,
-            explains=lambda contacts, residual: 0.7,
-            left=lambda residual: 100.0 if contacts else by_effects,
-        )
 
-    class Samples:
-        tau = np.zeros((4, 1))
-        motion = None
+def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction hid what a push did to a joint; the samples are the same."""
+    looks = [SimpleNamespace(share=0.6), SimpleNamespace(share=0.9)]
+    (event,) = accounted(150.0, looks, monkeypatch).contacts
+    assert event is looks[1]
 
-    model = SimpleNamespace(with_effects=lambda added: SimpleNamespace(predict=lambda motion: Samples.tau))
-    whole: Any = SimpleNamespace(model=model, samples=Samples)
-    monkeypatch.setattr(accounts.Account, "of", of)
-    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [event])
-    monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
-    monkeypatch.setattr(accounts, "smooth", lambda samples, tau: tau)
-    contacts: Any = [event]
-    account = accounts.best_account(whole, contacts, True, lambda text: None)
-    assert len(account.contacts) == kept
+
+@pytest.mark.parametrize(
+    ("start", "end", "whole"), [(0.05, 2.0, False), (0.2, 2.0, True), (8.0, 9.95, False)]
+)
+def test_an_event_begins_and_ends_within_its_run(start: float, end: float, whole: bool) -> None:
+    """What is there from the start may be a past that friction remembers."""
+    time = np.concatenate([np.linspace(0.0, 10.0, 1001), np.linspace(0.0, 10.0, 1001)])
+    still = np.zeros((2002, 1))
+    motion = Motion(time, still, still, still, np.array([0, 1001]))
+    rows = (np.arange(2002) > 1001) & (time >= start) & (time <= end)
+    parameters = {"start": Estimate(start, 0.0, "s"), "end": Estimate(end, 0.0, "s")}
+    contact: Any = SimpleNamespace(rows=rows, added=SimpleNamespace(parameters=parameters))
+    assert _seen_whole(motion, contact) == whole
 
 
 def test_noise_has_no_lead() -> None:

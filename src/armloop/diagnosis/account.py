@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,8 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
     again = find_contacts(whole, residual)
     if (without(whole, again).rows != account.evidence.rows).any():
         account = Account.of(whole, again, progress)
+    else:
+        account = replace(account, contacts=again)  # in the same samples, without what the effects do there
     if not account.contacts or not plain_counts:
         return account
     if contacts:

@@ -17,6 +17,7 @@ from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
+from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask
@@ -100,7 +101,15 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         counted[:, sorted(burst.joints)] = True
         counted[:, sorted(others)] = False
         found.append(push(evidence, residual, burst.rows, counted, sorted(burst.joints)))
-    return _distinct(motion, [contact for contact in found if contact is not None])
+    return _distinct(motion, [contact for contact in found if contact and _seen_whole(motion, contact)])
+
+
+def _seen_whole(motion: Motion, contact: Contact) -> bool:
+    """Whether an event begins after its run does and ends before it: else it may be a past that friction remembers."""
+    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    run = next(run for run in motion.runs() if contact.rows[run].any())
+    time = motion.time[run]
+    return bool(start - time[0] >= _SHORTEST and time[-1] - end >= _SHORTEST)
 
 
 def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: list[Burst]) -> list[Burst]:
