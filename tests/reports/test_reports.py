@@ -82,7 +82,7 @@ def test_a_wrong_verdict_is_admitted(loop: SimpleNamespace) -> None:
 
 def test_a_loop_without_an_effect_found(loop: SimpleNamespace, clean: Diagnosis) -> None:
     text = loop_report(
-        SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "baseline": None})
+        SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "reference": None})
     )
     assert "no effect" in text and "One-shot SINDy" not in text
 

@@ -28,6 +28,7 @@ from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
+from armloop.util.workers import one_thread
 
 SCHEMA = "armloop/diagnosis/2"
 
@@ -193,6 +194,7 @@ def _null(value: Any) -> Any:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
+@one_thread
 def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Progress = silent) -> Diagnosis:
     """Find what the model lacks on a measured run.
 

@@ -22,6 +22,7 @@ from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
+from armloop.util.workers import one_thread
 
 #: Speed below which a joint's direction fades in the columns, relative to its fastest.
 _SLOW = 0.02
@@ -105,6 +106,7 @@ class Excitation:
         }
 
 
+@one_thread
 def excite(
     arm: Arm,
     ranges: MotionRanges,
