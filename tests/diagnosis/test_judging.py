@@ -99,6 +99,16 @@ def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.
     assert event is looks[1]
 
 
+def test_an_account_leaves_what_is_held_out_and_what_events_do_not_explain() -> None:
+    """Two rows held out, 3 and 4 units; of an event's two counted rows of 10 N·m at a scale of 5 a quarter is left."""
+    whole: Any = SimpleNamespace(rows=np.array([[True], [True], [True], [False]]))
+    evidence: Any = SimpleNamespace(scale=np.array([5.0]))
+    outcome: Any = SimpleNamespace(after=SimpleNamespace(held_out=np.array([3.0, 4.0])))
+    event: Any = SimpleNamespace(share=0.75, rows=np.array([False, True, True, True]))
+    account = accounts.Account(whole, [event], evidence, outcome, None)
+    assert account.left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 0.25 * (4 + 4))
+
+
 @pytest.mark.parametrize(
     ("start", "end", "whole"), [(0.05, 2.0, False), (0.2, 2.0, True), (8.0, 9.95, False)]
 )
