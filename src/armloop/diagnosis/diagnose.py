@@ -20,7 +20,7 @@ from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.reasons import Standing, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.search import Found, Outcome, Strength, strengths
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects import hypotheses
@@ -45,6 +45,7 @@ class Diagnosis:
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
         reversals: what was found at reversals, if anything.
+        strengths: of each effect found.
         adopted: whether the model has the unlisted law.
         standing: how far the run can be judged: what a reader must know beside the verdict.
     """
@@ -57,6 +58,7 @@ class Diagnosis:
     contacts: list[Contact]
     reversals: AtReversals | None = None
     standing: Standing = field(default_factory=lambda: Standing([], [], False))
+    strengths: list[Strength] = field(default_factory=list)
     adopted: bool = False
 
     def adopt(self) -> Diagnosis:
@@ -127,13 +129,15 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         effects: list[dict[str, Any]] = []
-        for found, added in zip(self.outcome.found, self.outcome.added(), strict=True):
+        every = zip(self.outcome.found, self.outcome.added(), self.strengths, strict=True)
+        for found, added, strength in every:
             effects.append(
                 {
                     **added.to_dict(),
                     "share": found.share,
                     "when": "changed",
-                    "probability": None,  # nothing has calibrated one
+                    "probability": None,
+                    "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
@@ -272,7 +276,16 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]
     augmented = model.with_effects(added)
-    found = Diagnosis(verdict, outcome, augmented, unlisted, evidence, contacts, turned)
+    found = Diagnosis(
+        verdict,
+        outcome,
+        augmented,
+        unlisted,
+        evidence,
+        contacts,
+        turned,
+        strengths=strengths(evidence, outcome),
+    )
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
     stand = standing(evidence, augmented, found.errors()["after"], known)

@@ -67,7 +67,10 @@ def at_rest(samples: Samples) -> NDArray[np.bool_]:
     rest = ~samples.moving
     reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
     if reach:
-        still = [binary_erosion(rest[run], np.ones((2 * reach + 1, 1)), border_value=1) for run in samples.motion.runs()]
+        still = [
+            binary_erosion(rest[run], np.ones((2 * reach + 1, 1)), border_value=1)
+            for run in samples.motion.runs()
+        ]
         rest = np.concatenate(still)
     return np.asarray(rest | (np.abs(samples.motion.v) < CREEP))
 

@@ -33,8 +33,15 @@ def is_worth(evidence: Evidence, current: Fit, trial: Fit) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
-    # What a load or a delay changes shows a little on every joint: the joints' parts add up.
-    return float((by_joint(current, trial) / enough(evidence, current)).sum()) > 1.0
+    return times_enough(evidence, current, trial) > 1.0
+
+
+def times_enough(evidence: Evidence, current: Fit, trial: Fit) -> float:
+    """How many times more than the model's own shortcomings a trial removes.
+
+    What a load or a delay changes shows a little on every joint: the joints' parts add up.
+    """
+    return float((by_joint(current, trial) / enough(evidence, current)).sum())
 
 
 def enough(evidence: Evidence, fit: Fit) -> Array:
