@@ -10,6 +10,7 @@ import pytest
 
 import armloop.diagnosis.account as accounts
 from armloop.data.motion import Motion
+from armloop.diagnosis import unlisted
 from armloop.diagnosis.contacts import _seen_whole
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.fit import Fit
@@ -148,3 +149,10 @@ def test_a_width_beyond_what_was_tried_is_not_resolved() -> None:
     for width, shown in ((1e-5, False), (1e-3, True), (1.0, False)):
         parameters = {"level": Estimate(1.0, 0.1, "N*m"), "width": Estimate(width, 0.0, "rad")}
         assert memory.resolved(parameters, [1e-4, 1e-2]) == shown
+
+
+@pytest.mark.parametrize(
+    ("joints", "law"), [(3, "sin(q1+2*q3)*v2^2"), (4, "sin(3*q4)*v4^2"), (6, "sin(3*q5)*v2*v5")]
+)
+def test_a_law_is_sought_among_waves_of_three_times_an_angle_whatever_the_arm(joints: int, law: str) -> None:
+    assert law in unlisted._library((True,) * joints).names

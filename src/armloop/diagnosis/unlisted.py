@@ -7,6 +7,7 @@ and directions, and reported only if both halves of the run choose it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ FAR_LESS = 0.5
 _FEWEST = 50
 _MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
+_RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,6 +191,15 @@ class _Law:
         return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
 
 
+@lru_cache(maxsize=8)
+def _library(revolute: tuple[bool, ...]) -> AngleSums:
+    """The richest library that is not too large: with many joints, waves of fewer of their angles together."""
+    libraries = (AngleSums(revolute, N1, 2, "velocity", few) for N1, few in _RICHEST_FIRST)
+    return next(
+        (each for each in libraries if each.size <= _MOST_CANDIDATES), AngleSums(revolute, 1, 2, "velocity")
+    )
+
+
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
     y = after.held_out[mine]
@@ -196,8 +207,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     motion = evidence.samples.motion
     moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
     revolute = tuple(bool(r) for r in evidence.model.arm.revolute)
-    libraries = [AngleSums(revolute, N1, 2, "velocity") for N1 in (3, 2, 1)]
-    library = next((each for each in libraries if each.size <= _MOST_CANDIDATES), libraries[-1])
+    library = _library(revolute)
     X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
     X = np.hstack([X, X[:, library.order() <= 1] * direction])
     signed = [
