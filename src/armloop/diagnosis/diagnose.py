@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armloop.data.log import MotionLog, require_different
 from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
+from armloop.diagnosis import probability
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
@@ -136,7 +137,7 @@ class Diagnosis:
                     **added.to_dict(),
                     "share": found.share,
                     "when": "changed",
-                    "probability": None,
+                    "probability": probability.of_effect(found.share),
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
@@ -160,7 +161,7 @@ class Diagnosis:
                 **contact.added.to_dict(),
                 "share": contact.share,
                 "when": "event",
-                "probability": None,
+                "probability": probability.EVENT.probability,
                 "words": contact.added.effect.sentence(contact.added.parameters),
                 "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
                 "alternatives": [
@@ -179,7 +180,7 @@ class Diagnosis:
             where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
             entry = {
                 "when": "changed",
-                "probability": None,
+                "probability": probability.UNLISTED.probability,
                 "where": where.to_dict(),
                 "adopted": self.adopted,
             }
