@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -60,8 +61,13 @@ def test_what_shows_a_little_on_every_joint_adds_up(sizes: tuple[float, float], 
     assert is_worth(evidence, left(before, block, joint), left(after, block, joint)) == worth
 
 
-def accounted(by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch) -> accounts.Account:
-    """The account of a run of which effects leave so much without an event, and 100 beside what each look shows."""
+def accounted(
+    by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch, of_event: float = 0.7
+) -> accounts.Account:
+    """The account of a run of 1000 of which effects leave so much without an event, and 100 beside what each look shows.
+
+    Without it they explain the part ``of_event`` of what it did.
+    """
 
     def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
@@ -71,16 +77,20 @@ def accounted(by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPat
     tau = np.zeros((4, 1))
     samples = SimpleNamespace(tau=tau, motion=None)
     model = SimpleNamespace(with_effects=lambda added: SimpleNamespace(predict=lambda motion: tau))
-    whole: Any = SimpleNamespace(model=model, samples=samples)
+    rows, one = np.ones((4, 1), dtype=bool), np.ones(1)
+    run = np.full((4, 1), np.sqrt(1000 / 4))
+    whole: Any = SimpleNamespace(
+        model=model, samples=samples, rows=rows, scale=one, residual=lambda known: run
+    )
     first, again = looks
     monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
-    monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: 0.7)
+    monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: of_event)
     monkeypatch.setattr(
         accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
     )
     monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [again])
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
-    monkeypatch.setattr(accounts, "smooth", lambda samples, tau: tau)
+    monkeypatch.setattr(accounts.Account, "remaining", lambda self: tau)
     return accounts.best_account(whole, [first], True, lambda text: None)
 
 
@@ -93,6 +103,15 @@ def test_an_event_gives_way_to_effects_that_leave_less_of_the_whole_run(
     assert len(accounted(by_effects, [event, event], monkeypatch).contacts) == kept
 
 
+@pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (800.0, 1)])
+def test_effects_that_explain_an_event_must_explain_the_rest_of_the_run_as_well(
+    by_effects: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside an event a law was found that explains the run; without it a drag that explains but what the event did."""
+    event = SimpleNamespace(share=0.9)
+    assert len(accounted(by_effects, [event, event], monkeypatch, of_event=0.95).contacts) == kept
+
+
 def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction hid what a push did to a joint; the samples are the same."""
     looks = [SimpleNamespace(share=0.6), SimpleNamespace(share=0.9)]
@@ -103,11 +122,14 @@ def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.
 def test_an_account_leaves_what_is_held_out_and_what_events_do_not_explain() -> None:
     """Two rows held out, 3 and 4 units; of an event's two counted rows of 10 N·m at a scale of 5 a quarter is left."""
     whole: Any = SimpleNamespace(rows=np.array([[True], [True], [True], [False]]))
-    evidence: Any = SimpleNamespace(scale=np.array([5.0]))
+    evidence: Any = SimpleNamespace(scale=np.array([5.0]), rows=np.zeros((4, 1), dtype=bool))
+    evidence.rows[0] = True
     outcome: Any = SimpleNamespace(after=SimpleNamespace(held_out=np.array([3.0, 4.0])))
     event: Any = SimpleNamespace(share=0.75, rows=np.array([False, True, True, True]))
     account = accounts.Account(whole, [event], evidence, outcome, None)
     assert account.left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 0.25 * (4 + 4))
+    # taken back, its samples are nobody's: all that is left there counts
+    assert replace(account, contacts=[]).left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 4 + 4)
 
 
 @pytest.mark.parametrize(
