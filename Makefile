@@ -10,6 +10,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Compiled modules are kept, whatever the shell around says: else each of the hundred commands that the tests call would
+# compile numpy, Drake and armloop anew, which takes it several seconds.
+export PYTHONDONTWRITEBYTECODE =
 # Stamps, not the folder: each is touched only after its step has ended well.
 PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
@@ -26,8 +29,7 @@ setup: $(INSTALLED)
 # The set-up counts towards what `make loop` takes, so it is kept short. `$(call install,WHAT)`: uv installs in a sixth of
 # pip's time; where it cannot be had, or the packages are somewhere only pip is told of, it is pip. Nothing is resolved,
 # for the locks are complete, and instead of compiling every module of every package (half a minute), the imports below
-# compile those that are used (4 s). They must not obey PYTHONDONTWRITEBYTECODE, or every later command would compile
-# them again.
+# compile those that are used (4 s).
 export UV_SYSTEM_CERTS ?= 1
 export UV_HTTP_RETRIES ?= 1
 install = { $(BIN)/uv pip install -q --no-deps --no-build-isolation --python $(BIN)/python $(1) \
@@ -40,8 +42,7 @@ $(PACKAGES): requirements.lock
 	@$(PYTHON) -m venv --clear $(VENV)
 	@$(BIN)/pip install -qq --no-deps --no-compile $$(grep '^uv==' requirements.lock) || true
 	@$(call install,-r requirements.lock)
-	@export PYTHONDONTWRITEBYTECODE=; \
-	$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
+	@$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
 	$(BIN)/python -c 'import matplotlib.pyplot, control, osqp, jinja2, pyarrow.csv, pyarrow.parquet' \
 	  && $(BIN)/python -c 'import pydrake.multibody.plant, pydrake.multibody.parsing, pydrake.geometry' \
 	  && wait $$first
