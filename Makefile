@@ -1,6 +1,7 @@
 # make setup   create .venv with everything in it, from requirements.lock
 # make loop    the main job, start to end, on a simulated and a measured arm, in out/loop
 # make test    style, types and tests
+# make types   style and types alone
 # make docs    the documentation, tutorials executed, in out/site
 # make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel
 # make bench   the benchmarks' ratios
@@ -22,7 +23,7 @@ WRITING := $(VENV)/.writing
 WHEEL ?= out/wheel
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: setup loop test long docs wheel bench blind mutants clean
+.PHONY: setup loop test types long docs wheel bench blind mutants clean
 
 setup: $(INSTALLED)
 
@@ -60,11 +61,13 @@ loop: setup
 	$(BIN)/armloop loop --out out/loop
 
 # With the packages of the documentation, whose site a test builds.
-test: setup $(WRITING)
+test: types $(WRITING)
+	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
+
+types: setup $(TESTING)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
 
 # What takes minutes a test: ten random arms of another engine, workers killed in the middle.
 long: setup $(TESTING)
@@ -84,7 +87,8 @@ wheel: setup
 	@rm -rf $(WHEEL) && mkdir -p $(WHEEL)
 	$(BIN)/python -m build --wheel --no-isolation --outdir $(WHEEL) . >/dev/null
 	$(PYTHON) -m venv $(WHEEL)/environment
-	$(WHEEL)/environment/bin/pip install -qq --no-compile -c requirements.lock $(WHEEL)/armloop-*.whl
+	$(BIN)/uv pip install -q --python $(WHEEL)/environment/bin/python -c requirements.lock $(WHEEL)/armloop-*.whl \
+	  || $(WHEEL)/environment/bin/pip install -qq --no-compile -c requirements.lock $(WHEEL)/armloop-*.whl
 	$(WHEEL)/environment/bin/pip check
 	cd / && $(abspath $(WHEEL))/environment/bin/armloop --version
 
