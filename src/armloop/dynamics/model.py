@@ -60,7 +60,7 @@ class ModelEquations:
         self.symmetric = symmetric
         self.functions = functions
         # A fault of a sensor is none of the arm, an event of one run none of the next.
-        kept = [a for a in model.effects if step >= 3 and not a.effect.sensor and a.effect.searched]
+        kept = [a for a in model.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
         added = [(a.effect, a.parameters) for a in kept]
         inertial = model.inertial_parameters() if any(e.needs_inertial for e, _ in added) else None
         laws = [
