@@ -163,9 +163,15 @@ def test_a_log_of_a_data_frame():
     cells = {"time": log.time, "temperature": log.time + 30}
     for kind in ("q", "v", "tau"):
         cells |= {f"{kind}{j + 1}": getattr(log, kind)[:, j] for j in range(3)}
-    for frame in (Frame(cells), pa.table(cells)):
+    for frame in (Frame(cells), pa.table(cells), cells):
         found = MotionLog.from_frame(frame, joints=3)
         np.testing.assert_array_equal(found.tau, log.tau)
+    with pytest.raises(LogError, match=r"ndarray has no columns by name; .*from_arrays"):
+        MotionLog.from_frame(log.q)
+    with pytest.raises(LogError, match="the header lacks"):
+        MotionLog.from_frame({"time": log.time})
+    with pytest.raises(TypeError, match="positional"):  # a file's order would give v for tau
+        MotionLog.from_arrays(log.time, log.q, log.v, log.tau)  # type: ignore[misc]
     del cells["v1"], cells["v2"], cells["v3"]
     assert MotionLog.from_frame(Frame(cells)).v_derived
     with pytest.raises(LogError, match="tau1"):

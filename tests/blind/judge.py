@@ -68,8 +68,9 @@ def deviations(hidden: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[st
         for found in verdict["effects"]:
             if place(found) != place(truth):
                 continue
-            for key, value in truth["parameters"].items():
-                if key not in found["parameters"] or key in ("phase", "ratio", "order"):
+            # Arms from outside have an effect's numbers beside its name; a force on a link is none on the tool.
+            for key, value in truth.get("parameters", truth).items():
+                if key not in found["parameters"] or key in ("phase", "ratio", "order", "force"):
                     continue
                 estimate = found["parameters"][key]
                 off = np.linalg.norm(np.subtract(estimate["value"], value))

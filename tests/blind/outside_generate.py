@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 from outside.mujoco_arms import random_arm, write_log
+from outside.mujoco_run import Diverged
 from outside.references import fourier_reference, mixed_reference
 from outside_cases import draw_case
 
 #: What is hidden in one case after the other, and its size as a share of the joint's RMS torque.
 KINDS = ("clean", "one", "event", "one", "two", "one", "unlisted", "one")
 SIZES = (0.04, 0.08, 0.2)
+#: So often another effect is drawn where one throws the arm off its path.
+_ATTEMPTS = 5
 
 
 def generate_outside(seed: int, cases: int, logs: Path, answers: Path, seconds: float = 30.0) -> None:
@@ -37,8 +40,15 @@ def generate_outside(seed: int, cases: int, logs: Path, answers: Path, seconds: 
     for case in range(cases):
         kind, size = KINDS[case % len(KINDS)], SIZES[int(rng.integers(len(SIZES)))]
         reference = fourier_reference(arm, 1000 * seed + case, seconds, speed=float(rng.uniform(0.6, 1.0)))
-        hidden = draw_case(arm, reference, 1000 * seed + case, kind, size)
-        log = arm.simulate(reference, hidden.effects, seed=case, **how)
+        for attempt in range(_ATTEMPTS):
+            try:
+                hidden = draw_case(arm, reference, 1000 * seed + case + 100 * attempt, kind, size)
+                log = arm.simulate(reference, hidden.effects, seed=case, **how)
+                break
+            except Diverged:
+                # An effect that the controller cannot hold leaves no log: another one is drawn.
+                if attempt == _ATTEMPTS - 1:
+                    raise
         write_log(log, folder / f"run_{case}.csv")
         (answers / f"{name}_run_{case}.json").write_text(
             json.dumps({**hidden.sealed(), "seconds": seconds}, indent=1), encoding="utf-8"

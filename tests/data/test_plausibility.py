@@ -141,7 +141,7 @@ def test_lists_are_converted() -> None:
     same = MotionLog(log.time.tolist(), log.q.tolist(), log.v.tolist(), log.tau.astype(np.float32).tolist())
     np.testing.assert_array_equal(same.q, log.q)
     assert same.tau.dtype == np.float64 and same.joints == 3
-    whole = MotionLog.from_arrays(range(3), [[0], [1], [2]], [[5], [5], [5]], [[1], [1], [1]])
+    whole = MotionLog.from_arrays(range(3), [[0], [1], [2]], [[5], [5], [5]], v=[[1], [1], [1]])
     assert whole.q.dtype == np.float64
 
 

@@ -18,6 +18,7 @@ from synthetic import (
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
+from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
@@ -303,7 +304,8 @@ def test_a_law_that_is_not_listed_is_said_to_be_unlisted(model: ReconstructedMod
     def law(motion: Motion) -> np.ndarray:
         return on_joint(motion, 1, 0.5 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])
 
-    answer = diagnose(model, [run(law, seed=6)]).to_dict()
+    found = diagnose(model, [run(law, seed=6)])
+    answer = found.to_dict()
     assert answer["verdict"] == "unlisted_effect"
     (effect,) = answer["effects"]
     assert (effect["effect"], effect["joint"]) == ("unlisted", 1)
@@ -311,6 +313,27 @@ def test_a_law_that_is_not_listed_is_said_to_be_unlisted(model: ReconstructedMod
     assert law_found == "cos(2*q1)*v2"
     assert float(coefficient) == pytest.approx(0.5, rel=0.1)
     assert effect["rmse"]["with_form"] < 0.3 * effect["rmse"]["residual"]
+    # adopted, it is in the model: coefficient within its errors, and a run that it was not found on has lost it
+    estimate = effect["parameters"]["cos(2*q1)*v2"]
+    assert (
+        abs(estimate["value"] - 0.5) < max(3 * estimate["std_error"], 0.05) and estimate["std_error"] < 0.05
+    )
+    adopted = found.adopt()
+    assert adopted.to_dict()["effects"][0]["adopted"] and not effect["adopted"]
+    assert adopted.errors()["after"][0] < 0.3 * found.errors()["after"][0]
+    other = preprocess([run(law, seed=16)], model.conditioning)
+    ranges = {
+        key: np.asarray(effect["parameters"][key]["value"]) for key in ("q_low", "q_high", "v_low", "v_high")
+    }
+    q1, v2 = other.motion.q[:, 0], other.motion.v[:, 1]
+    within = other.moving[:, 0] & (q1 > ranges["q_low"][0]) & (q1 < ranges["q_high"][0])
+    within &= (v2 > ranges["v_low"][1]) & (v2 < ranges["v_high"][1])
+    assert 0.5 < within.mean() < 1.0
+    before, after = (
+        np.sqrt(np.mean((other.tau - each.predict(other.motion))[within, 0] ** 2))
+        for each in (found.model, adopted.model)
+    )
+    assert after < 0.3 * before
 
 
 @pytest.mark.parametrize(("times", "verdict"), [(1.5, "unlisted_effect"), (0.8, "cannot_tell")])

@@ -31,6 +31,10 @@ _FIELDS = {
 _SENSORS = ("torque_gain", "torque_offset", "encoder_offset", "time_delay", "torque_noise")
 
 
+class Diverged(RuntimeError):
+    """A simulation that was thrown off its path."""
+
+
 def simulate(
     arm: Any,
     reference: Any,
@@ -115,7 +119,7 @@ def simulate(
     log = np.array(kept)
     time, (q, v, vdot, tau) = log[:, 0], (log[:, 1 + k * n : 1 + (k + 1) * n] for k in range(4))
     if not np.isfinite(log).all():
-        raise RuntimeError(f"{arm.name}: the simulation diverged")
+        raise Diverged(f"{arm.name}: the simulation diverged")
     q, tau = _sensed(effects, time, q, tau, rng)
     if not clean:
         tau = tau + noise * np.sqrt(np.mean(tau**2, axis=0)) * rng.normal(size=tau.shape)

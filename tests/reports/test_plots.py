@@ -54,6 +54,16 @@ def test_reconstruction_figures(loop: SimpleNamespace) -> None:
     drawn(plots.orders_figure(loop.reconstruction.reports, loop.reference.reports))
 
 
+def test_friction_laws_tried_are_drawn_with_what_they_led_to() -> None:
+    rungs = [
+        {"rung": "Coulomb and viscous", "before": 0.7, "after": 0.02, "refused": None, "joints": [1, 2]},
+        {"rung": "Stribeck", "before": 0.02, "after": 0.02, "refused": 0.021, "joints": []},
+    ]
+    axes = drawn(plots.ladder_figure(rungs)).axes[0]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["Coulomb and viscous", "Stribeck"]
+    assert [text.get_text() for text in axes.texts] == ["2.0 %   joints 1, 2", "2.1 %"]
+
+
 def test_a_residual_lies_under_every_torque(loop: SimpleNamespace) -> None:
     model, samples = loop.reconstruction.model, loop.diagnosis.samples
     figure = drawn(plots.torque_figure(model, samples))

@@ -88,6 +88,7 @@ def diagnose(
     logs: MotionLog | Sequence[MotionLog],
     *,
     held_out: MotionLog | Sequence[MotionLog] = (),
+    adopt: bool = False,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Find what a model lacks on a measured run, trace it to a physical effect, and add it; see ``armloop diagnose``.
@@ -95,6 +96,7 @@ def diagnose(
     Args:
         logs: the run, or several of the same arm.
         held_out: further runs of the arm as it is now, never fitted: error before and after on each.
+        adopt: put an unlisted law that was found into the model; it acts where the run has been.
 
     Raises:
         InputError: a log does not fit the model.
@@ -102,5 +104,6 @@ def diagnose(
     runs = logs_for(model, as_logs(logs))
     plain = Model.of(model).plain()
     found = run(plain, runs, progress)
+    found = found.adopt() if adopt else found
     closing = close(plain, found.model, found.samples, logs_for(model, as_logs(held_out)))
     return Diagnosis(found, model, runs, closing)

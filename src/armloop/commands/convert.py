@@ -116,16 +116,26 @@ def _suggest(options: argparse.Namespace, arm: object) -> None:
     text = written(mapping, unsure, recording)
     if place is not None:
         write_text(place, text)
+    known = "?" not in mapping.q.names()
     if options.json:
         answer = {"map": None if place is None else str(place), "kind": recording.kind}
         print_json(
-            {**answer, "samples": recording.samples, "joints": mapping.n, "unsure": unsure, "text": text}
+            {
+                **answer,
+                "samples": recording.samples,
+                "joints": mapping.n if known else 0,
+                "unsure": unsure,
+                "text": text,
+            }
         )
         return
     if place is None:
         print(text, end="")
         return
-    print(f"{recording.path.name}: {recording.kind}, {recording.samples} rows, {mapping.n} joints")
+    joints = f"{mapping.n} joint{'s' if mapping.n > 1 else ''}" if known else "how many joints is not clear"
+    print(f"{recording.path.name}: {recording.kind}, {recording.samples} rows, {joints}")
+    for note in recording.notes:
+        print(f"  {note}")
     for line in doubts(unsure):
         print(f"  unsure of {line}")
     if not unsure:

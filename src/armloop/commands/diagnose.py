@@ -26,6 +26,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="LOG",
         help="further runs of the arm as it is now, never fitted: error before and after on each of them",
     )
+    p.add_argument(
+        "--adopt",
+        action="store_true",
+        help="put an unlisted law that was found into the augmented model and its feedforward; it acts where the run has "
+        "been and fades outside of that",
+    )
     p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
     add_chain(p)
     add_recorded(p, "as the model's training logs")
@@ -48,6 +54,7 @@ def run(options: argparse.Namespace) -> None:
     apart = held_out_logs(options, model, logs)
     wanted = wish(options, model)
     result = run(model, logs, progress(options))
+    result = result.adopt() if options.adopt else result
     closing = close(model, result.model, result.samples, apart)
     answer = {**result.to_dict(), **closing.to_dict()}
     planned = None if wanted is None else plan(options.next_run, result, wanted, progress(options))

@@ -6,41 +6,15 @@ Nothing here is certain. What comes out is a map to be looked at, with what it i
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping as Mapping_
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.units import canonical
+from armloop.convert.vocabulary import CURRENT, WANTED, WORDS, kind_of, words_of
 
-# In the order of preference: the first word that a name holds decides.
-_WORDS = {
-    "vdot": ("vdot", "ddq", "qdd", "qacc", "acceleration", "accelerations", "acc", "accel"),
-    "v": ("dq", "qd", "qdot", "qvel", "velocity", "velocities", "vel", "speed", "speeds", "omega", "v"),
-    "tau": (
-        "tau",
-        "torque",
-        "torques",
-        "effort",
-        "efforts",
-        "moment",
-        "moments",
-        "trq",
-        "current",
-        "currents",
-        "amps",
-        "i",
-    ),
-    "q": ("q", "qpos", "position", "positions", "pos", "angle", "angles", "theta", "state", "jointangles"),
-    "time": ("time", "timestamp", "timestamps", "stamp", "t", "sec", "secs", "seconds", "clock", "duration"),
-}
-_CURRENT = {"current", "currents", "amps", "i"}
-# A name with one of these is not what was measured at the joint.
-_WANTED = {
-    "target", "desired", "des", "cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "goal", "action",
-    "d", "c", "error", "err", "ext", "external", "hat", "motor", "tcp", "ee", "cartesian", "limit", "max", "min", "var",
-    "std",     "temperature", "temperatures", "temp", "voltage",
-    "gripper",
-}  # fmt: skip
+_BRACKETS = str.maketrans("（）［］【】", "()[][]")
 _UNIT = re.compile(r"[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]\s*$")
 _UNIT_WORDS = {
     "deg": "deg",
@@ -76,11 +50,16 @@ class Suggestion:
     unsure: dict[str, str]
 
 
-def suggest(columns: Sequence[str], joints: Sequence[str] = ()) -> Suggestion:
-    """A map for a table with these columns; ``joints`` are the names of the arm's, where one is given."""
+def suggest(
+    columns: Sequence[str], joints: Sequence[str] = (), units: Mapping_[str, str] | None = None
+) -> Suggestion:
+    """A map for a table with these columns.
+
+    ``joints`` are the names of the arm's, where one is given, ``units`` those of a row below the header.
+    """
     unsure: dict[str, str] = {}
-    groups = _numbered(columns) + _named(columns, joints)
-    best: dict[str, list[Group]] = {kind: _ranked(kind, groups) for kind in ("q", "v", "tau", "vdot")}
+    groups = groups_of(columns, joints, units)
+    best: dict[str, list[Group]] = {kind: ranked(kind, groups) for kind in ("q", "v", "tau", "vdot")}
     if not best["q"] or not best["tau"]:
         missing = " and ".join(
             {"q": "positions", "tau": "torques or currents"}[k] for k in ("q", "tau") if not best[k]
@@ -88,17 +67,17 @@ def suggest(columns: Sequence[str], joints: Sequence[str] = ()) -> Suggestion:
         return Suggestion(None, {"columns": f"no columns of {missing} were recognised"})
     q = best["q"][0]
     fields: dict[str, QuantityMap | None] = {"v": None, "vdot": None}
-    for kind, ranked in best.items():
-        fitting = [ordered for group in ranked if (ordered := _in_order(group, q)) is not None]
+    for kind, likely in best.items():
+        fitting = [ordered for group in likely if (ordered := _in_order(group, q)) is not None]
         if not fitting:
             if kind == "tau":
                 return Suggestion(None, {"columns": f"no {len(q.columns)} columns of torque go with {q.key}"})
             continue
         group = fitting[0]
-        fields[kind] = QuantityMap(list(group.columns), _unit(kind, group))
+        fields[kind] = QuantityMap(list(group.columns), unit_of(kind, group))
         if len(fitting) > 1:
             unsure[kind] = "also possible: " + ", ".join(other.key for other in fitting[1:4])
-    time, doubt = _time(columns)
+    time, doubt = time_of(columns, units)
     if doubt:
         unsure["time"] = doubt
     found = fields["q"], fields["tau"]
@@ -128,15 +107,18 @@ def _in_order(group: Group, first: Group) -> Group | None:
     return replace(group, columns=tuple(columns[joint] for joint in first.joints), joints=first.joints)
 
 
-def words_of(name: str) -> list[str]:
-    """The words of a name, lower case: ``joint1Pos_deg`` gives joint, 1, pos, deg."""
-    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
-    return re.findall(r"[a-z%µ°]+|\d+", spaced.lower())
+def groups_of(
+    columns: Sequence[str], joints: Sequence[str] = (), units: Mapping_[str, str] | None = None
+) -> list[Group]:
+    """Columns that differ in the joint alone, by its number or its name."""
+    return _numbered(columns, units or {}) + _named(columns, joints, units or {})
 
 
-def _split_unit(name: str) -> tuple[str, str]:
-    """A name without its unit, and the unit as it is written, in brackets or as the last word."""
-    found = _UNIT.search(name)
+def _split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
+    """A name without its unit, and the unit as it is written: in a row of its own, in brackets, or as the last word."""
+    if units.get(name):
+        return name, units[name]
+    found = _UNIT.search(name.translate(_BRACKETS))
     if found:
         return name[: found.start()].strip(), found[1]
     last = words_of(name)[-1:]
@@ -145,11 +127,11 @@ def _split_unit(name: str) -> tuple[str, str]:
     return name, ""
 
 
-def _numbered(columns: Sequence[str]) -> list[Group]:
+def _numbered(columns: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
     """Groups like ``q1, q2, …`` or ``state.q[0], state.q[1], …`` with consecutive numbers from 0 or 1."""
     found: dict[tuple[str, str, str], dict[int, str]] = {}
     for column in columns:
-        name, unit = _split_unit(column)
+        name, unit = _split_unit(column, units)
         for place in re.finditer(r"\d+", name):
             key = (name[: place.start()], name[place.end() :], unit)
             found.setdefault(key, {}).setdefault(int(place[0]), column)
@@ -170,11 +152,11 @@ def _numbered(columns: Sequence[str]) -> list[Group]:
     return [group for group in groups if len(group.columns) > 1 or most == 1]
 
 
-def _named(columns: Sequence[str], joints: Sequence[str]) -> list[Group]:
+def _named(columns: Sequence[str], joints: Sequence[str], units: Mapping_[str, str]) -> list[Group]:
     """Groups like ``elbow.pos, wrist.pos`` that share a beginning or an end, or hold the names of the arm's joints."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for column in columns:
-        name, unit = _split_unit(column)
+        name, unit = _split_unit(column, units)
         hits = [joint for joint in joints if joint in name]
         if hits:
             joint = max(hits, key=len)
@@ -182,7 +164,7 @@ def _named(columns: Sequence[str], joints: Sequence[str]) -> list[Group]:
             continue
         for separator in ("/", ".", "__", " ", "_"):
             first, _, last = name.rpartition(separator)
-            if first and last and not last.isdecimal() and not _WANTED & set(words_of(first)):
+            if first and last and not last.isdecimal() and not WANTED & set(words_of(first)):
                 found.setdefault((separator + last, unit), {})[first] = column
                 break
     groups = []
@@ -199,42 +181,39 @@ def _named(columns: Sequence[str], joints: Sequence[str]) -> list[Group]:
     return groups
 
 
-def _ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
+def ranked(kind: str, groups: Sequence[Group]) -> list[Group]:
     """The groups that may hold a quantity, the likeliest first."""
 
     def rank(group: Group) -> tuple[int, int, int, int]:
-        wanted = sum(word in _WANTED for word in group.words)
-        place = min(_WORDS[kind].index(word) for word in group.words if word in _WORDS[kind])
+        wanted = sum(word in WANTED for word in group.words)
+        place = min(WORDS[kind].index(word) for word in group.words if word in WORDS[kind])
         how = 0 if group.by_name else 1 if group.joints[0].isdecimal() else 2
         return wanted, how, place, -len(group.columns)
 
-    return sorted((group for group in groups if _kind(group.words) == kind and rank(group)[0] < 2), key=rank)
+    return sorted(
+        (group for group in groups if kind_of(group.words) == kind and rank(group)[0] < 2), key=rank
+    )
 
 
-def _kind(words: Sequence[str]) -> str | None:
-    for kind, known in _WORDS.items():
-        if any(word in known for word in words):
-            return kind
-    return None
-
-
-def _unit(kind: str, group: Group) -> str | None:
+def unit_of(kind: str, group: Group) -> str | None:
+    """The unit that the names of a group say, or None."""
     said = canonical(group.unit, kind)
     if said is None and group.unit and kind in ("v", "vdot"):
         said = canonical(f"{group.unit}/s" + ("^2" if kind == "vdot" else ""), kind)
-    if said is None and kind == "tau" and _CURRENT & set(group.words):
+    if said is None and kind == "tau" and CURRENT & set(group.words):
         return None
     return said
 
 
-def _time(columns: Sequence[str]) -> tuple[TimeMap, str]:
-    found = []
+def time_of(columns: Sequence[str], units: Mapping_[str, str] | None = None) -> tuple[TimeMap, str]:
+    """The column of time by its name, and what is not sure of it."""
+    found, units = [], units or {}
     for column in columns:
-        name, unit = _split_unit(column)
+        name, unit = _split_unit(column, units)
         # a variable inside a struct: data.time
         words = [word for word in words_of(name.rpartition(".")[2]) if word not in _UNIT_WORDS]
-        if words and all(word in _WORDS["time"] for word in words):
-            found.append((_WORDS["time"].index(words[0]), column, canonical(unit, "time")))
+        if words and all(word in WORDS["time"] for word in words):
+            found.append((WORDS["time"].index(words[0]), column, canonical(unit, "time")))
     if not found:
         return TimeMap(column=None, rate=None), "no column of time was recognised; say time: {rate: HZ}"
     found.sort(key=lambda entry: entry[0])

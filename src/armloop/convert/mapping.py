@@ -110,6 +110,13 @@ def check_map(mapping: Mapping, where: str) -> None:
         raise InputError(f"{where}: schema is {mapping.schema!r}; it must be {SCHEMA}")
     if (mapping.time.column is None) == (mapping.time.rate is None):
         raise InputError(f"{where}: time: give either column (with its unit) or rate in Hz")
+    open_fields = [name for name, quantity in mapping.quantities().items() if UNSAID in quantity.names()]
+    if mapping.time.column == UNSAID:
+        open_fields.insert(0, "time")
+    if open_fields:
+        raise InputError(
+            f"{where}: {' and '.join(open_fields)}: the columns are still {UNSAID!r}; name them, one per joint, base to tip"
+        )
     _check_unit(mapping.time.unit, "time", where)
     n = mapping.n
     if not 1 <= n <= MOST_JOINTS:

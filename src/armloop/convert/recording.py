@@ -28,6 +28,8 @@ class Recording:
         epoch: what the time column counts from, s since 1970, where the format says so.
         rows: what to call a row ("row", "message").
         notes: what was read and what was left, one line each.
+        unsure: what the columns' names leave open, by field of the map.
+        units: by column, the unit that a row below the header says.
     """
 
     path: Path
@@ -40,6 +42,7 @@ class Recording:
     rows: str = "row"
     notes: list[str] = field(default_factory=list)
     unsure: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:

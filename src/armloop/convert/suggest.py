@@ -9,42 +9,51 @@ import numpy as np
 
 from armloop.convert.assemble import rate_ratio
 from armloop.convert.headers import suggest
+from armloop.convert.inferred import alternatives, described, inferred
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
 from armloop.convert.recording import Recording
-from armloop.convert.units import FACTORS, RATES, canonical
+from armloop.convert.units import FACTORS, RATES, canonical, fitting
 from armloop.robot.arm import Arm
-from armloop.util.errors import LogError
 
 _BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
 _YAML_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 
 
 def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str, str]]:
-    """The map of a source, and by field what is not sure of it.
-
-    Raises:
-        LogError: no positions or no torques are recognised among the columns.
-    """
+    """The map of a source, and by field what is not sure of it; what cannot be told has the one column ``?``."""
     mapping, unsure = recording.mapping, dict(recording.unsure)
     if mapping is None or (arm is not None and mapping.n != arm.n and not recording.named):
         names = [] if arm is None else [joint.name for joint in arm.joints]
-        found = suggest(list(recording.columns), names)
-        if found.mapping is None:
-            columns = ", ".join(list(recording.columns)[:20])
-            raise LogError(
-                f"{recording.path}: {found.unsure['columns']} ({columns}); write a map by hand, see docs/convert.md"
-            )
-        mapping, unsure = found.mapping, found.unsure
+        found = suggest(list(recording.columns), names, recording.units)
+        if found.mapping is not None and (arm is None or found.mapping.n == arm.n):
+            mapping, unsure = found.mapping, found.unsure
+        else:
+            mapping, unsure = inferred(recording, names)
     if mapping.tau.unit is None:
         unsure["tau.unit"] = "N*m for torques, A for motor currents (then with gains, in N·m/A)"
     for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
-        if quantity is not None and quantity.unit is None:
+        if quantity is not None and quantity.unit is None and UNSAID not in quantity.names():
             unsure[f"{kind}.unit"] = (
-                f"{_range(recording, quantity)}: rad or deg?" if kind == "q" else "as that of q, per s"
+                f"{_range(recording, quantity)}: rad or deg?"
+                if kind == "q"
+                else _rates_that_fit(recording, mapping)
             )
     if mapping.time.column is not None and mapping.time.unit is None:
         unsure["time.unit"] = _time_evidence(recording, mapping)
+    if mapping.v is not None and not {"q.unit", "v.unit", "time.unit", "v"} & {*unsure}:
+        unsure |= _contradiction(recording, mapping, mapping.v)
     return mapping, unsure
+
+
+def _contradiction(recording: Recording, mapping: Mapping, v: QuantityMap) -> dict[str, str]:
+    """What is wrong where v is not the rate of q in the units that the source says; nothing where that is not known."""
+    clock, unit = mapping.time.column, canonical(mapping.time.unit or "", "time")
+    if clock is None or unit is None or recording.kind == "motion log":
+        return {}
+    ratio = rate_ratio(recording.columns[clock], recording, mapping.q, v) / FACTORS["time"][unit]
+    if ratio == 0 or 0.7 < ratio < 1.4:
+        return {}
+    return {"v": f"in these units q changes {ratio:.3g} times as fast as v says; is each of the units right?"}
 
 
 def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> str:
@@ -55,6 +64,8 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
         f"schema: {SCHEMA}",
     ]
     time = mapping.time
+    if any(UNSAID in quantity.names() for quantity in mapping.quantities().values()):
+        lines += ["# What the columns show:", *(f"#   {line}" for line in described(recording, time.column))]
     if time.rate is not None:
         lines.append(f"time: {{rate: {time.rate:g}}}")
     elif time.column is None:
@@ -69,6 +80,8 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
     for kind, quantity in mapping.quantities().items():
         lines.append(f"{kind}:{_doubt(unsure, kind)}")
         lines.append(f"  columns: {_words(quantity.names())}")
+        if UNSAID in quantity.names():
+            lines += [f"  # columns: {_words(names)}" for names in alternatives(recording, mapping)]
         lines.append(f"  unit: {_word(str(quantity.unit or UNSAID))}" + _doubt(unsure, f"{kind}.unit"))
         if kind == "tau" and quantity.unit is None:
             lines.append("  # gains: [..]  N·m per A, one per joint, if these are currents")
@@ -85,6 +98,21 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
 def doubts(unsure: dict[str, str]) -> list[str]:
     """What is not sure, one line each."""
     return [f"{field}: {text}" for field, text in unsure.items()]
+
+
+def _rates_that_fit(recording: Recording, mapping: Mapping) -> str:
+    """Which units of q and v go together, where a clock tells."""
+    assert mapping.v is not None
+    clock, said = mapping.time.column, mapping.q.unit
+    if clock is not None and mapping.time.unit is not None and UNSAID not in mapping.q.names():
+        plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, "rad/s")
+        ratio = rate_ratio(recording.columns[clock], recording, *plain) / FACTORS["time"][mapping.time.unit]
+        pairs = [(q, v) for q, v in fitting(ratio) if said in (None, q)]
+        # Angles are the rule; others are named where no angle fits.
+        pairs = [pair for pair in pairs if pair[0] in ("rad", "deg")] or pairs
+        if pairs:
+            return "by the motion, " + ", ".join(v if said else f"{v} if q is in {q}" for q, v in pairs)
+    return "as that of q, per s"
 
 
 def _time_evidence(recording: Recording, mapping: Mapping) -> str:

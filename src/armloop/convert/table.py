@@ -7,23 +7,32 @@ from pathlib import Path
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import read_text
+from armloop.convert.text import clock_seconds, read_text
 from armloop.util.errors import LogError
 
 
 def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
     if path.suffix == ".parquet":
-        columns, starts, dropped = _parquet(path)
+        columns, starts, dropped, units = _parquet(path)
+        notes: list[str] = []
     else:
         table = read_text(path)
-        columns, starts, dropped = table.columns, table.starts, table.dropped
-    notes = [f"columns left out: {', '.join(dropped)}"] if dropped else []
-    own = _own(columns)
+        columns, starts, dropped, units, notes = (
+            table.columns,
+            table.starts,
+            table.dropped,
+            table.units,
+            table.notes,
+        )
+    notes += [f"columns left out: {', '.join(dropped)}"] if dropped else []
+    own = _own(columns) if not units else None
     if own is not None:
         return Recording(path, "motion log", columns, own, starts=starts, notes=notes)
-    found = suggest(list(columns))
-    return Recording(path, "table", columns, found.mapping, starts=starts, notes=notes, unsure=found.unsure)
+    found = suggest(list(columns), units=units)
+    return Recording(
+        path, "table", columns, found.mapping, starts=starts, notes=notes, unsure=found.unsure, units=units
+    )
 
 
 def _own(columns: dict[str, Array]) -> Mapping | None:
@@ -42,7 +51,7 @@ def _own(columns: dict[str, Array]) -> Mapping | None:
     )
 
 
-def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str]]:
+def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str], dict[str, str]]:
     import pyarrow
     import pyarrow.parquet
 
@@ -50,7 +59,7 @@ def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str]]:
         table = pyarrow.parquet.read_table(path)
     except (pyarrow.ArrowException, OSError) as error:
         raise LogError(f"{path}: not a Parquet file; write it anew, or name it .csv if it is text") from error
-    columns, dropped = {}, []
+    columns, dropped, units = {}, [], {}
     for name in table.column_names:
         kind = table.schema.field(name).type
         if (
@@ -59,6 +68,8 @@ def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str]]:
             or pyarrow.types.is_boolean(kind)
         ):
             columns[name] = table.column(name).cast(pyarrow.float64()).to_numpy()
+        elif (seconds := clock_seconds(table.column(name))) is not None:
+            columns[name], units[name] = seconds, "s"
         else:
             dropped.append(f"{name} ({kind})")
-    return columns, [0], dropped
+    return columns, [0], dropped, units

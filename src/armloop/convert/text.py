@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from armloop.convert.recording import Array
+from armloop.convert.units import FACTORS, canonical
 from armloop.util.errors import LogError
 
 _NUMBER = re.compile(
@@ -17,13 +19,19 @@ _NUMBER = re.compile(
 )
 
 
+# Bytes that stand in no text.
+_CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
+
+
 @dataclass
 class TextTable:
-    """Columns of text; ``starts`` holds the first row below each header."""
+    """Columns of text; ``starts`` holds the first row below each header, ``units`` what a row below it says."""
 
     columns: dict[str, Array]
     starts: list[int]
     dropped: list[str]
+    units: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
 def header_of(path: Path) -> list[str]:
@@ -32,7 +40,7 @@ def header_of(path: Path) -> list[str]:
     Raises:
         LogError: the file is not text.
     """
-    lines = _lines(path)
+    lines, _ = _lines(path)
     separator, at = _layout(lines)
     return [] if at is None else _names(lines[at], separator)
 
@@ -46,13 +54,20 @@ def read_text(path: Path) -> TextTable:
     import pyarrow
     import pyarrow.csv
 
-    lines = _lines(path)
+    lines, notes = _lines(path)
     separator, first = _layout(lines)
     if first is None:
         raise LogError(
             f"{path}: no header: the first line must name the columns; add one, such as time,q1,q2,tau1,tau2"
         )
     names = _names(lines[first], separator)
+    below = next((k for k in range(first + 1, len(lines)) if lines[k].strip()), first)
+    units: dict[str, str] = {}
+    if below > first and _is_units(lines[below], separator, len(names)):
+        cells = [_bare(cell) for cell in _cells(lines[below], separator)]
+        units = {name: unit for name, unit in zip(names, cells, strict=False) if name and unit}
+        lines = [*lines[:below], "", *lines[below + 1 :]]
+        notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
     heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
     body, starts, numbers, rows = [], [], [], 0
     for k in range(first + 1, len(lines)):
@@ -70,6 +85,9 @@ def read_text(path: Path) -> TextTable:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
     starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {rows})
     decimal = "," if separator != "," and any(re.search(r"\d,\d", line) for line in body[:50]) else "."
+    if separator != "," or decimal != ".":
+        between = {"\t": "tabs", ";": "semicolons", " ": "blanks", ",": "commas"}[separator]
+        notes.append(f"{between} between the cells, decimal {'comma' if decimal == ',' else 'point'}")
     if separator == " ":
         body = [" ".join(line.split()) for line in body]
     # One more separator at the end of each row, or one column whose cells are empty, is what some loggers write.
@@ -113,33 +131,96 @@ def read_text(path: Path) -> TextTable:
             if np.isnan(columns[name]).all():
                 del columns[name]
                 dropped.append(f"{name} (no numbers: {bad!r})")
+        elif (seconds := clock_seconds(cells)) is not None:
+            columns[name], units[name] = seconds, "s"
+            notes.append(f"{name}: dates or times of day, counted in s from the first row")
         else:
             dropped.append(f"{name} (empty)" if pyarrow.types.is_null(kind) else f"{name} ({kind})")
-    return TextTable(columns, starts, dropped)
+    return TextTable(columns, starts, dropped, units, notes)
 
 
-def _lines(path: Path) -> list[str]:
+def clock_seconds(cells: Any) -> Array | None:
+    """(N,) seconds from the first of pyarrow's dates or times of day; None where the cells are none or one is missing."""
+    import pyarrow
+
+    kind = cells.type
+    if cells.null_count or not (pyarrow.types.is_timestamp(kind) or pyarrow.types.is_time(kind)):
+        return None
+    per_second = {"s": 1, "ms": 1e3, "us": 1e6, "ns": 1e9}[kind.unit]
+    width = pyarrow.int32() if pyarrow.types.is_time32(kind) else pyarrow.int64()
+    ticks = cells.cast(width).to_numpy()
+    return np.asarray((ticks - ticks[0]) / per_second, dtype=np.float64)
+
+
+def _lines(path: Path) -> tuple[list[str], list[str]]:
+    """The lines of a text file, and what is to be said of its encoding."""
+    raw = path.read_bytes()
+    encoding = "utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
-        return path.read_text(encoding="utf-8-sig").splitlines()
+        return raw.decode(encoding).splitlines(), []
     except UnicodeDecodeError as error:
+        # Numbers are the same in every extension of ASCII; only names suffer.
+        if b"\0" not in raw and not any(mark in raw for mark in _CONTROL):
+            text = raw.decode("cp1252", errors="replace")
+            return text.splitlines(), [
+                "not UTF-8: read as Windows-1252, so that letters of names may be wrong"
+            ]
         raise LogError(f"{path}: not a text file in UTF-8; save the table as plain text") from error
 
 
 def _layout(lines: list[str]) -> tuple[str, int | None]:
-    """The separator and the index of the header line."""
+    """The separator and the index of the header line.
+
+    They are those with which a line of names has as many cells as the numbers below it; where there are none such,
+    as in a log whose rows have a cell more than its header, the separator that is most frequent in the first line.
+    """
+    for k in range(min(len(lines), 100)):
+        below = [line for line in lines[k + 1 : k + 20] if line.strip()][:2]
+        for separator in ("\t", ";", ",", " "):
+            names = _names(lines[k], separator) if lines[k].strip() else []
+            if len(names) < 2 or not _is_header(lines[k], separator):
+                continue
+            rows = below[1:] if below and _is_units(below[0], separator, len(names)) else below[:1]
+            if rows and _width(rows[0], separator) == len(names) and _is_numbers(rows[0], separator):
+                return separator, k
     for k, line in enumerate(lines[:100]):
         text = line.strip()
         if not text or (text.startswith("#") and _separator(text) == " "):
             continue
         separator = _separator(text)
         if _is_header(line, separator):
-            below = next((row for row in lines[k + 1 :] if row.strip()), "")
-            cells = len(below.split(separator)) if separator != " " else len(below.split())
-            if cells > 1 or not below or len(_names(line, separator)) == 1:
+            row = next((row for row in lines[k + 1 :] if row.strip()), "")
+            if len(_cells(row, separator)) > 1 or not row or len(_names(line, separator)) == 1:
                 return separator, k
         else:
             return separator, None
     return ",", None
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return line.split() if separator == " " else line.split(separator)
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().strip("\"'[]() ").strip()
+
+
+def _width(line: str, separator: str) -> int:
+    cells = _cells(line.strip(), separator)
+    return len(cells) - (not cells[-1].strip())
+
+
+def _is_numbers(line: str, separator: str) -> bool:
+    cells = [cell for cell in _cells(line, separator) if cell.strip()]
+    return bool(cells) and sum(bool(_NUMBER.match(cell)) for cell in cells) >= len(cells) / 2
+
+
+def _is_units(line: str, separator: str, width: int) -> bool:
+    """Whether a line below a header of so many names holds their units: most of its cells that say something do."""
+    cells = [_bare(cell) for cell in _cells(line, separator)]
+    said = [cell for cell in cells if cell not in ("", "-")]
+    known = [cell for cell in said if any(canonical(cell, kind) for kind in FACTORS)]
+    return abs(len(cells) - width) <= 1 and bool(said) and 2 * len(known) > len(said)
 
 
 def _separator(line: str) -> str:

@@ -61,6 +61,18 @@ _ALIASES = {
     "ampere": "A",
     "ma": "mA",
     "percent": "%",
+    "u/min": "rpm",
+    "1/min": "rpm",
+    "r/min": "rpm",
+    "rev/min": "rpm",
+    "grados": "deg",
+    "度": "deg",
+    "弧度": "rad",
+    "秒": "s",
+    "毫秒": "ms",
+    "牛米": "N*m",
+    "安": "A",
+    "安培": "A",
 }
 #: The unit of the velocity that goes with a position's, and so on.
 RATES = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s"}
@@ -74,4 +86,20 @@ def canonical(text: str, quantity: str) -> str | None:
     if text in known:
         return text
     alias = _ALIASES.get(text.lower(), text.lower())
-    return alias if alias in known else None
+    if alias in known:
+        return alias
+    if quantity == "v" and "/" in text:
+        of, _, per = text.partition("/")
+        rate = RATES.get(canonical(of, "q") or "")
+        return rate if canonical(per, "time") == "s" else None
+    return None
+
+
+def fitting(ratio: float) -> list[tuple[str, str]]:
+    """The units of q and v with which v is the rate of q, whose numbers change ``ratio`` times as fast as v says."""
+    return [
+        (q, v)
+        for q in RATES
+        for v, factor in FACTORS["v"].items()
+        if 0.9 < ratio * FACTORS["q"][q] / factor < 1.1 and (q in ("m", "mm")) == (v in ("m/s", "mm/s"))
+    ]

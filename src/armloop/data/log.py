@@ -7,7 +7,7 @@ SI units; joints numbered from 1, base to tip. Columns of any other name are lef
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
@@ -93,14 +93,15 @@ class MotionLog:
         time: ArrayLike,
         q: ArrayLike,
         tau: ArrayLike,
+        *,
         v: ArrayLike | None = None,
         vdot: ArrayLike | None = None,
-        *,
         name: str = "log",
         tau_unit: str = "N*m",
     ) -> "MotionLog":
         """Make a log of anything that can be an array; where there is no v, q is differentiated, run by run.
 
+        v and vdot are given by name, for their order after tau is not that of a file's columns.
         What is doubtful is said as `armloop.util.errors.InputWarning`. Raises `LogError` as the class does.
         """
         seconds, positions = _numbers(time, "time", name), _numbers(q, "q", name)
@@ -113,13 +114,20 @@ class MotionLog:
     def from_frame(
         cls, frame: Any, *, joints: int | None = None, name: str = "log", tau_unit: str = "N*m"
     ) -> "MotionLog":
-        """Make a log of a data frame (pandas, polars, pyarrow) with the columns of a file: `time,q1..,v1..,tau1..`.
+        """Make a log of a data frame (pandas, polars, pyarrow), or a dict of columns, as in a file: `time,q1..,v1..,tau1..`.
 
         joints : how many joints the arm has; None takes what the frame has. v may be missing: see `from_arrays`
 
         Raises `LogError` when columns are missing, and as the class does.
         """
-        header = [str(column) for column in getattr(frame, "column_names", frame.columns)]
+        names = frame.keys() if isinstance(frame, Mapping) else getattr(frame, "columns", None)
+        names = getattr(frame, "column_names", names)
+        if names is None:
+            raise LogError(
+                f"{name}: {type(frame).__name__} has no columns by name; give a data frame or a dict of columns "
+                "time,q1..,v1..,tau1.., or arrays to MotionLog.from_arrays"
+            )
+        header = [str(column) for column in names]
         n, _ = _columns(Path(name), header)
         if joints is not None and n != joints:
             raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
@@ -134,8 +142,8 @@ class MotionLog:
             _numbers(frame["time"], "time", name),
             cells["q"],
             cells["tau"],
-            cells.get("v"),
-            cells.get("vdot"),
+            v=cells.get("v"),
+            vdot=cells.get("vdot"),
             name=name,
             tau_unit=tau_unit,
         )

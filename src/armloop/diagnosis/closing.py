@@ -134,4 +134,4 @@ def held_out_run(before: ReconstructedModel, after: ReconstructedModel, log: Mot
 
 def lasting(model: ReconstructedModel) -> ReconstructedModel:
     """The model without effects that were events of one run."""
-    return replace(model, effects=tuple(added for added in model.effects if added.effect.searched))
+    return replace(model, effects=tuple(added for added in model.effects if not added.effect.event))

@@ -44,7 +44,7 @@ class Burst:
 
 def is_event(added: AddedEffect) -> bool:
     """Whether an effect took place in an interval of one log."""
-    return not added.effect.searched and "start" in added.parameters
+    return added.effect.event and "start" in added.parameters
 
 
 def known_contacts(evidence: Evidence) -> Mask:

@@ -45,6 +45,7 @@ class Diagnosis:
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
         reversals: what was found at reversals, if anything.
+        adopted: whether the model has the unlisted law.
         standing: how far the run can be judged: what a reader must know beside the verdict.
     """
 
@@ -56,6 +57,15 @@ class Diagnosis:
     contacts: list[Contact]
     reversals: AtReversals | None = None
     standing: Standing = field(default_factory=lambda: Standing([], [], False))
+    adopted: bool = False
+
+    def adopt(self) -> Diagnosis:
+        """The same with an unlisted law, where one was found, in the model: its feedforward supplies it.
+
+        The law acts where the run has been and fades outside of it (:class:`armloop.laws.effects.FoundLaw`).
+        """
+        law = [] if self.unlisted is None or self.adopted else self.unlisted.added()
+        return replace(self, model=self.model.with_effects(law), adopted=True) if law else self
 
     @property
     def reasons(self) -> list[str]:
@@ -86,6 +96,8 @@ class Diagnosis:
         before, after = (
             np.sqrt(_by_joint(f, f.held_out**2)) * scale for f in (self.outcome.before, self.outcome.after)
         )
+        if self.adopted and self.unlisted is not None:
+            after[self.unlisted.joint - 1] = self.unlisted.rmse_with_form
         return {
             "metric": "rmse",
             "held_out": True,
@@ -161,7 +173,12 @@ class Diagnosis:
         ]
         if self.unlisted is not None:
             where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
-            entry = {"when": "changed", "probability": None, "where": where.to_dict()}
+            entry = {
+                "when": "changed",
+                "probability": None,
+                "where": where.to_dict(),
+                "adopted": self.adopted,
+            }
             effects.append({**self.unlisted.to_dict(), **entry})
         return {
             "schema": SCHEMA,

@@ -18,6 +18,7 @@ from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.laws.effects import Context, Effect
+from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
@@ -25,8 +26,6 @@ from armloop.util.arrays import Array
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
-#: So many times its trained range, a joint is where the model knows nothing.
-FAR = 1.2
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.

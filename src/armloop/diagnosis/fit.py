@@ -80,7 +80,7 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         judged, beta, _, _, _ = _solved(evidence, residual, effects, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(evidence, residual, effects, [s.final for s in shapes], None)
-    covariance = _block_covariance(stacked, beta, J)
+    covariance = block_covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block)
     parameters, start = [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
@@ -129,12 +129,17 @@ def _stack(
     return evidence.stack(residual, columns), [c.shape[2] for c in columns]
 
 
-def _block_covariance(stacked: Stacked, beta: Array, J: Array) -> Array:
-    """Sandwich covariance with blocks as the independent units (Liang and Zeger 1986)."""
-    X = stacked.X @ J
+def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:
+    """Sandwich covariance (p, p) with blocks as the independent units (Liang and Zeger 1986).
+
+    Args:
+        X: (R, p) columns.
+        left: (R,) what they leave.
+        block: (R,) block of each row.
+    """
     G = X.T @ X
-    scores = X * (stacked.y - stacked.X @ beta)[:, None]
-    _, index = np.unique(stacked.block, return_inverse=True)
+    scores = X * left[:, None]
+    _, index = np.unique(block, return_inverse=True)
     sums = np.zeros((index.max(initial=-1) + 1, X.shape[1]))
     np.add.at(sums, index, scores)
     scale = unit_scale(G)

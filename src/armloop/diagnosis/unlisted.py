@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.fit import Fit, block_covariance
 from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.features.angle_sums import AngleSums
+from armloop.laws.effects import Estimate, FoundLaw, found_law
+from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
 from armloop.util.progress import Progress
@@ -45,7 +47,10 @@ _MOST_CANDIDATES = 1500
 class Unlisted:
     """A real residual: its joint, how large it is, and its law (empty if none is stable over the blocks).
 
-    ``left`` (R,) is what the law leaves of the joint's rows, weighted, on blocks it was not fitted on.
+    Attributes:
+        parameters: the law's coefficients by their functions' names, with standard errors, and the range of the run
+            (:class:`armloop.laws.effects.FoundLaw`); empty where there is no law.
+        left: (R,) what the law leaves of the joint's rows, weighted, on blocks it was not fitted on.
     """
 
     joint: int
@@ -53,7 +58,12 @@ class Unlisted:
     baseline: float
     form: str
     rmse_with_form: float
+    parameters: dict[str, Estimate] = field(default_factory=dict)
     left: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+
+    def added(self) -> list[AddedEffect]:
+        """The law as an effect that a model can have; none where there is no law."""
+        return [AddedEffect(FoundLaw(self.joint), self.parameters)] if self.parameters else []
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``diagnosis.json``."""
@@ -61,7 +71,7 @@ class Unlisted:
             "effect": "unlisted",
             "joint": self.joint,
             "form": self.form,
-            "parameters": {},
+            "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
             "rmse": {"residual": self.rmse, "with_form": self.rmse_with_form, "baseline": self.baseline},
             "alternatives": [],
         }
@@ -95,7 +105,18 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
             return find_law(evidence, bare, progress)
     scale, rows = float(evidence.scale[j]), int((outcome.after.stacked.joint == j).sum())
     rmse, with_form = (float(np.sqrt(e / rows)) * scale for e in (_energy(outcome.after, j), law.energy))
-    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, law.left), pruned(evidence, outcome)
+    estimates = _parameters(evidence, law, j) if law.terms else {}
+    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, estimates, law.left), pruned(
+        evidence, outcome
+    )
+
+
+def _parameters(evidence: Evidence, law: _Law, j: int) -> dict[str, Estimate]:
+    """The law's coefficients, N·m (N) per unit of their functions, and the range of the samples it was found on."""
+    motion, rows, scale = evidence.samples.motion, evidence.rows[:, j], float(evidence.scale[j])
+    terms = {name: (scale * b, scale * error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
+    low, high = ((end(motion.q[rows], axis=0), end(motion.v[rows], axis=0)) for end in (np.min, np.max))
+    return found_law(evidence.model.arm, j + 1, terms, low, high)
 
 
 def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
@@ -152,10 +173,12 @@ class _Law:
     """Terms with coefficients (weighted), none if none is stable, and what is left (R,), weighted.
 
     Left of each half of the run is what terms and coefficients leave there that were chosen and fitted on the other.
+    Standard errors of the coefficients count blocks as the independent units.
     """
 
     terms: list[tuple[float, str]]
     left: Array
+    errors: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def energy(self) -> float:
@@ -197,4 +220,6 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
         return _Law([], y)
     beta = whole.solve(stable)
-    return _Law([(float(b), names[t]) for b, t in zip(beta, stable, strict=True)], error)
+    covariance = block_covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.block[mine])
+    terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
+    return _Law(terms, error, np.sqrt(np.diag(covariance)))

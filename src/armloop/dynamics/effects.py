@@ -14,7 +14,7 @@ from typing import Any
 from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
 from armloop.dynamics.own_effects import OwnEffectEquations
 from armloop.laws.effects import Value, effect
-from armloop.laws.effects.base import Body, Placed
+from armloop.laws.effects.base import Body, Placed, StateLaw
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
 from armloop.util.errors import ModelError
@@ -67,6 +67,21 @@ class _AlongEquations(Equations):
         return tau
 
 
+class _StateEquations(Equations):
+    """A torque that depends on q and v alone."""
+
+    has_inertia = False
+
+    def __init__(self, n: int, law: StateLaw, functions: Functions) -> None:
+        self.n, self._law, self._functions = n, law, functions
+
+    def inertia(self, q: Numbers) -> Rows:
+        return [[0.0] * self.n for _ in range(self.n)]
+
+    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
+        return self._law(self._functions, q, v)
+
+
 class _WeightEquations(Equations):
     """Links as their weight alone: no inertia, no Coriolis torques."""
 
@@ -110,6 +125,9 @@ def effect_law(
         raise ModelError(f"effect {name}: parameter {error} is missing") from error
     if body is not None:
         return EffectLaw(_body_equations(arm, body, functions), load=kind.load)
+    of_state = kind.of_state(parameters)
+    if of_state is not None:
+        return EffectLaw(_StateEquations(arm.n, of_state, functions), load=kind.load)
     if law is None:
         return EffectLaw(OwnEffectEquations(arm, kind, parameters, inertial), load=kind.load)
     friction = tuple(t for t in law.terms if t.element.part == "friction")

@@ -226,7 +226,7 @@ class ReconstructedModel:
         self, step: int
     ) -> tuple[Arm, tuple[Component, ...], list[list[Acting]], list[tuple[bool, EffectPointwise]]]:
         """What acts at one sample: added effects that are friction of one joint stand with its friction."""
-        added = [a for a in self.effects if step >= 3 and not a.effect.sensor and a.effect.searched]
+        added = [a for a in self.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
         inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
         friction = [[t.acting for t in joint if t.step <= step] for joint in self.friction.terms]
         effects = []

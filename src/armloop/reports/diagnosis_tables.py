@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armloop.laws.effects.found import RANGE
 from armloop.reports.findings import blame, findings, nothing_to_supply, reasons, rivals
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
@@ -30,8 +31,12 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
                 [label, key.replace("_", " "), with_error(e.value, e.std_error), unit(e.unit), share, where]
             )
     if diagnosis.unlisted is not None:
-        law = diagnosis.unlisted.form or MISSING
-        rows.append([f"unlisted, joint {diagnosis.unlisted.joint}", "law", law, "", "", ""])
+        label = f"unlisted, joint {diagnosis.unlisted.joint}"
+        terms = [(k, e) for k, e in diagnosis.unlisted.parameters.items() if k not in RANGE]
+        for k, (key, e) in enumerate(terms):
+            rows.append(["" if k else label, key, with_error(e.value, e.std_error), unit(e.unit), "", ""])
+        if not terms:
+            rows.append([label, "law", MISSING, "", "", ""])
     headers = ["effect", "parameter", "value ± std. error", "unit", "share", "where"]
     return make_table(headers, rows, title, left=(0, 1, 3, 5))
 

@@ -59,6 +59,13 @@ def findings(diagnosis: Diagnosis) -> list[str]:
             f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}; "
             f"{unit(where.words())}."
         )
+        if diagnosis.adopted:
+            sentences.append(
+                "The law is adopted: the augmented model and its feedforward have it where the run has been, and it fades "
+                "outside of that."
+            )
+        elif unlisted.parameters:
+            sentences.append("`--adopt` puts the law into the augmented model and its feedforward.")
     return sentences or [_nothing(diagnosis)]
 
 
@@ -136,7 +143,7 @@ def nothing_to_supply(added: list[AddedEffect]) -> str:
 def _why_not(added: AddedEffect) -> str:
     if added.effect.sensor:
         return "a sensor's fault is no torque that the arm needs"
-    if not added.effect.searched:
+    if added.effect.event:
         return "what pushed the arm was an event of this run"
     if added.effect.name == "friction_drift":
         return "friction that fades is gone once the joint is warm"

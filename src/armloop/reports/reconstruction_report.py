@@ -15,7 +15,14 @@ from armloop.identification.reconstruction import Reconstruction, StepReport
 from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots import clusters_figure, friction_figure, has_trials, orders_figure, torque_figure
+from armloop.reports.plots import (
+    clusters_figure,
+    friction_figure,
+    has_trials,
+    ladder_figure,
+    orders_figure,
+    torque_figure,
+)
 from armloop.reports.tables import (
     Table,
     formulas,
@@ -41,6 +48,10 @@ _FRICTION = (
     "Friction over velocity. Dots: the measured torque without what the rest of the model explains; line: the "
     "model's friction once the joint slides, the band where it depends on the load. Dots away from the line are "
     "friction that the model lacks, or something else that it takes for friction."
+)
+_LADDER = (
+    "Friction laws, tried one after the other: from the error before to the error with it, on blocks that judged and "
+    "fitted nothing. What gains less than it scatters over the blocks is not taken."
 )
 _PARTS = (
     "Of what the model leaves on held-out data, a flexible regression (ridge and boosted trees of the state, the "
@@ -119,6 +130,13 @@ def reconstruction_sections(
     if has_trials(reconstruction.reports):
         trials = orders_figure(reconstruction.reports, reference.reports if reference else ())
         pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_REFERENCE if reference else "")))
+    notes = list(reconstruction.notes)
+    if ladder := history.get("friction_ladder"):
+        # the notes say the same in a line each, for the terminal
+        notes = [
+            note for note in notes if not any(note.startswith(f"friction, {r['rung']}:") for r in ladder)
+        ]
+        pictures.append(Picture(ladder_figure(ladder), _LADDER))
     if samples is not None:
         pictures.append(Picture(torque_figure(model, samples), _TORQUE))
         pictures.append(Picture(friction_figure(model, samples), _FRICTION))
@@ -146,7 +164,7 @@ def reconstruction_sections(
         folded.append(("Coefficients with standard errors", f"{coefficients}\n\n{textwrap.fill(NOTE, 110)}"))
     if legend := model.legend():
         folded.append(("What the symbols stand for", "\n".join(legend)))
-    return [Section("Reconstruction", text, pictures, tables, folded, list(reconstruction.notes))]
+    return [Section("Reconstruction", text, pictures, tables, folded, notes)]
 
 
 def comparison(ours: Reconstruction, reference: Reconstruction) -> Table:

@@ -32,8 +32,9 @@ _HEAT = (
     "too; the alarm's own section says which of them explains the others."
 )
 _TREND = (
-    "Each dot is the coefficient that the effect alone would be given by one log (or the logarithm of the residual's "
-    "mean square). The band holds nine in ten of the logs before the first change. Below: the evidence for a change."
+    "Each dot is the coefficient, in SI units, that the effect alone would be given by one log (or the logarithm of "
+    "the residual's mean square). The band holds nine in ten of the logs before the first change. Below: the "
+    "evidence for a change."
 )
 _SHOWN, _STREAMS = 4, 60
 

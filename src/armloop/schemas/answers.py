@@ -40,6 +40,7 @@ class FoundData(Struct):
     alternatives: list[AlternativeData] = []
     parameters: dict[str, Any] = {}
     form: Text | UnsetType = UNSET
+    adopted: bool | UnsetType = UNSET
     when: Name | UnsetType = UNSET
     probability: Annotated[float, Meta(ge=0, le=1)] | UnsetType | None = UNSET
 

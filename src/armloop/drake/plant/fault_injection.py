@@ -86,7 +86,7 @@ def _fault(kind: type[Effect], given: UndeclaredEffect) -> str:
     if kind.memory and kind.name not in LISTED and not getattr(kind, "elements", ()):
         return "depends on the past; the plant takes effects that are torques of q and v"
     if kind.name not in LISTED and not getattr(kind, "elements", ()):
-        return ""  # its parameters are tried by its law
+        return kind.fault(given.parameters)  # the parameters themselves are tried by its law
     return _wrong_parameters(kind, given.parameters)
 
 

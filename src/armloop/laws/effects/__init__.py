@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from armloop.laws.effects.base import Context, Effect, Estimate, Parameter, Value
+from armloop.laws.effects.found import FoundLaw, found_law
 from armloop.laws.effects.law import INERTIA, Law, LinearJointEffect, ProfiledJointEffect
 from armloop.laws.effects.listed import EFFECTS
 from armloop.laws.effects.own import REGISTRY, register
@@ -23,6 +24,7 @@ __all__ = [
     "Effect",
     "Element",
     "Estimate",
+    "FoundLaw",
     "Law",
     "LinearJointEffect",
     "Parameter",
@@ -30,6 +32,7 @@ __all__ = [
     "Value",
     "effect",
     "effect_kind",
+    "found_law",
     "hypotheses",
     "register",
 ]
@@ -41,6 +44,8 @@ def effect_kind(name: Any) -> type[Effect]:
     Raises:
         ModelError: there is none of that name.
     """
+    if name == FoundLaw.name:
+        return FoundLaw
     kind = REGISTRY.find(name) if isinstance(name, str) else None
     if kind is None:
         own = f"; of your own: {', '.join(REGISTRY.own_names())}" if REGISTRY.own_names() else ""

@@ -21,9 +21,12 @@ from armloop.robot.arm import Arm
 from armloop.robot.kinematics import regressor
 from armloop.robot.newton_euler import inverse_dynamics
 from armloop.util.arrays import Array
+from armloop.util.functions import Functions
 
 Value = float | list[float]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
+#: Torques (n) of positions and speeds (n) of any kind of number, by the functions for it.
+StateLaw = Callable[[Functions, Sequence[Any], Sequence[Any]], list[Any]]
 
 
 @dataclass(frozen=True)
@@ -127,8 +130,8 @@ class Effect(ABC):
         name: as in ``diagnosis.json``.
         scope: "arm", "joint" or "pair"; ``joint_wise`` and ``pair_wise`` follow from it.
         role: "mechanical"; "sensor", which falsifies what is recorded instead of acting on the arm; or "event" of one
-            run, which no hypothesis of a diagnosis searches for and no controller supplies. ``sensor`` and
-            ``searched`` follow from it.
+            run, which no controller supplies. ``sensor`` and ``event`` follow from it, and that no event is ``searched``:
+            a hypothesis of a diagnosis.
         parameters: what it calls its numbers; as many are free (``complexity``) unless it says otherwise.
         needs_inertial: whether its columns are made of the known model's inertial parameters.
         needs_model: whether its columns depend on anything the known model says, not on the motion alone.
@@ -151,6 +154,7 @@ class Effect(ABC):
     needs_inertial: ClassVar[bool] = False
     needs_model: ClassVar[bool] = True
     load: ClassVar[bool] = False
+    event: ClassVar[bool] = False
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
     rubs: ClassVar[bool] = False
@@ -164,7 +168,8 @@ class Effect(ABC):
         if "scope" in stated:
             cls.joint_wise, cls.pair_wise = cls.scope != "arm", cls.scope == "pair"
         if "role" in stated:
-            cls.sensor, cls.searched = cls.role == "sensor", cls.role != "event"
+            cls.sensor, cls.event = cls.role == "sensor", cls.role == "event"
+            cls.searched = not cls.event
         if "parameters" in stated and "complexity" not in stated:
             cls.complexity = len(cls.parameters)
 
@@ -236,6 +241,11 @@ class Effect(ABC):
         del parameters
         return None
 
+    def of_state(self, parameters: Mapping[str, Value]) -> StateLaw | None:
+        """The torque as a function of q and v alone, written for every kind of number; None where it is none."""
+        del parameters
+        return None
+
     def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
         """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
         del arm, parameters, inertial
@@ -251,7 +261,7 @@ class Effect(ABC):
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
         """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,); none of an event."""
         rest = np.zeros(arm.n)
-        if not self.searched:
+        if self.event:
             return lambda q, v, vdot: rest
         body = self.body(arm, parameters, inertial)
         if body is not None:

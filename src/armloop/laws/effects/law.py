@@ -145,7 +145,7 @@ class Law(Effect):
 
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
         placed = self.placed(parameters)
-        if placed is None or not self.searched:
+        if placed is None or self.event:
             return super().pointwise(arm, parameters, inertial)
         along, terms = placed
         mass = sum(t.coefficient for t in terms if t.element.part == "inertia")

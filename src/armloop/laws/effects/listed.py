@@ -27,7 +27,7 @@ def _defined(module: str) -> list[type[Effect]]:
 
 _FOLDER = str(Path(__file__).parent)
 _FILES = sorted(
-    {module.name for module in iter_modules([_FOLDER])} - {"base", "events", "law", "listed", "own"}
+    {module.name for module in iter_modules([_FOLDER])} - {"base", "events", "found", "law", "listed", "own"}
 )
 
 #: Every listed effect by its name in ``diagnosis.json``. Of two that do equally well with as many numbers a search names

@@ -3,6 +3,7 @@
 from armloop.reports.plots.conditions import clusters_figure
 from armloop.reports.plots.feedforward import feedforward_figure
 from armloop.reports.plots.friction import friction_figure
+from armloop.reports.plots.ladder import ladder_figure
 from armloop.reports.plots.orders import has_trials, orders_figure
 from armloop.reports.plots.residual import residual_shape_figure, residual_time_figure
 from armloop.reports.plots.ring import Stage, ring_figure
@@ -17,6 +18,7 @@ __all__ = [
     "feedforward_figure",
     "friction_figure",
     "has_trials",
+    "ladder_figure",
     "orders_figure",
     "residual_shape_figure",
     "residual_time_figure",

@@ -8,9 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from armloop.identification.reconstruction import StepReport
-from armloop.reports.plots.style import BLUE, INK, MUTED, figure, panels, polish
+from armloop.reports.plots.style import BLUE, INK, MUTED, figure, log_percent, panels, polish
 from armloop.reports.words import percent
 
+# Labels that stand level below a panel; more of them stand upright.
+_MOST_LEVEL = 5
 _ROMAN = {1: "I", 2: "II", 3: "III"}
 
 
@@ -35,40 +37,26 @@ def orders_figure(reports: Sequence[StepReport], reference: Sequence[StepReport]
             )
             searches[key] = (name, report)
     shown = [*searches.values(), *(("One-shot SINDy", report) for report in reference[:1] if report.trials)]
-    made = figure(max(4.6, 3.3 * len(shown)), 3.3)
-    row = panels(made, 1, len(shown), legend_row=False)[0]
+    upright = any(len(report.trials) > _MOST_LEVEL for _, report in shown)
+    made = figure(max(4.6, 3.3 * len(shown)), 3.7 if upright else 3.3)
+    row = panels(made, 1, len(shown), legend_row=False, bottom=0.92 if upright else 0.52)[0]
     for axes, (name, report) in zip(row, shown, strict=True):
         labels = [f"({orders[0]}, {orders[1]})" for orders, _ in report.trials]
         errors = [error for _, error in report.trials]
         axes.plot(range(len(errors)), errors, color=BLUE, linewidth=2, marker="o", markersize=5)
         chosen = _chosen(report)
         axes.plot(chosen, errors[chosen], "o", color=INK, markersize=12, fillstyle="none")
-        axes.annotate(
-            f"chosen: {percent(errors[chosen])}",
-            (chosen, errors[chosen]),
-            textcoords="offset points",
-            # above the ring, where no tick's label stands, and towards the panel's middle
-            xytext=(0, 14),
-            ha="left" if 2 * chosen < len(errors) - 1 else "right",
-            color=INK,
-            fontsize=9.5,
-        )
         axes.set_yscale("log")
-        tilted = len(labels) > 5
-        axes.set_xticks(range(len(labels)), labels, rotation=90 if tilted else 0)
+        axes.set_xticks(range(len(labels)), labels, rotation=90 if len(labels) > _MOST_LEVEL else 0)
+        # beside the panel's name: within it the line would run through
+        axes.set_title(f"chosen: {percent(errors[chosen])}", color=INK, fontsize=9, loc="right")
         polish(axes, "orders (N1, N2)", "held-out error / RMS torque" if axes is row[0] else "", name)
         axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{100 * y:.3g} %"))
-        axes.yaxis.set_minor_formatter(_minor(errors))
+        axes.yaxis.set_minor_formatter(log_percent(min(errors), max(errors)))
         axes.tick_params(which="minor", colors=MUTED, labelsize=8, length=0)
         axes.margins(x=0.22)
-        axes.set_ylim(0.75 * min(errors), max(1.25 * max(errors), 2.5 * errors[chosen]))
+        axes.set_ylim(0.75 * min(errors), 1.25 * max(errors))
     return made
-
-
-def _minor(errors: Sequence[float]) -> FuncFormatter:
-    """Labels between the powers of ten where the errors span too little for those to appear."""
-    narrow = max(errors) < 5 * min(errors)
-    return FuncFormatter(lambda y, _: f"{100 * y:.3g} %" if narrow else "")
 
 
 def _chosen(report: StepReport) -> int:

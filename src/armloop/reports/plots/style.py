@@ -12,8 +12,10 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from armloop.util.arrays import Array
@@ -53,17 +55,18 @@ def panels(
     gap: float = 0.8,
     legend_row: bool = True,
     rows_gap: float = 0.5,
+    bottom: float = 0.52,
     **options: Any,
 ) -> NDArray[np.object_]:
     """Divide a figure into (rows, columns) axes with margins in inches.
 
     Matplotlib's own layouts draw everything twice to measure the labels, which doubles the time of a report;
     here all labels have known sizes. ``left`` has room for the labels of the first column, ``gap`` for those
-    of the others, ``rows_gap`` for those between rows; ``legend_row`` keeps the top free for a legend. Further
-    options go to ``Figure.subplots``.
+    of the others, ``rows_gap`` for those between rows, ``bottom`` for those below the last; ``legend_row`` keeps
+    the top free for a legend. Further options go to ``Figure.subplots``.
     """
     width, height = target.get_size_inches()
-    top, bottom = (0.62 if legend_row else 0.32), 0.52
+    top = 0.62 if legend_row else 0.32
     between = 0.36 if options.get("sharex") else rows_gap
     target.subplots_adjust(
         left=left / width,
@@ -115,6 +118,8 @@ def legend(target: Axes | Figure, columns: int = 4) -> None:
     for shown in made.legend_handles:
         if isinstance(shown, Line2D):
             shown.set_linewidth(2.4)
+        if isinstance(shown, PathCollection):  # dots as small as in the panel would not be seen
+            shown.set_sizes([24.0])
         if shown is not None:
             shown.set_alpha(0.9)
     for text in made.get_texts():
@@ -152,3 +157,14 @@ def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
         return time, values
     gaps = np.flatnonzero((steps > 10 * np.median(steps)) | (steps < 0)) + 1
     return np.insert(time, gaps, time[gaps]), np.insert(values, gaps, np.nan)
+
+
+def log_percent(low: float, high: float) -> FuncFormatter:
+    """Minor labels of a logarithmic axis in percent, the fewer the larger its span: all, 2 and 5, none."""
+    labelled = range(2, 10) if high < 3 * low else (2, 5) if high < 30 * low else ()
+
+    def text(x: float, _: object) -> str:
+        leading = round(x / 10 ** np.floor(np.log10(x))) if x > 0 else 0
+        return f"{100 * x:.3g} %" if leading in labelled else ""
+
+    return FuncFormatter(text)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.reports.plots.style import GRID, MUTED, STEPS, figure, legend, panels, polish, thin
+from armloop.reports.plots.style import GRID, INK, MUTED, STEPS, figure, legend, panels, polish, thin
 from armloop.reports.words import unit
 
 _ROMAN = {1: "I", 2: "II", 3: "III"}
@@ -28,8 +28,8 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
         axes.plot(
             *thin(time, samples.tau[shown, j]),
             color=MUTED,
-            linewidth=3.4,
-            alpha=0.45,
+            linewidth=5.0,
+            alpha=0.5,
             label="measured",
             zorder=1,
         )
@@ -37,7 +37,7 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
             axes.plot(
                 *thin(time, predicted[step][shown, j]),
                 color=color,
-                linewidth=1.9 if step == 3 else 1.1,
+                linewidth=1.4 if step == 3 else 1.1,
                 alpha=1.0 if step == 3 else 0.85,
                 label=f"predicted after Step {_ROMAN[step]}",
                 zorder=1 + step,
@@ -45,7 +45,7 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
         axes.margins(x=0.01)
         left = samples.tau[shown, j] - predicted[3][shown, j]
         below.axhline(0.0, color=GRID, linewidth=1)
-        below.plot(*thin(time, left), color=STEPS[3], linewidth=0.9, label="residual")
+        below.plot(*thin(time, left), color=INK, linewidth=0.8, label="residual of Step III")
         below.margins(x=0.01)
         what, of = "torque" if joint.kind == "revolute" else "force", unit(joint.torque_unit)
         polish(axes, "", f"{what} [{of}]", f"Joint {j + 1}")

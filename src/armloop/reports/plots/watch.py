@@ -16,6 +16,8 @@ from armloop.util.arrays import Array
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60
 _INCHES_PER_LETTER = 0.085
+# s that the axis of time covers at least
+_LEAST_SPAN = 86_400.0
 
 
 def heat_figure(
@@ -95,6 +97,10 @@ def trend_figure(
         polish(top, "", "score", name)
         polish(under, "", "log evidence", "")
         under.set_ylim(0, 1.25 * limit)
+    if when.max() - when.min() < _LEAST_SPAN:  # logs of one moment would have an axis of years
+        middle = 0.5 * (when.max() + when.min())
+        ends = [datetime.fromtimestamp(middle + side * _LEAST_SPAN, UTC) for side in (-0.5, 0.5)]
+        axes[-1].set_xlim(*ends)
     locator = AutoDateLocator()
     axes[-1].xaxis.set_major_locator(locator)
     axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
