@@ -53,7 +53,14 @@ class Payload(Effect):
         J[:4, :4] = _FOUR
         J[4:, 0] = [-p / mass for p in point]
         a, b, c = a / mass, b / mass, c / mass
-        J[4:, 1:4] = [[0, 2 * b, 2 * c], [2 * a, 0, 2 * c], [2 * a, 2 * b, 0], [-b, -a, 0], [-c, 0, -a], [0, -c, -b]]
+        J[4:, 1:4] = [
+            [0, 2 * b, 2 * c],
+            [2 * a, 0, 2 * c],
+            [2 * a, 2 * b, 0],
+            [-b, -a, 0],
+            [-c, 0, -a],
+            [0, -c, -b],
+        ]
         J[4:7, 4] = 1.0
         return beta, J
 
