@@ -7,6 +7,7 @@ and directions, and reported only if both halves of the run choose it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -189,15 +190,20 @@ class _Law:
         return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
 
 
+@lru_cache(maxsize=8)
+def _library(revolute: tuple[bool, ...]) -> AngleSums:
+    """The largest library that is searched for an arm's joints, with what it has found of itself."""
+    libraries = [AngleSums(revolute, N1, 2, "velocity") for N1 in (3, 2, 1)]
+    return next((each for each in libraries if each.size <= _MOST_CANDIDATES), libraries[-1])
+
+
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
     y = after.held_out[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
     motion = evidence.samples.motion
     moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
-    revolute = tuple(bool(r) for r in evidence.model.arm.revolute)
-    libraries = [AngleSums(revolute, N1, 2, "velocity") for N1 in (3, 2, 1)]
-    library = next((each for each in libraries if each.size <= _MOST_CANDIDATES), libraries[-1])
+    library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
     X = np.hstack([X, X[:, library.order() <= 1] * direction])
     signed = [
