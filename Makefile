@@ -1,6 +1,7 @@
 # make setup   create .venv with everything in it, from requirements.lock
 # make loop    the main job, start to end, on a simulated and a measured arm, in out/loop
 # make test    style, types and tests
+# make types   style and types alone
 # make docs    the documentation, tutorials executed, in out/site
 # make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel
 # make bench   the benchmarks' ratios
@@ -10,6 +11,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Compiled modules are kept, whatever the shell around says: else each of the hundred commands that the tests call would
+# compile numpy, Drake and armloop anew, which takes it several seconds.
+export PYTHONDONTWRITEBYTECODE =
 # Stamps, not the folder: each is touched only after its step has ended well.
 PACKAGES := $(VENV)/.packages
 INSTALLED := $(VENV)/.installed
@@ -19,15 +23,14 @@ WRITING := $(VENV)/.writing
 WHEEL ?= out/wheel
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: setup loop test long docs wheel bench blind mutants clean
+.PHONY: setup loop test types long docs wheel bench blind mutants clean
 
 setup: $(INSTALLED)
 
 # The set-up counts towards what `make loop` takes, so it is kept short. `$(call install,WHAT)`: uv installs in a sixth of
 # pip's time; where it cannot be had, or the packages are somewhere only pip is told of, it is pip. Nothing is resolved,
 # for the locks are complete, and instead of compiling every module of every package (half a minute), the imports below
-# compile those that are used (4 s). They must not obey PYTHONDONTWRITEBYTECODE, or every later command would compile
-# them again.
+# compile those that are used (4 s).
 export UV_SYSTEM_CERTS ?= 1
 export UV_HTTP_RETRIES ?= 1
 install = { $(BIN)/uv pip install -q --no-deps --no-build-isolation --python $(BIN)/python $(1) \
@@ -40,8 +43,7 @@ $(PACKAGES): requirements.lock
 	@$(PYTHON) -m venv --clear $(VENV)
 	@$(BIN)/pip install -qq --no-deps --no-compile $$(grep '^uv==' requirements.lock) || true
 	@$(call install,-r requirements.lock)
-	@export PYTHONDONTWRITEBYTECODE=; \
-	$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
+	@$(BIN)/python -c 'import sklearn.cluster, sklearn.linear_model, pysindy' & first=$$!; \
 	$(BIN)/python -c 'import matplotlib.pyplot, control, osqp, jinja2, pyarrow.csv, pyarrow.parquet' \
 	  && $(BIN)/python -c 'import pydrake.multibody.plant, pydrake.multibody.parsing, pydrake.geometry' \
 	  && wait $$first
@@ -59,11 +61,13 @@ loop: setup
 	$(BIN)/armloop loop --out out/loop
 
 # With the packages of the documentation, whose site a test builds.
-test: setup $(WRITING)
+test: types $(WRITING)
+	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
+
+types: setup $(TESTING)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest $(PYTEST_ARGS) -m "not long"
 
 # What takes minutes a test: ten random arms of another engine, workers killed in the middle.
 long: setup $(TESTING)
@@ -83,7 +87,8 @@ wheel: setup
 	@rm -rf $(WHEEL) && mkdir -p $(WHEEL)
 	$(BIN)/python -m build --wheel --no-isolation --outdir $(WHEEL) . >/dev/null
 	$(PYTHON) -m venv $(WHEEL)/environment
-	$(WHEEL)/environment/bin/pip install -qq --no-compile -c requirements.lock $(WHEEL)/armloop-*.whl
+	$(BIN)/uv pip install -q --python $(WHEEL)/environment/bin/python -c requirements.lock $(WHEEL)/armloop-*.whl \
+	  || $(WHEEL)/environment/bin/pip install -qq --no-compile -c requirements.lock $(WHEEL)/armloop-*.whl
 	$(WHEEL)/environment/bin/pip check
 	cd / && $(abspath $(WHEEL))/environment/bin/armloop --version
 

@@ -123,6 +123,14 @@ def test_a_diagnosis_has_objects_for_effects(model, found, tmp_path):
     ]
 
 
+def test_a_score_and_a_log_show_themselves(model, tmp_path):
+    log = run(5, 6)
+    score = al.evaluate(model, log)
+    assert score.plot().axes and "<img" in score._repr_html_()
+    assert "Prediction error" in score.report(tmp_path / "score.html").read_text()
+    assert str(log).count("\n") == 4 and "<pre>" in log._repr_html_()
+
+
 def test_currents_and_torques_do_not_mix(model):
     log = run(10, 6)
     amperes = MotionLog(log.time, log.q, log.v, log.tau, tau_unit="A")

@@ -1,5 +1,7 @@
 """Every export, read back by its consumer, gives the model's torques as far as the target can say them."""
 
+import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -135,6 +137,33 @@ def test_the_drake_program_has_all_of_the_model(tmp_path):
         cwd="/",
     )
     assert "q after 0.1 s" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("steep", [False, True])
+def test_the_drake_program_does_not_chatter_and_a_steeper_one_would(tmp_path, steep):
+    """Dry friction of the model that fades in over a thousandth of rad/s, on links as light as a wrist's."""
+    friction = (FrictionTerm("smooth_sign", 2.0, 1e-3), FrictionTerm("viscous", 0.5))
+    model = model_of(ARMS["three_axis"], friction=friction)
+    found = export(model, "drake", tmp_path / "arm")
+    assert (found.difference < 1e-6 * found.rms).all()
+    assert "w is" in " ".join(found.notes) and "a joint creeps" in " ".join(found.notes)
+    program = (tmp_path / "arm" / "simulate.py").read_text()
+    widths = re.search(r"smoothing=(\[[^]]*\])", program)
+    assert widths is not None and max(json.loads(widths[1])) < 1.0
+    program = program.replace("Path(__file__).parent", repr(tmp_path / "arm").replace("PosixPath", "Path"))
+    program = program.replace(widths[1], "0.001") if steep else program
+    program = program.replace(
+        "simulator = ",
+        "from pydrake.all import LogVectorOutput\n"
+        "log = LogVectorOutput(plant.get_state_output_port(), builder, 0.001)\nsimulator = ",
+    )
+    scope: dict = {}
+    exec(program.replace("AdvanceTo(0.1)", "AdvanceTo(0.5)"), scope)
+    states = scope["log"].FindLog(scope["simulator"].get_context()).data()
+    turns = np.sign(np.diff(states[3:], axis=1))
+    alternating = (turns[:, 1:] * turns[:, :-1] < 0).mean(axis=1)
+    assert (alternating.max() > 0.5) == steep
 
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler (cc, gcc, clang)")

@@ -1,4 +1,4 @@
-"""The README's commands on a measured arm, and the way from a bag in docs/convert.md, run as they stand."""
+"""The commands of docs/measured.md, and the way from a bag in docs/convert.md, run as they stand."""
 
 import json
 import re
@@ -10,7 +10,7 @@ from page_commands import ROOT, armloop, commands
 @pytest.mark.long
 @pytest.mark.measured
 def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path, measured):
-    lines = [line for line in commands("armloop") if "$UR10E" in line]
+    lines = commands("armloop", "docs/measured.md")
     assert [line.split()[1] for line in lines] == ["reconstruct", "evaluate", "diagnose", "crossvalidate"]
     *_, diagnosed, answered = (
         armloop(
@@ -18,7 +18,7 @@ def test_the_commands_on_the_measured_arm_give_the_figures_of_the_text(tmp_path,
         )
         for line in lines
     )
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/measured.md").read_text(encoding="utf-8")
     (mass,) = re.findall(r"`payload`, ([\d.]+) ± ", text)
     assert mass in diagnosed
     answer = json.loads((tmp_path / "out" / "ur10e" / "diagnosis.json").read_text(encoding="utf-8"))

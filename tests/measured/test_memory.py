@@ -70,7 +70,7 @@ def test_a_ur10e_model_lacks_memory_at_nearly_all_joints(
     assert (left[2:] < 0.4).all()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_panda_model_lacks_memory_at_its_wrist(
     measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

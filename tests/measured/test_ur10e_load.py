@@ -42,11 +42,8 @@ def resampled(log: Path, rate: float, path: Path) -> Path:
     return path
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("half", "rate"),
-    [(0, 50.0), *(pytest.param(*case, marks=pytest.mark.long) for case in ((0, 100.0), (1, 100.0)))],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("half", "rate"), [(0, 50.0), (0, 100.0), (1, 100.0)])
 def test_a_half_of_the_run_tells_the_load_and_the_other_half_confirms_it(
     model: Path, ur10e: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], half: int, rate: float
 ) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armloop.api.reading import as_logs
-from armloop.api.shown import page
+from armloop.api.shown import displayed, page
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
@@ -18,6 +20,10 @@ from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
 from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
+from armloop.util.files import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,7 +51,22 @@ class Score(Numbers):
         return str(score_table(self, self.arm))
 
     def _repr_html_(self) -> str:
-        return page(str(self))
+        return page(str(self), self.plot())
+
+    def plot(self) -> Figure:
+        """nRMSE per joint as bars."""
+        from armloop.reports.score_report import score_figure
+
+        assert self.arm is not None
+        return displayed(score_figure(self, self.arm))
+
+    def report(self, path: str | Path) -> Path:
+        """Write one HTML page; raises ``InputError`` where the place cannot be written to."""
+        from armloop.reports.score_report import score_report
+
+        assert self.arm is not None
+        write_text(path, score_report(self, self.arm))
+        return Path(path)
 
 
 def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -> Score:

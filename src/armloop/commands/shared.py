@@ -18,7 +18,7 @@ from armloop.util.doubts import said
 from armloop.util.errors import InputError, ModelError
 from armloop.util.files import strict
 from armloop.util.outputs import take_file, take_folder
-from armloop.util.progress import Progress, silent
+from armloop.util.progress import Progress, silent, with_time_left
 
 
 def progress(options: argparse.Namespace) -> Progress:
@@ -26,7 +26,7 @@ def progress(options: argparse.Namespace) -> Progress:
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
     stream = sys.stderr if sys.stderr.isatty() else sys.stdout
-    return lambda message: print(f"  … {message}", file=stream, flush=True)
+    return with_time_left(lambda message: print(f"  … {message}", file=stream, flush=True))
 
 
 def print_json(value: Any) -> None:

@@ -90,6 +90,7 @@ def _mapping(columns: dict[str, Array], info: dict[str, Any]) -> tuple[Mapping |
     torques = next((found for stem in _TORQUES if (found := _of(columns, stem))), by_ending["tau"])
     velocities = next((found for stem in _VELOCITIES if (found := _of(columns, stem))), by_ending["v"])
     positions = by_ending["q"] or [name for name in states if name not in (*torques, *velocities)]
+    positions, torques, velocities = _paired(positions, torques, velocities)
     if not positions or len(torques) != len(positions):
         guess = suggest(list(columns)).mapping
         return (
@@ -103,6 +104,20 @@ def _mapping(columns: dict[str, Array], info: dict[str, Any]) -> tuple[Mapping |
     ), named
 
 
+def _paired(q: list[str], tau: list[str], v: list[str]) -> tuple[list[str], list[str], list[str]]:
+    """The columns of the joints that have a torque, in the order of the positions, where names tell which they are.
+
+    A gripper has a position, and a force or nothing; a state may be in another order than the efforts.
+    """
+    by_joint = [{_stem(name): name for name in names if "/" in name} for names in (q, tau, v)]
+    common = [joint for joint in by_joint[0] if joint in by_joint[1]]
+    if not common:
+        return q, tau, v
+    known = all(joint in by_joint[2] for joint in common)
+    found = [[names[joint] for joint in common] for names in by_joint[:2]]
+    return found[0], found[1], [by_joint[2][joint] for joint in common] if known else v
+
+
 def _of(columns: dict[str, Array], stem: str) -> list[str]:
     return [name for name in columns if name == stem or name.startswith((f"{stem}/", f"{stem}["))]
 
@@ -114,6 +129,16 @@ def _ending(name: str) -> str:
 def _joint(name: str) -> str:
     entry = name.rpartition("/")[2]
     return entry.rpartition(".")[0] if _ending(entry) in _ENDINGS["q"] and "." in entry else entry
+
+
+def _stem(name: str) -> str:
+    entry = name.rpartition("/")[2]
+    ends = [end for endings in _ENDINGS.values() for end in endings]
+    return (
+        entry[: -len(_ending(entry)) - 1]
+        if _ending(entry) in ends and len(_ending(entry)) < len(entry)
+        else entry
+    )
 
 
 def _info(path: Path) -> dict[str, Any]:
@@ -132,10 +157,12 @@ def _info(path: Path) -> dict[str, Any]:
 
 
 def _names(value: Any) -> list[str]:
-    """The entries of a feature: a list, or a list under some key, or a dict of indices."""
+    """The entries of a feature: a list, a list in a list, a list under some key, or a dict of indices."""
     if isinstance(value, dict):
         inner = next(iter(value.values()), None)
         return _names(inner) if isinstance(inner, list) else [str(key) for key in value]
+    if isinstance(value, list) and len(value) == 1 and isinstance(value[0], list):
+        return _names(value[0])
     return [str(entry) for entry in value] if isinstance(value, list) else []
 
 

@@ -9,6 +9,7 @@ SI units; joints numbered from 1, base to tip. Columns of any other name are lef
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from html import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -154,6 +155,18 @@ class MotionLog:
             f"<armloop.MotionLog {self.name}: {self.q.shape[1]} joints, {self.samples} samples in {runs} "
             f"{'run' if runs == 1 else 'runs'}, {seconds:.4g} s, tau in {self.tau_unit}>"
         )
+
+    def __str__(self) -> str:
+        unit = "A" if self.tau_unit == "A" else "N·m"
+        lines = [repr(self), f"joint       q, rad (m)  largest |v|, 1/s  |tau|, {unit}"]
+        for j in range(self.joints):
+            q, v, tau = self.q[:, j], self.v[:, j], self.tau[:, j]
+            reach = f"{q.min():.3g} … {q.max():.3g}"
+            lines.append(f"{j + 1:<5d} {reach:>15s}  {np.abs(v).max():16.3g}  {np.abs(tau).max():10.3g}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
 
     @property
     def samples(self) -> int:

@@ -76,10 +76,11 @@ class Fit:
 def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
     """Fit effects together; errors are cross-fitted over the folds, parameters come from all blocks."""
     outside = []
+    problem = _Problem(evidence, residual, effects)
     for k in range(FOLDS):
-        judged, beta, _, _, _ = _solved(evidence, residual, effects, [s.without[k] for s in shapes], k)
+        judged, beta, _, _, _ = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ beta)
-    stacked, beta, x, J, values = _solved(evidence, residual, effects, [s.final for s in shapes], None)
+    stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
     covariance = block_covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block)
     parameters, start = [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
@@ -89,21 +90,37 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), np.array(outside), stacked)
 
 
+class _Problem:
+    """Effects and the residual that they have to explain; the rows of the last nonlinear parameters are kept.
+
+    Where no effect has one, all folds share them.
+    """
+
+    def __init__(self, evidence: Evidence, residual: Array, effects: Sequence[Effect]) -> None:
+        self.evidence, self.effects = evidence, effects
+        self._residual = residual
+        self._last: tuple[list[float], Stacked, list[int]] | None = None
+
+    def rows(self, values: Sequence[float]) -> tuple[Stacked, list[int]]:
+        """The weighted rows at the effects' nonlinear parameters, and the number of each effect's columns."""
+        if self._last is None or self._last[0] != values:
+            columns = [self.evidence.columns(e, value) for e, value in zip(self.effects, values, strict=True)]
+            stacked = self.evidence.stack(self._residual, columns)
+            self._last = list(values), stacked, [c.shape[2] for c in columns]
+        return self._last[1:]
+
+
 def _solved(
-    evidence: Evidence,
-    residual: Array,
-    effects: Sequence[Effect],
-    values: Sequence[float],
-    without: int | None,
+    problem: _Problem, values: Sequence[float], without: int | None
 ) -> tuple[Stacked, Array, list[Array], Array, list[float]]:
     """Fit on all rows, or on those outside a fold, with nonlinear parameters refined from where they start.
 
     Returns:
         The rows, coefficients, free parameters per effect, derivative, and the refined nonlinear parameters.
     """
-    values = list(values)
+    values, effects, evidence = list(values), problem.effects, problem.evidence
     for attempt in range(_REFINEMENTS + 1):
-        stacked, sizes = _stack(evidence, residual, effects, values)
+        stacked, sizes = problem.rows(values)
         rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
         beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
         better = [
@@ -120,13 +137,6 @@ def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
     """A nonlinear parameter, not refined beyond what is tried: there it would stand for another effect."""
     tried = effect.shapes(evidence.context)
     return float(np.clip(value, min(tried), max(tried))) if len(tried) > 1 else value
-
-
-def _stack(
-    evidence: Evidence, residual: Array, effects: Sequence[Effect], values: Sequence[float]
-) -> tuple[Stacked, list[int]]:
-    columns = [evidence.columns(e, value) for e, value in zip(effects, values, strict=True)]
-    return evidence.stack(residual, columns), [c.shape[2] for c in columns]
 
 
 def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:

@@ -206,8 +206,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     rows = np.flatnonzero(evidence.rows[:, j])
     motion = evidence.samples.motion
     moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
-    revolute = tuple(bool(r) for r in evidence.model.arm.revolute)
-    library = _library(revolute)
+    library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
     X = np.hstack([X, X[:, library.order() <= 1] * direction])
     signed = [

@@ -39,7 +39,7 @@ class ModelEquations:
         functions: Functions,
         *,
         step: int = 3,
-        smoothing: float = 0.0,
+        smoothing: float | Sequence[float] = 0.0,
         sharp: bool = False,
         symmetric: bool = False,
     ) -> None:
@@ -47,8 +47,8 @@ class ModelEquations:
 
         Args:
             step: what of it: 1 gravity and dry friction, 2 with velocity terms, 3 the whole with its effects.
-            smoothing: speed, rad/s or m/s, within which dry friction changes sign as tanh(v / smoothing);
-                0 for the sign itself, which has no derivative at rest.
+            smoothing: speed, rad/s or m/s, within which dry friction changes sign as tanh(v / smoothing), of all
+                joints or of each; 0 for the sign itself, which has no derivative at rest.
             sharp: take smoothed dry friction of the model, tanh(v / p), as sign(v), for a plant that sticks.
             symmetric: take (M + M^T) / 2 for M. The mass matrix of sparse terms is not symmetric by itself.
 
@@ -88,7 +88,13 @@ class ModelEquations:
         for law in laws:
             if law.friction is not None:
                 self._friction.setdefault(law.friction.along, []).extend(law.friction.terms)
-        self._smoothing, self._sharp = smoothing, sharp
+        self._sharp = sharp
+        each = [float(smoothing)] * self.n if isinstance(smoothing, int | float) else [*map(float, smoothing)]
+        #: The smoothing along each direction: of two joints that share it no less than either's part of the sliding.
+        self._smoothing = {
+            along: each[along.joint] + (abs(along.ratio) * each[along.other] if along.ratio else 0.0)
+            for along in self._friction
+        }
         rubbing = [t.element for terms in self._friction.values() for t in terms]
         self.load_matters = any(element.by_load for element in rubbing)
 
@@ -135,7 +141,8 @@ class ModelEquations:
         loads = [0.0] * self.n if load is None else load
         for along, terms in self._friction.items():
             w = along.of(v)
-            sign = f.tanh(w / self._smoothing) if self._smoothing else f.sign(w)
+            width = self._smoothing[along]
+            sign = f.tanh(w / width) if width else f.sign(w)
             x = Sliding(0.0 if q is None else along.of(q), w, sign, t)
             along.add(total, torque_along(terms, x, loads[along.joint], f, self._sharp))
         return total

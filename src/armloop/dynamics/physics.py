@@ -20,8 +20,10 @@ from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 
-#: Postures drawn over the limits, how many of the worst are looked around, how often and with how many neighbours.
-_POSTURES, _WORST, _ROUNDS, _NEIGHBOURS = 1000, 8, 6, 12
+#: Postures drawn over the limits, and from how many of the worst a lower eigenvalue is searched.
+_POSTURES, _WORST = 1000, 12
+#: Rounds of that search, directions across the joints in each, and postures along a direction.
+_ROUNDS, _ACROSS, _ALONG = 8, 3, 7
 #: Motions drawn for the power of friction and for yaw, and speeds of a joint that moves alone.
 _MOTIONS, _SPEEDS = 400, 60
 #: Asymmetry of M and torque by yaw, both relative, that the noise in the coefficients of a good model leaves.
@@ -120,8 +122,8 @@ class PhysicsChecks:
 def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     """Try a model's mass matrix, friction and yaw at random postures within the joint limits.
 
-    The smallest eigenvalue is looked for around the worst postures, too. Friction is tried up to the speeds that the
-    model was fitted on (one rad/s if it does not say): joint after joint alone, and all joints at once.
+    The smallest eigenvalue is searched from the worst postures on, too (:func:`lowest`). Friction is tried up to the
+    speeds that the model was fitted on (one rad/s if it does not say): joint after joint alone, and all joints at once.
 
     Args:
         seed: of the postures and motions.
@@ -134,11 +136,11 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     tilt = np.linalg.norm(M - M.transpose(0, 2, 1), axis=(1, 2)) / np.maximum(
         np.linalg.norm(M, axis=(1, 2)), 1e-300
     )
-    value, at = lowest(lambda q: mass_matrix(model, q), low, high, q, least, rng)
+    values, postures = lowest(lambda q: mass_matrix(model, q), low, high, q, least, rng)
     driving, speeds = _driving(model, low, high, rng)
     return PhysicsChecks(
-        least=value,
-        least_at=_tuple(at),
+        least=float(values[0]),
+        least_at=_tuple(postures[0]),
         negative=float(np.mean(least <= 0)),
         asymmetry=float(tilt.max()),
         asymmetry_at=_tuple(q[int(np.argmax(tilt))]),
@@ -180,23 +182,37 @@ def lowest(
     q: Array,
     values: Array,
     rng: np.random.Generator,
-) -> tuple[float, Array]:
-    """The smallest eigenvalue of a mass matrix and its posture, looked for around the worst of the postures tried.
+    starts: int = _WORST,
+) -> tuple[Array, Array]:
+    """Smallest eigenvalues of a mass matrix and their postures, by a multistart direct search; the least one first.
+
+    From each of the worst postures tried, every joint in turn, and then some directions across them all, are scanned for
+    a lower eigenvalue: over the whole range at first, over half as far in each further round. A joint's whole range shows
+    the dips that a small step hides.
 
     Args:
         mass: (P, n) postures -> (P, n, n).
         low, high: (n,) limits of the postures.
         q: (P, n) postures tried, with their smallest eigenvalues ``values`` (P,).
+        starts: how many of them to begin at.
+
+    Returns:
+        (S,) eigenvalues, rising, and (S, n) their postures.
     """
-    reach = 0.1 * (high - low)
+    n, worst = len(low), np.argsort(values)[:starts]
+    q, values = q[worst], values[worst]
+    each, reach = np.arange(len(worst)), np.linspace(-1, 1, _ALONG)[:, None] * (high - low)
     for _ in range(_ROUNDS):
-        worst = np.argsort(values)[:_WORST]
-        steps = rng.normal(size=(len(worst), _NEIGHBOURS, len(low))) * reach
-        near = np.clip((q[worst][:, None] + steps).reshape(-1, len(low)), low, high)
-        q, values = np.concatenate([q[worst], near]), np.concatenate([values[worst], _least(mass(near))])
+        for direction in [*np.eye(n), *rng.normal(scale=1 / np.sqrt(n), size=(_ACROSS, n))]:
+            tried = np.clip(q[:, None] + reach * direction, low, high)
+            found = _least(mass(tried.reshape(-1, n))).reshape(len(worst), -1)
+            best = found.argmin(axis=1)
+            better = found[each, best] < values
+            q = np.where(better[:, None], tried[each, best], q)
+            values = np.where(better, found[each, best], values)
         reach = 0.5 * reach
-    best = int(np.argmin(values))
-    return float(values[best]), q[best]
+    order = np.argsort(values)
+    return values[order], q[order]
 
 
 def _least(M: Array) -> Array:

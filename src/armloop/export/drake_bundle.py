@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import runpy
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.drake.plant.beyond_bodies import presliding_elements
+from armloop.drake.plant.beyond_bodies import explicit_part, presliding_elements, widened
 from armloop.dynamics import ModelEquations
 from armloop.export.exported import Exported, rms_of, whole_torque
-from armloop.export.expressible import Said, friction_torques, random_motion, said
+from armloop.export.expressible import Said, random_motion, said
 from armloop.export.robot_xml import urdf_text
 from armloop.export.round_trip import drake_torque
 from armloop.model import ReconstructedModel
@@ -27,7 +28,8 @@ from armloop.util.functions import MATH
 from armloop.util.quiet import quiet
 
 _STEP = 1e-3
-_SMALLEST_SMOOTHING = 0.01
+# rad/s (m/s): no smaller speed is worth a distinction, no larger one is called dry friction.
+_SMALLEST_SMOOTHING, _LARGEST_SMOOTHING = 0.003, 10.0
 _POSTURES = 100
 _PROGRAM = '''\
 """The arm as a Drake plant with all that armloop's model knows of it; SI units. Connect drives to its actuation port."""
@@ -82,9 +84,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     if any(a.effect.name == "transmission_coupling" for a in model.effects):
         missing.append("the inertia of a motor that two joints share")
     missing += [f"{a.effect.label()}: a fault of the record" for a in model.effects if a.effect.sensor]
-    notes = [
-        f"dry friction sets in as tanh(v/{smoothing:g}): stable at {_STEP:g} s; armloop's ArmPlant really sticks"
-    ]
+    notes = _costs(model, _slower(model, smoothing), smoothing)
     return Exported(
         "drake",
         files,
@@ -111,31 +111,88 @@ def _forces(program: dict[str, Any], elements: list[Any], q: Array, v: Array) ->
     return tau
 
 
-def _smoothed(model: ReconstructedModel, what: Said, motion: Motion, smoothing: float) -> Array:
+def _smoothed(model: ReconstructedModel, what: Said, motion: Motion, smoothing: Sequence[float]) -> Array:
     """(N, n) torques of the bodies written and the rest of the model, dry friction smoothed but for what has slid.
 
     The load that friction grows with is taken without acceleration.
     """
-    whole = ModelEquations(model, MATH, smoothing=smoothing)
+    whole = ModelEquations(widened(model, smoothing), MATH, smoothing=smoothing)
     bodies = tuple(a for a in model.effects if a.effect.name in ("payload", "rotor_inertia"))
     rigid = ModelEquations(replace(model, effects=bodies), MATH)
-    elements = presliding_elements(model)
     rows = what.torque(motion.q, motion.v, motion.vdot, frozenset())
     still = [0.0] * model.arm.n
     for k, (q, v) in enumerate(zip(motion.q.tolist(), motion.v.tolist(), strict=True)):
         rows[k] += whole.friction(v, whole.load(q, v, still), 0.0, q)
         rows[k] += np.subtract(whole.rigid(q, v, still), rigid.rigid(q, v, still))
-        for e in elements:
+        for e in presliding_elements(model):
             x = v[e.joint - 1]
-            rows[k, e.joint - 1] += e.level * (MATH.sign(x) - MATH.tanh(x / smoothing))
+            rows[k, e.joint - 1] += e.level * (MATH.sign(x) - MATH.tanh(x / smoothing[e.joint - 1]))
     return rows
 
 
-def _smoothing(model: ReconstructedModel, what: Said) -> float:
-    """A speed over which dry friction may change sign without chatter: h f (M^-1)_ii, at least; two digits."""
-    M = mass_matrix(model.arm, what.links)
-    q = random_motion(model, _POSTURES, seed=5).q
-    inverse = [np.diag(np.linalg.inv(np.array(M(row)) + np.diag(what.rotors))) for row in q]
-    level = np.abs(friction_torques(model)[1]).max(axis=0)
-    needed = float((_STEP * level * np.max(inverse, axis=0)).max())
-    return float(f"{max(needed, _SMALLEST_SMOOTHING):.2g}")
+def _smoothing(model: ReconstructedModel, what: Said) -> list[float]:
+    """The speeds over which each joint's dry friction may change sign without chatter, two digits.
+
+    A force -F v that is applied explicitly to a plant whose damping D is implicit gives (M + hD) v' = (M - hF) v,
+    which is stable while hF < 2M + hD. Half of that is used, at the postures tried, by an F that is diagonal.
+    """
+    mass = mass_matrix(model.arm, what.links)
+    motion = random_motion(model, _POSTURES, seed=5)
+    held = np.array([mass(q) for q in motion.q]) + np.diag(what.rotors + 0.5 * _STEP * what.damping)
+    inverse = np.linalg.inv(held)
+    slope = 1.0 / (_STEP * np.diagonal(inverse, axis1=1, axis2=2).max(axis=0))
+    root = np.sqrt(_STEP * slope)
+    slope /= np.linalg.eigvalsh(root[:, None] * inverse * root)[:, -1].max()
+    loads = _loads(model)
+    widths = [_LARGEST_SMOOTHING] * model.arm.n
+    for j in range(model.arm.n):
+        low, high = _SMALLEST_SMOOTHING, _LARGEST_SMOOTHING
+        while high > 1.01 * low:
+            middle = float(np.sqrt(low * high))
+            tried = [*widths[:j], middle, *widths[j + 1 :]]
+            low, high = (low, middle) if _steepness(model, tried, loads, j) <= slope[j] else (middle, high)
+        widths[j] = float(f"{high:.2g}")
+    return widths
+
+
+def _steepness(model: ReconstructedModel, widths: Sequence[float], loads: list[float], j: int) -> float:
+    """How steeply the friction of joint j that is applied explicitly rises at rest, N m s (N s/m)."""
+    equations = ModelEquations(explicit_part(model, widths), MATH, smoothing=widths)
+    still = [0.0] * model.arm.n
+    speed = 1e-4 * widths[j]
+    there, back = (
+        equations.friction([*still[:j], side * speed, *still[j + 1 :]], loads, 0.0, still)[j]
+        for side in (1, -1)
+    )
+    return float((there - back) / (2 * speed))
+
+
+def _slower(model: ReconstructedModel, smoothing: Sequence[float]) -> list[int]:
+    """Joints (0-based) whose dry friction sets in over more than the model has it."""
+    loads, at_once = _loads(model), [1e-6] * model.arm.n
+    return [
+        j
+        for j in range(model.arm.n)
+        if _steepness(model, at_once, loads, j) > 1.01 * _steepness(model, smoothing, loads, j)
+    ]
+
+
+def _loads(model: ReconstructedModel) -> list[float]:
+    """(n,) the largest torques at rest that load the joints, at the postures tried."""
+    equations, still = ModelEquations(model, MATH), [0.0] * model.arm.n
+    postures = random_motion(model, _POSTURES, seed=5).q.tolist()
+    return [float(x) for x in np.abs([equations.load(q, still, still) for q in postures]).max(axis=0)]
+
+
+def _costs(model: ReconstructedModel, joints: Sequence[int], smoothing: Sequence[float]) -> list[str]:
+    """What the smoothing costs, in a line each."""
+    if not joints:
+        return []
+    each = ", ".join(
+        f"{smoothing[j]:g} {model.arm.joints[j].position_unit}/s at joint {j + 1}" for j in joints
+    )
+    return [
+        f"dry friction sets in as tanh(v/w) instead of at once, so that a step of {_STEP:g} s does not chatter: w is {each}",
+        "below w a joint creeps where the model's sticks, and the friction is less than the model's; a step of half the "
+        "size needs half of w (simulate.py); armloop's ArmPlant really sticks",
+    ]

@@ -91,6 +91,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     from armloop.reports.html import Section
     from armloop.reports.loop_report import loop_figure, loop_report
     from armloop.reports.tables import eta_table, score_table, steps_table
+    from armloop.reports.words import controller
 
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant
@@ -132,7 +133,8 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             after_run = workers.submit(
                 track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared]
             )
-            write_replay(folder / "replay.html", plant.arm, tracking)
+            labels = {name: controller(name) for name in tracking}
+            write_replay(folder / "replay.html", plant.arm, tracking, labels=labels)
             before, after = before_run.result(), after_run.result()
         with _Clock(seconds, "measured", progress, "6/7 the same on measured data: a UR5 that was pushed"):
             measured_words, measured_section = pushed.result()

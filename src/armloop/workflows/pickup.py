@@ -64,7 +64,7 @@ def run_pickup_scenario(
         write_figure(folder / "tracking.png", tracking_figure(phases, PHASES))
         progress("recording the replay")
         # every phase holds the whole run
-        write_replay(folder / "replay.html", scenario.plant.arm, {"pid_step3": phases["augmented"]})
+        write_replay(folder / "replay.html", scenario.plant.arm, {"augmented model": phases["augmented"]})
     return answer, result
 
 

@@ -51,11 +51,13 @@ def run_scenario(
     if folder is not None:
         from armloop.drake.view.replay import write_replay
         from armloop.reports.plots import tracking_figure
+        from armloop.reports.words import controller
 
         progress("drawing and recording the replay")
         write_json(folder / "tracking.json", answer)
         write_figure(folder / "tracking.png", tracking_figure(results))
-        write_replay(folder / "replay.html", scenario.plant.arm, results)
+        labels = {name: controller(name) for name in results}
+        write_replay(folder / "replay.html", scenario.plant.arm, results, labels=labels)
         save_made(folder, chosen, models)
     return answer, results
 

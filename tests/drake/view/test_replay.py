@@ -42,6 +42,7 @@ def test_one_offline_html_file(arm, tmp_path, caplog):
     assert "connect(" not in own and "new WebSocket" not in own
     assert [p.name for p in tmp_path.iterdir()] == ["replay.html"]
     assert path.stat().st_size < 10e6
+    assert "pid_step3" in html[html.index('<div id="legend"') :] and "grey: the reference" in html
 
 
 def test_an_arm_with_meshes_is_drawn_as_sticks(tmp_path):

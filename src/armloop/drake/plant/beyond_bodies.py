@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.laws.effects.base import number
-from armloop.laws.friction import FrictionLaw
+from armloop.laws.friction import KINDS, FrictionLaw
 from armloop.model import ReconstructedModel
 
 #: Effects that a description of links and drives holds.
@@ -27,7 +28,8 @@ def BeyondBodies_(T: type) -> Any:
         """A model's forces on its arm that a plant of links, rotors and joint damping does not have.
 
         force = -(friction(v, load(q, v)) - viscous v + springs, ripples, tilt(q, v)) with dry friction's sign as
-        tanh(v / `smoothing`), and of friction that grows with the load the load without acceleration.
+        tanh(v / `smoothing`), or more slowly where the model's own fades in over a wider range, and of friction that
+        grows with the load the load without acceleration.
 
         Input port: `state` (2n,) positions, then velocities. Output port: `force` (n,), N*m (N), to add to a plant's
         applied generalized forces (`add_joint_forces`). Stateless; the joints are started at time 0. Scalar types
@@ -40,17 +42,20 @@ def BeyondBodies_(T: type) -> Any:
         """
 
         def _construct(
-            self, model: ReconstructedModel, smoothing: float = 0.02, *, converter: Any = None
+            self,
+            model: ReconstructedModel,
+            smoothing: float | Sequence[float] = 0.02,
+            *,
+            converter: Any = None,
         ) -> None:
-            """model : of n joints; smoothing : rad/s (m/s)."""
-            if not smoothing > 0:
-                raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
-            LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = model, smoothing
+            """model : of n joints; smoothing : rad/s (m/s), of all joints or of each."""
             n = self._n = model.arm.n
+            widths = per_joint(smoothing, n)
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = model, tuple(widths)
             functions = functions_of(T)
-            sliding = _without_elements(model)
-            self._whole = ModelEquations(sliding, functions, smoothing=smoothing)
+            sliding = explicit_part(model, widths)
+            self._whole = ModelEquations(sliding, functions, smoothing=widths)
             bodies = tuple(a for a in model.effects if a.effect.name in _BODIES)
             others = [a for a in sliding.effects if not a.effect.sensor and a.effect.name not in _BODIES]
             # Only where an effect acts besides friction are the bodies' torques needed, to take them off again.
@@ -94,17 +99,42 @@ def presliding_elements(model: ReconstructedModel) -> list[Stop]:
     return found
 
 
-def friction_systems(model: ReconstructedModel, smoothing: float, period: float) -> list[Any]:
+def friction_systems(
+    model: ReconstructedModel, smoothing: float | Sequence[float], period: float
+) -> list[Any]:
     """The systems that make a plant of a model's bodies the whole model, for `add_joint_forces`."""
     systems: list[Any] = [BeyondBodies(model, smoothing)]
     elements = presliding_elements(model)
     return systems + ([PreslidingFriction(model.arm.n, elements, period)] if elements else [])
 
 
-def _without_elements(model: ReconstructedModel) -> ReconstructedModel:
-    """The model without viscous terms, which the plant has as damping, and without what remembers."""
+def per_joint(smoothing: float | Sequence[float], n: int) -> list[float]:
+    """The smoothing of each of n joints; raises ``ValueError`` unless it is above 0 and one or n numbers."""
+    widths = [float(smoothing)] * n if isinstance(smoothing, int | float) else [*map(float, smoothing)]
+    if len(widths) != n or not all(width > 0 for width in widths):
+        raise ValueError(
+            f"smoothing is {smoothing}; it must be above 0 rad/s, one number or one for each of {n} joints"
+        )
+    return widths
+
+
+def widened(model: ReconstructedModel, widths: Sequence[float]) -> ReconstructedModel:
+    """The model with dry friction that fades in over less than its joint's width fading in over that."""
     terms = tuple(
-        tuple(t for t in joint if t.kind not in ("viscous", "hysteresis")) for joint in model.friction.terms
+        tuple(
+            replace(t, parameter=max(t.parameter, width)) if KINDS[t.kind].way == "fading" else t
+            for t in joint
+        )
+        for joint, width in zip(model.friction.terms, widths, strict=True)
+    )
+    return replace(model, friction=FrictionLaw(terms))
+
+
+def explicit_part(model: ReconstructedModel, widths: Sequence[float]) -> ReconstructedModel:
+    """The widened model without viscous terms, which the plant has as damping, and without what remembers."""
+    terms = tuple(
+        tuple(t for t in joint if t.kind not in ("viscous", "hysteresis"))
+        for joint in widened(model, widths).friction.terms
     )
     effects = []
     for added in model.effects:

@@ -211,6 +211,10 @@ def JointLoads_(T: type) -> Any:
             by_load = []
             for rubbing in self._rubbing:
                 along, w = rubbing.along, rubbing.along.of(v)
+                if rubbing.alone is not None:
+                    laws.append(ClampedLaw.dry(along, max(rubbing.alone.level(w, functions), 0.0)))
+                    pieces.append(laws[-1].piece(w))
+                    continue
                 x = Sliding(along.of(q), w, 1.0, context.get_time())
                 level, more = rubbing.level(x, functions), rubbing.more
                 if rubbing.smooth:
@@ -254,6 +258,7 @@ class _Rubbing:
 
     smooth : whether a part of it does not turn with the sliding; it is taken to first order about the step's start
     more : elements that grow with the load
+    alone : the joint's friction where nothing else rubs: its velocity is all that counts
     """
 
     def __init__(self, along: Direction, friction: JointFriction | None, terms: Sequence[Acting]) -> None:
@@ -263,6 +268,7 @@ class _Rubbing:
         self.more = [t for t in own if t.element.by_load]
         states = (Sliding(0.3, w, 1.0, 1.0) for w in (-0.7, 0.2))
         self.smooth = any(self._smooth(x, MATH) != 0.0 for x in states)
+        self.alone = None if self._terms or self.more else friction
 
     def __bool__(self) -> bool:
         eq34 = self._friction is not None and self._friction.static > 0

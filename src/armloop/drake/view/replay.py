@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Protocol
 
@@ -12,9 +13,14 @@ from pydrake.geometry import MeshcatVisualizer
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from armloop.drake.view.scene import add_actors, local_meshcat
+from armloop.drake.view.scene import COLOURS, add_actors, local_meshcat, look_at
 from armloop.robot.arm import Arm
 from armloop.util.files import write_text
+
+_LEGEND = (
+    "position:fixed;left:0;bottom:0;padding:.5em .8em;border-radius:0 8px 0 0;background:rgba(255,255,255,.85);"
+    "color:#1b2430;font:16px/1.5 system-ui,sans-serif;z-index:10"
+)
 
 
 class Recorded(Protocol):
@@ -29,10 +35,16 @@ class Recorded(Protocol):
 
 
 def write_replay(
-    path: str | Path, arm: Arm, results: Mapping[str, Recorded], *, frames_per_second: float = 25.0
+    path: str | Path,
+    arm: Arm,
+    results: Mapping[str, Recorded],
+    *,
+    labels: Mapping[str, str] | None = None,
+    frames_per_second: float = 25.0,
 ) -> None:
     """Write a replay of tracking runs: the arms side by side, a colour per controller, each in a grey ghost.
 
+    A legend says whose each colour is; ``labels`` are what it calls the results, else their names.
     The ghost is the reference. The Meshcat server listens on the loopback interface only and ends with this call. The
     file is written whole or not at all; raises `InputError` when it cannot be.
     """
@@ -56,4 +68,20 @@ def write_replay(
         diagram.ForcedPublish(context)
     visualizer.StopRecording()
     visualizer.PublishRecording()
-    write_text(path, meshcat.StaticHtml())
+    look_at(meshcat, arm, len(results))
+    write_text(path, _labelled(meshcat.StaticHtml(), [(labels or {}).get(name, name) for name in results]))
+
+
+def _labelled(page: str, names: Sequence[str]) -> str:
+    """The page with a legend below the scene: whose arm has which colour."""
+    dots = [
+        (f"rgb({', '.join(str(round(255 * part)) for part in COLOURS[k % len(COLOURS)])})", name)
+        for k, name in enumerate(names)
+    ]
+    shown = "".join(
+        f'<span style="white-space:nowrap;margin-right:1em"><span style="color:{colour}">&#9679;</span> '
+        f"{escape(name)}</span> "
+        for colour, name in [*dots, ("rgb(140, 140, 140)", "grey: the reference")]
+    )
+    at = page.rindex("</body>")
+    return f'{page[:at]}<div id="legend" style="{_LEGEND}">{shown}</div>{page[at:]}'

@@ -59,6 +59,14 @@ def add_actors(plant: MultibodyPlant, arm: Arm, names: Sequence[str]) -> list[Ac
     return actors
 
 
+def look_at(meshcat: Meshcat, arm: Arm, count: int) -> None:
+    """Place the camera so that ``count`` arms side by side fill a wide window, seen from the front and a little above."""
+    reach = _reach(arm)
+    width = _SPACING * 0.5 * reach * (count - 1) + reach
+    target = np.array([0.2 * reach, 0.0, 0.35 * reach])
+    meshcat.SetCameraPose(target + max(0.66 * width, 1.3 * reach) * np.array([0.86, -0.36, 0.36]), target)
+
+
 def _reach(arm: Arm) -> float:
     """Return the stretched length of the arm, m."""
     steps = [np.linalg.norm(X[:3, 3]) for X in (*arm.X_PF, arm.X_tool)]

@@ -87,8 +87,13 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     fitting = Fitting(arm, training, design, {}, options, progress)
     ladder, laws = fitting.chosen()
     r = energy.count + laws.count
+
+    def columns(q: Array) -> Array:
+        return np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3)
+
     shape = Body(
-        lambda q: np.concatenate([energy.mass(q), laws.mass(arm, q)], axis=3),
+        columns,
+        lambda theta, q: columns(q) @ theta,
         postures(motion),
         *joint_limits(arm, motion_range(motion)),
         np.zeros(r, dtype=bool),
@@ -101,11 +106,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
             try:
                 physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
                 theta = physical.theta
-                physics = {
-                    "constraints": physical.binding,
-                    "contradicted": physical.contradicted,
-                    "kept_positive": physical.where,
-                }
+                physics = physical.to_dict()
             except (
                 ExcitationError
             ):  # terms found in little data may leave no room for M; the notes then say so

@@ -1,7 +1,7 @@
 """Physical-consistency constraints on regressed coefficients, kept as linear inequalities.
 
 M(q) is kept positive definite over the joint limits, not only where the arm was seen: cutting planes at random postures,
-and at the worst ones that a search finds afterwards, until it finds none. By how much is a small part of each joint's mean
+and at all that a multistart search finds afterwards, until it finds none. By how much is a small part of each joint's mean
 inertia, so that M can be inverted everywhere.
 """
 
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,8 +25,11 @@ from armloop.util.errors import ExcitationError
 
 #: Postures of the motion, and more within the joint limits, at which M(q) is kept positive definite from the start.
 POSTURES, _BEYOND = 60, 240
-#: Searches for a posture that violates it nevertheless, postures each begins with, and the worst that are added.
-_SEARCHES, _TRIED, _ADDED = 8, 400, 20
+#: Searches for postures that violate it nevertheless, postures each draws, from how many of the worst it goes on, and how
+#: many searches in a row must find none.
+_SEARCHES, _TRIED, _STARTS, _QUIET = 40, 400, 24, 2
+#: Postures nearer than that part of the range in every joint are one.
+_ALIKE = 0.05
 #: Part of the joints' mean inertias by which M(q) stays clear of a singular matrix; how negative counts as violated.
 _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
@@ -46,13 +48,15 @@ class Body:
     """Shared coefficients as a mass matrix, and where it matters.
 
     Attributes:
-        mass: postures (P, n) -> (P, n, n, r) mass matrices per unit of every shared coefficient.
+        columns: postures (P, n) -> (P, n, n, r) mass matrices per unit of every shared coefficient.
+        mass: coefficients (r,), postures (P, n) -> (P, n, n): what the columns add up to.
         seen: (P, n) postures of the training motion.
         low, high: (n,) the joint limits.
         positive: (r,) coefficients that are negative for no arm: sums of masses and principal inertias.
     """
 
-    mass: Callable[[Array], Array]
+    columns: Callable[[Array], Array]
+    mass: Callable[[Array, Array], Array]
     seen: Array
     low: Array
     high: Array
@@ -68,11 +72,22 @@ class PhysicalSolution:
         binding: conditions on M(q), independent of each other, that hold the coefficients.
         where: :data:`LIMITS`, :data:`TRAINED` where the data contradict a positive definite M(q) over all of them by
             more than noise, or :data:`FREE` where they contradict it at the postures of the motion, too.
+        left: (n,) a posture within the limits at which M(q) is negative nevertheless: the searches ended there.
     """
 
     theta: Array
     binding: int
     where: str = LIMITS
+    left: Array | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a model keeps of it."""
+        return {
+            "constraints": self.binding,
+            "contradicted": self.contradicted,
+            "kept_positive": self.where,
+            **({} if self.left is None else {"left": self.left.tolist()}),
+        }
 
     @property
     def contradicted(self) -> bool:
@@ -111,7 +126,9 @@ def physical_solution(
     most = np.inf if insist else float(chi2.ppf(_CHANCE, conditions)) * repeats
     for where, q in tried:
         try:
-            theta, binding = _kept_positive(solution, body, laws, q, rng if where == LIMITS else None, most)
+            theta, binding, left = _kept_positive(
+                solution, body, laws, q, rng if where == LIMITS else None, most
+            )
         except TooCostly:
             continue
         except ArithmeticError as error:
@@ -119,7 +136,7 @@ def physical_solution(
             continue
         cost = (_cost(solution, theta) - _cost(solution, solution.theta)) / repeats
         if insist or cost <= chi2.ppf(_CHANCE, max(binding, 1)):
-            return PhysicalSolution(theta, binding, where)
+            return PhysicalSolution(theta, binding, where, left)
     if failed is not None:
         raise ExcitationError(
             "the motion tells too little: no physically possible inertial parameters can be found for it; log "
@@ -135,48 +152,86 @@ def _kept_positive(
     q: Array,
     rng: np.random.Generator | None,
     most: float,
-) -> tuple[Array, int]:
-    """Coefficients with M positive definite at postures q and, with ``rng``, at all that a search finds, too.
+) -> tuple[Array, int, Array | None]:
+    """Coefficients with M positive definite at postures q and, with ``rng``, at all that searches find, too.
+
+    Returns:
+        The coefficients, how many conditions bind, and a posture at which M is negative nevertheless, if one was left
+        when the searches ended.
 
     Raises:
         TooCostly: that adds more than ``most`` to the squared error.
         ArithmeticError: there are none.
     """
-    rows: list[Array] = []
-    mass, start, r = body.mass(q), solution.theta, len(body.positive)
+    columns, r = body.columns(q), len(body.positive)
+    clear = _CLEAR * np.einsum("pjjr->jr", columns) / len(columns)
+    rows: Array = np.zeros((0, len(solution.theta)))
+    theta, left = solution.theta, None
     for _ in range(_SEARCHES):
-        cuts = physical_cuts(mass, laws, body.positive)
-
-        def recorded(theta: Array, cuts: Cuts = cuts) -> Array:
-            found = cuts(theta)
-            rows.extend(row for row in found if np.count_nonzero(row) > 1)
-            return found
-
-        theta, _ = constrained_least_squares(solution.G, solution.b, start, recorded, most)
+        cuts = physical_cuts(columns, clear, laws, body.positive)
+        try:
+            theta, rows = _within(solution, cuts, rows, most)
+        except TooCostly:
+            raise
+        except ArithmeticError:
+            if left is None:
+                raise
+            break
         if rng is None:
             break
-        q = rng.uniform(body.low, body.high, (_TRIED, len(body.low)))
-        own = body.mass(q)
-        least = np.asarray(np.linalg.eigvalsh(own @ theta[:r])[:, 0], dtype=float)
-        value, at = lowest(partial(_mass, body, theta[:r]), body.low, body.high, q, least, rng)
-        if value > 0:
+        found = _violated(body, theta[:r], 0.5 * clear, rng)
+        if len(found) == 0:
+            left = None
             break
-        worst = np.argsort(least)[:_ADDED]
-        mass = np.concatenate([mass, own[worst], body.mass(at[None])])
-    else:
-        raise ArithmeticError(f"M(q) is still negative at q = {at} after {_SEARCHES} searches")
-    A = np.array(rows).reshape(-1, len(theta))
-    sizes = np.maximum(np.abs(A * theta).sum(axis=1, keepdims=True), 1e-300)
-    tight = (A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300))[
-        np.abs(A @ theta) < 1e-4 * sizes[:, 0]
-    ]
+        left = found[0]
+        columns = np.concatenate([columns, body.columns(found)])
     # A coefficient held at zero is a condition, too, though no row of several.
     held = np.count_nonzero(np.abs(theta[:r][body.positive]) <= _SLACK)
-    return theta, (int(np.linalg.matrix_rank(tight, tol=1e-3)) if len(tight) else 0) + int(held)
+    several = rows[np.count_nonzero(rows, axis=1) > 1]
+    rank = int(np.linalg.matrix_rank(several, tol=1e-3)) if len(several) else 0
+    negative = left is not None and np.linalg.eigvalsh(body.mass(theta[:r], left[None]))[0, 0] <= 0
+    return theta, rank + int(held), left if negative else None
 
 
-def _mass(body: Body, coefficients: Array, q: Array) -> Array:
-    return np.asarray(body.mass(q) @ coefficients)
+def _within(solution: Solution, cuts: Cuts, known: Array, most: float) -> tuple[Array, Array]:
+    """Coefficients within all cuts, of which some are known to bind; and those that then do, of unit length."""
+    rows = [known]
+
+    def recorded(theta: Array) -> Array:
+        found = cuts(theta)
+        # the binding ones of a problem with fewer cuts spare this one finding them again
+        found = np.vstack([known, found]) if len(rows) == 1 and len(found) else found
+        rows.append(found)
+        return found
+
+    theta, _ = constrained_least_squares(solution.G, solution.b, solution.theta, recorded, most)
+    A = np.unique(np.vstack(rows), axis=0)
+    sizes = np.maximum(np.abs(A * theta).sum(axis=1), 1e-300)
+    A = A[np.abs(A @ theta) < 1e-4 * sizes]
+    return theta, A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300)
+
+
+def _violated(body: Body, coefficients: Array, clear: Array, rng: np.random.Generator) -> Array:
+    """(K, n) postures within the limits at which M(q) is less than ``clear`` on its diagonal, the worst first; none alike.
+
+    Several searches, each from postures of its own, end at the first that finds any.
+    """
+    least, span = np.diag(clear @ coefficients), body.high - body.low
+
+    def mass(q: Array) -> Array:
+        return np.asarray(body.mass(coefficients, q) - least)
+
+    for _ in range(_QUIET):
+        q = rng.uniform(body.low, body.high, (_TRIED, len(span)))
+        values = np.asarray(np.linalg.eigvalsh(mass(q))[:, 0], dtype=float)
+        values, q = lowest(mass, body.low, body.high, q, values, rng, _STARTS)
+        found: list[Array] = []
+        for posture in q[values <= 0]:
+            if all((np.abs(posture - other) > _ALIKE * span).any() for other in found):
+                found.append(posture)
+        if found:
+            return np.array(found)
+    return np.zeros((0, len(span)))
 
 
 def _cost(solution: Solution, theta: Array) -> float:
@@ -184,7 +239,7 @@ def _cost(solution: Solution, theta: Array) -> float:
 
 
 def physical_cuts(
-    mass: Array, laws: list[list[FrictionTerm]], positive: NDArray[np.bool_] | None = None
+    mass: Array, clear: Array, laws: list[list[FrictionTerm]], positive: NDArray[np.bool_] | None = None
 ) -> Cuts:
     """What physics demands of the coefficients: M(q) positive definite, friction that never drives.
 
@@ -192,6 +247,7 @@ def physical_cuts(
 
     Args:
         mass: (P, n, n, r) mass matrices per unit of every shared coefficient at the postures tried.
+        clear: (n, r) the inertias, per unit of every shared coefficient, by which M(q) stays clear of a singular matrix.
         laws: friction of every joint, whose coefficients follow the shared ones.
         positive: (r,) shared coefficients that must not be negative.
     """
@@ -200,9 +256,8 @@ def physical_cuts(
     bound = [not x for x in free] + [term.kind != "offset" for law in laws for term in law]
     signs = np.eye(len(bound))[bound]
     joints = np.arange(mass.shape[1])
-    mean = np.zeros(mass.shape[1:])
-    mean[joints, joints] = mass[:, joints, joints].mean(axis=0)
-    mass = mass - _CLEAR * mean
+    mass = mass.copy()
+    mass[:, joints, joints] -= clear
 
     def cuts(theta: Array) -> Array:
         found = list(signs) if (signs @ theta < -_SLACK).any() else []
@@ -226,6 +281,11 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
         below = ", ".join(history.get("negative", {}))
         return [free + (f"; negative, as for no arm: {below}" if below else "")]
     notes = []
+    if history.get("left"):
+        posture = ", ".join(f"{x:.2f}" for x in history["left"])
+        notes.append(
+            f"M(q) was kept positive definite at all postures that {_SEARCHES} searches found, but for q = ({posture})"
+        )
     if where == TRAINED:
         notes.append(
             "the data contradict an M(q) that is positive definite over all joint limits by more than noise: it was kept so "

@@ -36,6 +36,7 @@ from armloop.identification.reconstruction.training import Training
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 
@@ -68,6 +69,9 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     r = base.count + laws.count
     shape = Body(
         lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
+        lambda theta, q: (
+            mass_matrix(arm, base, theta[: base.count], q) + laws.mass(arm, q) @ theta[base.count :]
+        ),
         postures(motion),
         *joint_limits(arm, motion_range(motion)),
         np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
@@ -79,11 +83,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         if options.physical:
             physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
             theta = physical.theta
-            physics = {
-                "constraints": physical.binding,
-                "contradicted": physical.contradicted,
-                "kept_positive": physical.where,
-            }
+            physics = physical.to_dict()
             held = np.flatnonzero(
                 base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
             )
@@ -142,6 +142,15 @@ def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit, np.array([0]))
     columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
     return columns.transpose(0, 2, 1, 3)
+
+
+def mass_matrix(arm: Arm, base: BaseParameters, values: Array, q: Array) -> Array:
+    """(P, n, n) mass matrix at postures q (P, n) of given base parameters, much sooner than by its columns."""
+    n, full = arm.n, base.to_full(values)
+    repeated, unit = np.repeat(q, n, axis=0), np.tile(np.eye(n), (len(q), 1))
+    weightless = replace(arm, gravity=np.zeros(3))
+    torques = joint_torques(weightless, full[: 10 * n], repeated, np.zeros_like(repeated), unit)
+    return torques.reshape(len(q), n, n).transpose(0, 2, 1) + np.diag(full[10 * n :])
 
 
 class RigidBodyLibrary(Library):

@@ -142,11 +142,11 @@ def crossvalidate(
         return answer
 
     results = []
-    progress(f"1 of {len(splits)}: {splits[0].name} left out")
+    progress(f"0 of {len(splits)} fitted: {splits[0].name} left out")
     fits = (workers or Serial()).map(fitted, list(enumerate(splits, 1)))
     for number, (split, found) in enumerate(zip(splits, fits, strict=True), 1):
         if number < len(splits):
-            progress(f"{number + 1} of {len(splits)}: {splits[number].name} left out")
+            progress(f"{number} of {len(splits)} fitted: {splits[number].name} left out")
         # Judged is what was kept, just made or not, so that both give the same figures.
         fit = Fit(model_of(found["model"], f"the model without {split.name}"), found["notes"])
         results.append((split.name, fit))
