@@ -104,7 +104,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
         found.append(best)
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of what can be explained")
         found = _exchanged(evidence, found, listed, explainable, progress)
-        found = _at_one_blow(evidence, nothing, found, explainable, progress)
+        found = _one_for_several(evidence, nothing, found, explainable, progress)
         known = _known(evidence, found)
         # What is added may be taken back by an exchange: the same effects a second time are the end of it.
         places = frozenset(f.effect.place for f in found)
@@ -168,7 +168,7 @@ def _exchanged(
     return found
 
 
-def _at_one_blow(
+def _one_for_several(
     evidence: Evidence, nothing: Known, found: list[Found], explainable: Array, progress: Progress
 ) -> list[Found]:
     """One effect of the whole arm where it does all that several did: a load shows on every joint."""
