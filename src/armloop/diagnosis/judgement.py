@@ -93,7 +93,7 @@ def _likelier(worse: Fit, better: Fit) -> float:
     blocks, hard, is no chance, though neither the sum's spread nor the number of blocks that agree says so.
     """
     joints = worse.stacked.joints
-    seen = np.unique(np.column_stack([worse.stacked.joint, worse.stacked.block]), axis=0)[:, 0]
+    seen = np.flatnonzero(np.bincount(worse.stacked.joint + joints * worse.stacked.block)) % joints
     rows = np.maximum(rows_per_joint(worse), 1)
     ratio = np.log((energy_by_joint(worse) + rows) / (energy_by_joint(better) + rows))
     log_likelihood = 0.5 * float((np.bincount(seen, minlength=joints) * ratio).sum())
