@@ -178,3 +178,16 @@ def test_a_width_beyond_what_was_tried_is_not_resolved() -> None:
 )
 def test_a_law_is_sought_among_waves_of_three_times_an_angle_whatever_the_arm(joints: int, law: str) -> None:
     assert law in unlisted._library((True,) * joints).names
+
+
+def test_a_law_that_explains_an_event_holds_where_the_event_was() -> None:
+    """Found without the last samples, in which something else was suspected."""
+    q = np.array([[0.0], [1.0], [3.0], [9.0]])
+    motion = Motion(np.arange(4.0), q, -q, 0 * q, np.array([0]))
+    rows = np.array([[True], [True], [True], [False]])
+    whole: Any = SimpleNamespace(rows=rows, samples=SimpleNamespace(motion=motion))
+    ends = {"q_low": [0.0], "q_high": [1.0], "v_low": [-1.0], "v_high": [0.0]}
+    parameters = {key: Estimate(value, [0.0], "rad") for key, value in ends.items()}
+    found = unlisted.Unlisted(1, 1.0, 0.1, "2*v1", 0.1, parameters | {"v1": Estimate(2.0, 0.1, "N*m*s/rad")})
+    wider = {key: e.value for key, e in found.over(whole).parameters.items()}
+    assert wider == {"q_low": [0.0], "q_high": [3.0], "v_low": [-3.0], "v_high": [-0.0], "v1": 2.0}

@@ -106,7 +106,8 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
         account = Account.of(whole, again, progress)
         # Beside what only looked like an event, a search may go another way than without it.
         if not again and looked.left(residual) < account.left(residual):
-            return looked
+            law = looked.unlisted
+            return looked if law is None else replace(looked, unlisted=law.over(whole))
     if not account.contacts or not plain_counts:
         return account
     if contacts:

@@ -6,7 +6,7 @@ and directions, and reported only if both halves of the run choose it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -21,6 +21,7 @@ from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Estimate, FoundLaw, found_law
+from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
@@ -66,6 +67,18 @@ class Unlisted:
     def added(self) -> list[AddedEffect]:
         """The law as an effect that a model can have; none where there is no law."""
         return [AddedEffect(FoundLaw(self.joint), self.parameters)] if self.parameters else []
+
+    def over(self, evidence: Evidence) -> Unlisted:
+        """The same law with the range of these samples, in which it was found to hold as well."""
+        rows, motion = evidence.rows[:, self.joint - 1], evidence.samples.motion
+        ends = {"low": np.min, "high": np.max}
+        wider = {
+            key: replace(e, value=ends[key[2:]](getattr(motion, key[0])[rows], axis=0).tolist())
+            if key in RANGE
+            else e
+            for key, e in self.parameters.items()
+        }
+        return replace(self, parameters=wider)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``diagnosis.json``."""
