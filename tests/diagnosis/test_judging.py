@@ -191,3 +191,28 @@ def test_a_law_that_explains_an_event_holds_where_the_event_was() -> None:
     found = unlisted.Unlisted(1, 1.0, 0.1, "2*v1", 0.1, parameters | {"v1": Estimate(2.0, 0.1, "N*m*s/rad")})
     wider = {key: e.value for key, e in found.over(whole).parameters.items()}
     assert wider == {"q_low": [0.0], "q_high": [3.0], "v_low": [-3.0], "v_high": [-0.0], "v1": 2.0}
+
+
+@pytest.mark.parametrize(("without_it", "kept"), [(500.0, True), (20.0, False)])
+def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
+    without_it: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The law leaves 50 of the run; a search among all samples finds something else, which leaves so much."""
+    law = SimpleNamespace(over=lambda whole: "everywhere")
+
+    def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
+        evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
+        outcome: Any = SimpleNamespace()
+        return accounts.Account(whole, contacts, evidence, outcome, law if contacts else None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
+    monkeypatch.setattr(
+        accounts.Account, "left", lambda self, residual: 50.0 if self.unlisted else without_it
+    )
+    monkeypatch.setattr(accounts.Account, "remaining", lambda self: np.zeros((4, 1)))
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [])
+    every: Any = SimpleNamespace(rows=np.ones((4, 1), dtype=bool))
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: every)
+    event: Any = SimpleNamespace(share=0.9)
+    found = accounts.best_account(every, [event], True, lambda text: None)
+    assert (found.unlisted == "everywhere") == kept and not found.contacts  # type: ignore[comparison-overlap]
