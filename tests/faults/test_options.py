@@ -72,6 +72,17 @@ WRONG: dict[str, tuple[str, str]] = {
     "a model twice": ("track scenario.yaml --model a=model.json --model a=model.json", "'a' is given twice"),
     "the exact model": ("track scenario.yaml --model exact=model.json", "choose another name"),
     "a pace without a view": ("track scenario.yaml --rate 2", "--rate is the pace of --meshcat"),
+    "a lock without an arm": (f"{DIAGNOSE} --lock joint_1=0", "--lock is of the URDF that --arm names"),
+    "a tip without an arm": (
+        "evaluate model.json run.csv --tip tool",
+        "--tip is of the URDF that --arm names",
+    ),
+    "a joint locked twice": (f"{RECONSTRUCT} --lock joint_1=0 --lock joint_1=1", "'joint_1' is locked twice"),
+    "a watch without a scheduler": (
+        "watch --models model.json --logs run.csv --store s --scheduler nonsense",
+        "no Dask scheduler answers",
+    ),
+    "a store of no text": ("watch --models model.json --logs run.csv --store s\udcff", "the name is no text"),
     "no command": ("", "required: COMMAND"),
     "an unknown command": ("magic", "magic"),
     "an arm that is a folder": ("collect . --out c", "no such file"),
