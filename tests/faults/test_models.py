@@ -36,6 +36,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("schema",), ["armloop/model/3", "armloop/loop/1", 1, None, [], ...], "schema is"),
     (("arm",), [None, [], 3, "three_axis"], r"arm is .*a mapping of fields"),
     (("arm", "name"), [None, 3, "x" * 1000], r"arm\.name"),
+    (("arm", "joints", 1, "name"), [None, "", " ", "joint_1"], r"arm\.joints\[2\]\.name"),
     (("arm", "joints"), [None, [], {}, "3", ...], r"joints"),
     (("arm", "joints", 0, "kind"), ["ball", None, 1, ""], r"arm\.joints\[1\]\.kind is .*there are|text"),
     (("arm", "joints", 0, "lower"), ["low", None, 1e300, 5.0, []], r"joints\[1\]\.lower|lower below upper"),

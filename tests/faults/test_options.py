@@ -61,6 +61,8 @@ WRONG: dict[str, tuple[str, str]] = {
     "an unknown plan": ("collect three_axis --out c --plan huge", "there are: dwell, paper, quick"),
     "an unknown arm": ("collect puma --out c", "puma: no such file and no built-in arm"),
     "the run held out, too": (f"{DIAGNOSE} --held-out run.csv", "is one of the logs diagnosed"),
+    "a run held out twice": (f"{DIAGNOSE} --held-out other.csv other.csv", "measurement of other once more"),
+    "a reserve without a next run": (f"{DIAGNOSE} --reserve 0.5", "give it, too"),
     "ranges without a next run": (f"{DIAGNOSE} --next-run-duration 60", "give it, too"),
     "a next run that is no table": (f"{DIAGNOSE} --next-run n.txt", "a reference ends in"),
     "no block": ("crossvalidate run.csv other.csv --arm three_axis --block 0", "--block 0"),

@@ -131,6 +131,11 @@ def held_out_logs(
                     f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
                     "--held-out takes runs that are not fitted"
                 )
-    for log in logs:
+    for k, log in enumerate(logs):
+        for other in logs[:k]:
+            if same_measurement(log, other):
+                raise InputError(
+                    f"{options.held_out[k]}: holds the measurement of {other.name} once more; give each run once"
+                )
         preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

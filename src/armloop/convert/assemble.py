@@ -73,7 +73,8 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     time, keep, starts = _time(recording, mapping, notes)
     if len(keep) < FEWEST_SAMPLES:
         raise LogError(
-            f"{where}: {len(keep)} of {N} {recording.rows}s have a time of their own; a motion log has at least {FEWEST_SAMPLES}"
+            f"{where}: {len(keep)} of {N} {recording.rows}s have a time of their own; a motion log has at least "
+            f"{FEWEST_SAMPLES}"
         )
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
