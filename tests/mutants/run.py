@@ -41,22 +41,15 @@ ROOMS = (
     "regression",
     "identification/uncertainty",
     "laws",
+    "drake",
     "identification/reconstruction",
     "diagnosis",
-    "drake",
 )
-#: Folders of tests that may see it too; not those of whole commands, runs and pages, which take long.
-OTHERS = (
-    "data",
-    "dynamics",
-    "experiment",
-    "export",
-    "features",
-    "identification",
-    "model",
-    "monitoring",
-    "robot",
-)
+#: Tests of other rooms that guard a room's numerics too.
+GUARDS = {
+    "laws": ("dynamics", "model"),
+    "identification/reconstruction": ("identification/goodness", "identification/validation"),
+}
 #: What a trial's process has imported already.
 AT_HAND = (
     "numpy scipy.optimize scipy.signal scipy.stats scipy.linalg sklearn.linear_model sklearn.cluster matplotlib.pyplot "
@@ -79,10 +72,8 @@ def own(room: str) -> list[Traced]:
 
 
 def others(room: str) -> list[Traced]:
-    """Those elsewhere."""
-    inside = f"tests/{room}/"
-    names = sorted({*OTHERS, *(each.split("/")[0] for each in ROOMS)})
-    return [test for name in names for test in _of(name) if not test.name.startswith(inside)]
+    """Those of rooms that guard it too."""
+    return [test for name in GUARDS.get(room, ()) for test in _of(name)]
 
 
 def concerned(mutant: Mutant, tests: list[Traced], most: float) -> list[Traced]:
@@ -210,7 +201,7 @@ class Results:
         file = ROOT / (by or "").split("::")[0]
         if by and file.is_file():
             return digest([file])
-        folders = () if by else (room, *OTHERS)
+        folders = () if by else (room, *GUARDS.get(room, ()))
         return digest([path for name in folders for path in sorted((ROOT / "tests" / name).rglob("*.py"))])
 
     def add(self, key: str, room: str, mutant: Mutant, by: str | None, seconds: float) -> dict[str, Any]:
@@ -247,6 +238,8 @@ def main() -> None:
     options = parser.parse_args()
     begin = time.monotonic()
     drawn = mutants(options.rooms, options.mutants, options.seed)
+    # one room after the other, those first whose tests are quick
+    drawn.sort(key=lambda one: ROOMS.index(one[0]))
     KEPT.mkdir(parents=True, exist_ok=True)
     results = Results(KEPT / "results.jsonl")
     for name in AT_HAND.split():
