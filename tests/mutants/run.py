@@ -57,8 +57,9 @@ AT_HAND = (
 )
 #: Times what its tests take that a mutant may take, and seconds that everything else may.
 PATIENCE, MARGIN = 5.0, 20.0
-#: Seconds of other rooms' tests, the quickest, that a mutant is tried on if its own room's pass.
-ELSEWHERE = 30.0
+#: Seconds of its room's tests, and of those elsewhere, that a mutant is tried on: the quickest that execute its statement.
+#: One that they do not see counts as survived, though a longer test may see it.
+NEAR, ELSEWHERE = 60.0, 30.0
 
 
 @cache
@@ -263,7 +264,7 @@ def main() -> None:
                 kept, tried = file.stat(), 0
                 file.write_text(mutant.mutated(text), encoding="utf-8")
                 try:
-                    for guards, most in ((own, math.inf), (others, ELSEWHERE)):
+                    for guards, most in ((own, NEAR), (others, ELSEWHERE)):
                         if by is None and (chosen := concerned(mutant, guards(room), most)):
                             tried += len(chosen)
                             by = killer(chosen, source)
