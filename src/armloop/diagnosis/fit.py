@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
@@ -143,9 +144,7 @@ def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:
     """
     G = X.T @ X
     scores = X * left[:, None]
-    _, index = np.unique(block, return_inverse=True)
-    sums = np.zeros((index.max(initial=-1) + 1, X.shape[1]))
-    np.add.at(sums, index, scores)
+    sums = np.array([block_sums(score, block) for score in scores.T]).T.reshape(-1, X.shape[1])
     scale = unit_scale(G)
     bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
     blocks = len(sums)

@@ -189,11 +189,11 @@ def _shape_problem(
     width = each[0].shape[-1]
     parts, left, outside, fold = [], [], [], []
     for j in joints:
-        rows = evidence.rows[:, j]
+        rows = evidence.rows[evidence.independent, j]
         columns = np.hstack([(c if c.ndim == 2 else c[:, j])[rows] for c in each])
         parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
         mine = current.stacked.joint == j
         left.append(current.held_out[mine])
         outside.append(current.outside[:, mine])
-        fold.append(evidence.fold[rows])
+        fold.append(evidence.fold[evidence.independent][rows])
     return np.concatenate(parts), np.concatenate(left), np.hstack(outside), np.concatenate(fold)
