@@ -150,7 +150,7 @@ def test_noise_has_no_lead() -> None:
     block = np.repeat(np.arange(34), 60)
     for seed in range(20):
         one, other = np.random.default_rng(seed).normal(size=(2, len(block)))
-        assert lead(left(one, block), left(other, block)) < SIGNIFICANCE + 1
+        assert lead(left(one, block).score, left(other, block).score) < SIGNIFICANCE + 1
 
 
 def test_a_column_of_rounding_errors_does_not_mislead_a_load() -> None:

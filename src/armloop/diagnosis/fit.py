@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
@@ -144,8 +143,10 @@ def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:
     """
     G = X.T @ X
     scores = X * left[:, None]
-    sums = np.array([block_sums(score, block) for score in scores.T]).T.reshape(-1, X.shape[1])
+    blocks, index = np.unique(block, return_inverse=True)
+    sums = np.zeros((len(blocks), X.shape[1]))
+    for k, score in enumerate(scores.T):
+        sums[:, k] = np.bincount(index, weights=score, minlength=len(blocks))
     scale = unit_scale(G)
     bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
-    blocks = len(sums)
-    return np.asarray(bread @ (sums.T @ sums) @ bread) * blocks / max(blocks - 1, 1)
+    return np.asarray(bread @ (sums.T @ sums) @ bread) * len(blocks) / max(len(blocks) - 1, 1)
