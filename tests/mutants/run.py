@@ -243,6 +243,8 @@ def main() -> None:
     drawn.sort(key=lambda one: ROOMS.index(one[0]))
     KEPT.mkdir(parents=True, exist_ok=True)
     results = Results(KEPT / "results.jsonl")
+    # on one core there are no worker processes, whose lines would not be seen
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     for name in AT_HAND.split():
         __import__(name)
     answers: list[dict[str, Any]] = []
