@@ -37,6 +37,8 @@ LOWER, UPPER = np.array([-1.5, -1.0, -3.1]), np.array([1.5, 1.0, 3.1])
 COULOMB, VISCOUS = np.array([0.557, 0.757, 0.585]), np.array([2.65, 1.82, 3.14])
 STATIC, STRIBECK = 1.3 * COULOMB, 0.1
 CREEP, FASTEST, STEEPEST, NOISE = 0.00175, 1.57, 3.1, 0.01
+#: Samples whose torque is drawn at a time.
+ROWS = 4096
 
 
 @cache
@@ -74,7 +76,9 @@ class Drawn:
 def rigid_body(q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> np.ndarray:
     """(N, 3) inverse dynamics of the arm's nominal links."""
     torque = inverse_dynamics(arm(), nominal_parameters(arm()), functions=NUMPY)
-    return np.array(torque(list(q.T), list(v.T), list(vdot.T))).T
+    # Some at a time: the recursion holds a hundred arrays, which would count as memory that a reconstruction needs.
+    parts = ([list(x[k : k + ROWS].T) for x in (q, v, vdot)] for k in range(0, len(q), ROWS))
+    return np.concatenate([np.array(torque(*part)).T for part in parts])
 
 
 def chunks(samples: int) -> list[Drawn]:

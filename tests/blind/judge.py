@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -61,6 +62,31 @@ def _meets(event: dict[str, Any], found: dict[str, Any]) -> bool:
     return bool(at and common >= 0.5 * min(end - start, event["end"] - event["start"]))
 
 
+def is_named(hidden: dict[str, Any], effect: dict[str, Any]) -> bool:
+    """Whether one effect of a verdict is, or has as its alternative, one that was hidden; unlisted, that some law was."""
+    if effect["effect"] == "unlisted":
+        return any(
+            truth["name"] == "unlisted" and truth["joint"] == effect["joint"] for truth in hidden["effects"]
+        )
+    if hidden["kind"] == "event":
+        return _meets(hidden["effects"][0], effect)
+    stands_for = {place(effect), *(place(rival) for rival in effect["alternatives"])}
+    return any(place(truth) in stands_for for truth in hidden["effects"])
+
+
+def reliability(cases: Iterable[Case]) -> str:
+    """Stated probability against how often what was named was there."""
+    stated: dict[float, list[bool]] = {}
+    for hidden, verdict in cases:
+        for effect in verdict["effects"]:
+            if effect.get("probability") is not None:
+                stated.setdefault(effect["probability"], []).append(is_named(hidden, effect))
+    rows: list[list[object]] = [
+        [f"{p:.2f}", len(there), sum(there), f"{np.mean(there):.2f}"] for p, there in sorted(stated.items())
+    ]
+    return table(["stated probability", "named", "there", "part"], rows, "Reliability of what is stated")
+
+
 def deviations(hidden: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[str, float, float]]:
     """(name, relative error, error in standard errors) of the parameters of effects that were named rightly."""
     out = []
@@ -113,6 +139,7 @@ def print_verdicts(cases: dict[str, Case]) -> int:
     print(_by_size(cases))
     print(_by_effect(cases))
     print(_parameters(cases))
+    print(reliability(cases.values()))
     return 0 if met else 1
 
 

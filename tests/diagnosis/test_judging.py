@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,6 +11,7 @@ import pytest
 
 import armloop.diagnosis.account as accounts
 from armloop.data.motion import Motion
+from armloop.diagnosis import unlisted
 from armloop.diagnosis.contacts import _seen_whole
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.fit import Fit
@@ -59,8 +61,13 @@ def test_what_shows_a_little_on_every_joint_adds_up(sizes: tuple[float, float], 
     assert is_worth(evidence, left(before, block, joint), left(after, block, joint)) == worth
 
 
-def accounted(by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch) -> accounts.Account:
-    """The account of a run of which effects leave so much without an event, and 100 beside what each look shows."""
+def accounted(
+    by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch, of_event: float = 0.7
+) -> accounts.Account:
+    """The account of a run of 1000 of which effects leave so much without an event, and 100 beside what each look shows.
+
+    Without it they explain the part ``of_event`` of what it did.
+    """
 
     def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
@@ -70,16 +77,20 @@ def accounted(by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPat
     tau = np.zeros((4, 1))
     samples = SimpleNamespace(tau=tau, motion=None)
     model = SimpleNamespace(with_effects=lambda added: SimpleNamespace(predict=lambda motion: tau))
-    whole: Any = SimpleNamespace(model=model, samples=samples)
+    rows, one = np.ones((4, 1), dtype=bool), np.ones(1)
+    run = np.full((4, 1), np.sqrt(1000 / 4))
+    whole: Any = SimpleNamespace(
+        model=model, samples=samples, rows=rows, scale=one, residual=lambda known: run
+    )
     first, again = looks
     monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
-    monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: 0.7)
+    monkeypatch.setattr(accounts.Account, "explains", lambda self, contacts, residual: of_event)
     monkeypatch.setattr(
         accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
     )
     monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [again])
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
-    monkeypatch.setattr(accounts, "smooth", lambda samples, tau: tau)
+    monkeypatch.setattr(accounts.Account, "remaining", lambda self: tau)
     return accounts.best_account(whole, [first], True, lambda text: None)
 
 
@@ -92,6 +103,15 @@ def test_an_event_gives_way_to_effects_that_leave_less_of_the_whole_run(
     assert len(accounted(by_effects, [event, event], monkeypatch).contacts) == kept
 
 
+@pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (800.0, 1)])
+def test_effects_that_explain_an_event_must_explain_the_rest_of_the_run_as_well(
+    by_effects: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside an event a law was found that explains the run; without it a drag that explains but what the event did."""
+    event = SimpleNamespace(share=0.9)
+    assert len(accounted(by_effects, [event, event], monkeypatch, of_event=0.95).contacts) == kept
+
+
 def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction hid what a push did to a joint; the samples are the same."""
     looks = [SimpleNamespace(share=0.6), SimpleNamespace(share=0.9)]
@@ -102,11 +122,14 @@ def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.
 def test_an_account_leaves_what_is_held_out_and_what_events_do_not_explain() -> None:
     """Two rows held out, 3 and 4 units; of an event's two counted rows of 10 N·m at a scale of 5 a quarter is left."""
     whole: Any = SimpleNamespace(rows=np.array([[True], [True], [True], [False]]))
-    evidence: Any = SimpleNamespace(scale=np.array([5.0]))
+    evidence: Any = SimpleNamespace(scale=np.array([5.0]), rows=np.zeros((4, 1), dtype=bool))
+    evidence.rows[0] = True
     outcome: Any = SimpleNamespace(after=SimpleNamespace(held_out=np.array([3.0, 4.0])))
     event: Any = SimpleNamespace(share=0.75, rows=np.array([False, True, True, True]))
     account = accounts.Account(whole, [event], evidence, outcome, None)
     assert account.left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 0.25 * (4 + 4))
+    # taken back, its samples are nobody's: all that is left there counts
+    assert replace(account, contacts=[]).left(np.full((4, 1), 10.0)) == pytest.approx(9 + 16 + 4 + 4)
 
 
 @pytest.mark.parametrize(
@@ -148,3 +171,48 @@ def test_a_width_beyond_what_was_tried_is_not_resolved() -> None:
     for width, shown in ((1e-5, False), (1e-3, True), (1.0, False)):
         parameters = {"level": Estimate(1.0, 0.1, "N*m"), "width": Estimate(width, 0.0, "rad")}
         assert memory.resolved(parameters, [1e-4, 1e-2]) == shown
+
+
+@pytest.mark.parametrize(
+    ("joints", "law"), [(3, "sin(q1+2*q3)*v2^2"), (4, "sin(3*q4)*v4^2"), (6, "sin(3*q5)*v2*v5")]
+)
+def test_a_law_is_sought_among_waves_of_three_times_an_angle_whatever_the_arm(joints: int, law: str) -> None:
+    assert law in unlisted._library((True,) * joints).names
+
+
+def test_a_law_that_explains_an_event_holds_where_the_event_was() -> None:
+    """Found without the last samples, in which something else was suspected."""
+    q = np.array([[0.0], [1.0], [3.0], [9.0]])
+    motion = Motion(np.arange(4.0), q, -q, 0 * q, np.array([0]))
+    rows = np.array([[True], [True], [True], [False]])
+    whole: Any = SimpleNamespace(rows=rows, samples=SimpleNamespace(motion=motion))
+    ends = {"q_low": [0.0], "q_high": [1.0], "v_low": [-1.0], "v_high": [0.0]}
+    parameters = {key: Estimate(value, [0.0], "rad") for key, value in ends.items()}
+    found = unlisted.Unlisted(1, 1.0, 0.1, "2*v1", 0.1, parameters | {"v1": Estimate(2.0, 0.1, "N*m*s/rad")})
+    wider = {key: e.value for key, e in found.over(whole).parameters.items()}
+    assert wider == {"q_low": [0.0], "q_high": [3.0], "v_low": [-3.0], "v_high": [-0.0], "v1": 2.0}
+
+
+@pytest.mark.parametrize(("without_it", "kept"), [(500.0, True), (20.0, False)])
+def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
+    without_it: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The law leaves 50 of the run; a search among all samples finds something else, which leaves so much."""
+    law = SimpleNamespace(over=lambda whole: "everywhere")
+
+    def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
+        evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
+        outcome: Any = SimpleNamespace()
+        return accounts.Account(whole, contacts, evidence, outcome, law if contacts else None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
+    monkeypatch.setattr(
+        accounts.Account, "left", lambda self, residual: 50.0 if self.unlisted else without_it
+    )
+    monkeypatch.setattr(accounts.Account, "remaining", lambda self: np.zeros((4, 1)))
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [])
+    every: Any = SimpleNamespace(rows=np.ones((4, 1), dtype=bool))
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: every)
+    event: Any = SimpleNamespace(share=0.9)
+    found = accounts.best_account(every, [event], True, lambda text: None)
+    assert (found.unlisted == "everywhere") == kept and not found.contacts  # type: ignore[comparison-overlap]

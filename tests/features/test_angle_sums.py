@@ -80,3 +80,15 @@ def test_terms_survive_the_model_file_and_are_evaluated_alike_one_by_one(tmp_pat
     np.testing.assert_allclose(again.predict(motion), expected, atol=1e-12)
     one_by_one = [model.feedforward(motion.q[k], motion.v[k], motion.vdot[k]) for k in range(20)]
     np.testing.assert_allclose(one_by_one, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("together", [1, 2, None])
+def test_fewer_angles_together_are_a_part_of_all(together):
+    revolute = (True, True, False, True)
+    whole, part = (AngleSums(revolute, 3, 2, "velocity", few) for few in (None, together))
+    mixed = [sum(f"{s}{j}" in name.split("*v")[0] for j in range(1, 5) for s in "q") for name in part.names]
+    assert set(part.names) <= set(whole.names) and max(mixed) == (together or 3)
+    kept = [name for name in whole.names if together is None or name in set(part.names)]
+    assert kept == part.names  # in the same order
+    left_out = set(whole.names) - set(part.names)
+    assert all(sum(f"q{j}" in name for j in range(1, 5)) > (together or 9) for name in left_out)

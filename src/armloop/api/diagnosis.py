@@ -14,7 +14,7 @@ from armloop.data.log import MotionLog
 from armloop.diagnosis import Diagnosis as Found
 from armloop.diagnosis import close
 from armloop.diagnosis import diagnose as run
-from armloop.diagnosis.closing import Closing
+from armloop.diagnosis.compensation import Closing
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.util.files import write_json, write_text

@@ -4,6 +4,7 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,10 @@ class Motion:
 
         Runs whose clock goes on belong to one log; a clock that goes back is another's.
         """
+        return self._elapsed
+
+    @cached_property
+    def _elapsed(self) -> NDArray[np.float64]:
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
         first = np.concatenate([[0], self.starts[1:][steps <= 0]]).astype(np.intp)
         lengths = np.diff(np.append(first, self.samples))

@@ -1,6 +1,6 @@
 """Tracing a residual to the physical effect that a model lacks. Sees a model and logs, nothing else."""
 
-from armloop.diagnosis.closing import Closing, close
+from armloop.diagnosis.compensation import Closing, close
 from armloop.diagnosis.diagnose import Diagnosis, diagnose
 
 __all__ = ["Closing", "Diagnosis", "close", "diagnose"]

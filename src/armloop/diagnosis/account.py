@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import MOST
 from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.laws.effects.found import RANGE
 from armloop.util.progress import Progress
 
 Array = NDArray[np.float64]
@@ -46,13 +48,29 @@ class Account:
         unlisted, outcome = find_law(evidence, outcome, progress)
         return Account(whole, contacts, evidence, outcome, unlisted)
 
+    def remaining(self) -> Array:
+        """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""
+        samples, added = self.whole.samples, self.outcome.added()
+        if self.unlisted is not None:
+            for law in self.unlisted.added():
+                everywhere = {key: e for key, e in law.parameters.items() if key not in RANGE}
+                added.append(replace(law, parameters=everywhere))
+        model = self.whole.model.with_effects(added)
+        return np.asarray(samples.tau - smooth(samples, model.predict(samples.motion)))
+
     def left(self, residual: Array) -> float:
-        """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples."""
+        """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples.
+
+        Samples that nothing was fitted to, and that are no event's, count with the residual.
+        """
         evidence, total = self.evidence, float((self._held_out() ** 2).sum())
         weighted = (residual / evidence.scale) ** 2
+        others = self.whole.rows & ~evidence.rows
         for contact in self.contacts:
-            total += (1 - contact.share) * float(weighted[self.whole.rows & contact.rows[:, None]].sum())
-        return total
+            mine = self.whole.rows & contact.rows[:, None]
+            total += (1 - contact.share) * float(weighted[mine].sum())
+            others &= ~mine
+        return total + float(weighted[others].sum())
 
     def _held_out(self) -> Array:
         """(R,) what effects and law leave of every row, weighted."""
@@ -78,22 +96,31 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
         plain_counts: whether the run moves enough to be judged without contacts, too.
     """
     account = plain = Account.of(whole, contacts, progress)
-    # What the effects leave shows events that they covered, and takes back those that they explain.
-    model, samples = whole.model.with_effects(account.outcome.added()), whole.samples
-    residual = samples.tau - smooth(samples, model.predict(samples.motion))
+    # What effects and law leave shows events that they covered, and takes back those that they explain.
+    residual = account.remaining()
     again = find_contacts(whole, residual)
-    if (without(whole, again).rows != account.evidence.rows).any():
-        account = Account.of(whole, again, progress)
+    looked = replace(account, contacts=again)
+    if (without(whole, again).rows == account.evidence.rows).all():
+        account = looked  # in the same samples, without what the effects do there
     else:
-        account = replace(account, contacts=again)  # in the same samples, without what the effects do there
+        account = Account.of(whole, again, progress)
+        # Beside what only looked like an event, a search may go another way than without it.
+        if not again and looked.left(residual) < account.left(residual):
+            law = looked.unlisted
+            return looked if law is None else replace(looked, unlisted=law.over(whole))
     if not account.contacts or not plain_counts:
         return account
     if contacts:
         plain = Account.of(whole, [], progress)
     enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
     same = account.unlisted and plain.unlisted and account.unlisted.joint == plain.unlisted.joint
-    explained = plain.explains(account.contacts, residual) >= enough
-    if same or explained or plain.left(residual) <= account.left(residual):
+    bare, plain_left, left = (
+        float(((whole.residual([]) / whole.scale)[whole.rows] ** 2).sum()),
+        *(each.left(residual) for each in (plain, account)),
+    )
+    alike = bare - plain_left >= MOST * (bare - left)
+    explained = alike and plain.explains(account.contacts, residual) >= enough
+    if same or explained or plain_left <= left:
         progress("what looked like contacts is explained without them")
         return plain
     return account

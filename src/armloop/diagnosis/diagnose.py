@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armloop.data.log import MotionLog, require_different
 from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
+from armloop.diagnosis import probability
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
@@ -20,7 +21,7 @@ from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.reasons import Standing, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.search import Found, Outcome, Strength, strengths
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects import hypotheses
@@ -45,6 +46,7 @@ class Diagnosis:
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
         reversals: what was found at reversals, if anything.
+        strengths: of each effect found.
         adopted: whether the model has the unlisted law.
         standing: how far the run can be judged: what a reader must know beside the verdict.
     """
@@ -57,6 +59,7 @@ class Diagnosis:
     contacts: list[Contact]
     reversals: AtReversals | None = None
     standing: Standing = field(default_factory=lambda: Standing([], [], False))
+    strengths: list[Strength] = field(default_factory=list)
     adopted: bool = False
 
     def adopt(self) -> Diagnosis:
@@ -127,13 +130,15 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         effects: list[dict[str, Any]] = []
-        for found, added in zip(self.outcome.found, self.outcome.added(), strict=True):
+        every = zip(self.outcome.found, self.outcome.added(), self.strengths, strict=True)
+        for found, added, strength in every:
             effects.append(
                 {
                     **added.to_dict(),
                     "share": found.share,
                     "when": "changed",
-                    "probability": None,  # nothing has calibrated one
+                    "probability": probability.of_effect(found.share),
+                    "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
@@ -156,7 +161,7 @@ class Diagnosis:
                 **contact.added.to_dict(),
                 "share": contact.share,
                 "when": "event",
-                "probability": None,
+                "probability": probability.EVENT.probability,
                 "words": contact.added.effect.sentence(contact.added.parameters),
                 "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
                 "alternatives": [
@@ -175,7 +180,7 @@ class Diagnosis:
             where = whereabouts(self.evidence, self.outcome.after, self.unlisted.joint - 1)
             entry = {
                 "when": "changed",
-                "probability": None,
+                "probability": probability.UNLISTED.probability,
                 "where": where.to_dict(),
                 "adopted": self.adopted,
             }
@@ -272,7 +277,16 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
     verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]
     augmented = model.with_effects(added)
-    found = Diagnosis(verdict, outcome, augmented, unlisted, evidence, contacts, turned)
+    found = Diagnosis(
+        verdict,
+        outcome,
+        augmented,
+        unlisted,
+        evidence,
+        contacts,
+        turned,
+        strengths=strengths(evidence, outcome),
+    )
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
     stand = standing(evidence, augmented, found.errors()["after"], known)

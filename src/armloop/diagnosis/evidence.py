@@ -34,7 +34,17 @@ FEWEST_BLOCKS = 8
 #: Columns of a run are kept up to so many bytes.
 _KEPT = 1 << 28
 
-_Columns = dict[tuple[tuple[str, int | None, int | None], float], Array]
+
+class _Columns(dict[tuple[tuple[str, int | None, int | None], float], Array]):
+    """Columns by the effect's place and shape, as many as there is room for."""
+
+    size = 0
+
+    def keep(self, key: tuple[tuple[str, int | None, int | None], float], columns: Array) -> None:
+        """Keep columns while there is room."""
+        if self.size < _KEPT:
+            self[key] = columns
+            self.size += columns.nbytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +69,8 @@ class Evidence:
     blocks: NDArray[np.intp]
     context: Context
     asked: tuple[Effect, ...] = ()
-    _of_motion: _Columns = field(default_factory=dict, repr=False)
-    _of_model: _Columns = field(default_factory=dict, repr=False)
+    _of_motion: _Columns = field(default_factory=_Columns, repr=False)
+    _of_model: _Columns = field(default_factory=_Columns, repr=False)
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, effects: list[Effect]) -> Evidence:
@@ -86,7 +96,7 @@ class Evidence:
         model = self.model.with_effects(known)
         every = [*(added.effect for added in known), *self.asked]
         context = model.context(self.samples.motion, every)
-        return replace(self, context=replace(context, period=self.context.period), _of_model={})
+        return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -122,8 +132,7 @@ class Evidence:
         if key in cache:
             return cache[key]
         columns = smooth(self.samples, effect.columns(self.context, shape))
-        if sum(kept.nbytes for kept in cache.values()) < _KEPT:
-            cache[key] = columns
+        cache.keep(key, columns)
         return columns
 
     def columns(self, effect: Effect, shape: float) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_erosion, uniform_filter1d
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
@@ -40,7 +40,7 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     """
     samples, model = evidence.samples, evidence.model
     motion = samples.motion
-    rest = ~samples.moving | (np.abs(motion.v) < CREEP)
+    rest = at_rest(samples)
     # Where sliding takes more than the model says, so does sticking.
     sliding_more = [
         float(np.median((np.sign(motion.v[:, j]) * residual[:, j])[evidence.rows[:, j]]))
@@ -49,15 +49,30 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
         for j in range(motion.joints)
     ]
     dry = dry_level(evidence) + np.abs(sliding_more)
-    # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
-    bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
-    held = np.minimum(np.abs(residual) - dry, np.abs(bare) - _STICTION * dry)
     ranges = model.history.get("range")
     slow = _SLOW * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
-    sliding = np.abs(residual) - _UNSURE * dry * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
-    size = np.maximum(np.where(rest, held, sliding), 0.0)
+    creeping = _UNSURE * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
+    # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
+    unsure = np.maximum(smooth(samples, dry * np.where(rest, 1.0, creeping)), 0.0)
+    # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
+    bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
+    size = np.abs(residual) - unsure
+    size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - _STICTION * unsure), size), 0.0)
     sign = np.sign(np.where(rest, bare, residual))
     return sign * size / deviations(evidence, residual), rest
+
+
+def at_rest(samples: Samples) -> NDArray[np.bool_]:
+    """(N, n) whether a joint stands still; around a standstill the filter has smeared only its torque."""
+    rest = ~samples.moving
+    reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
+    if reach:
+        still = [
+            binary_erosion(rest[run], np.ones((2 * reach + 1, 1)), border_value=1)
+            for run in samples.motion.runs()
+        ]
+        rest = np.concatenate(still)
+    return np.asarray(rest | (np.abs(samples.motion.v) < CREEP))
 
 
 def averaged(samples: Samples, values: Array) -> Array:

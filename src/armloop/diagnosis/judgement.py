@@ -33,8 +33,15 @@ def is_worth(evidence: Evidence, current: Fit, trial: Fit) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
-    # What a load or a delay changes shows a little on every joint: the joints' parts add up.
-    return float((by_joint(current, trial) / enough(evidence, current)).sum()) > 1.0
+    return times_enough(evidence, current, trial) > 1.0
+
+
+def times_enough(evidence: Evidence, current: Fit, trial: Fit) -> float:
+    """How many times more than the model's own shortcomings a trial removes.
+
+    What a load or a delay changes shows a little on every joint: the joints' parts add up.
+    """
+    return float((by_joint(current, trial) / enough(evidence, current)).sum())
 
 
 def enough(evidence: Evidence, fit: Fit) -> Array:
@@ -86,7 +93,7 @@ def _likelier(worse: Fit, better: Fit) -> float:
     blocks, hard, is no chance, though neither the sum's spread nor the number of blocks that agree says so.
     """
     joints = worse.stacked.joints
-    seen = np.unique(np.column_stack([worse.stacked.joint, worse.stacked.block]), axis=0)[:, 0]
+    seen = np.flatnonzero(np.bincount(worse.stacked.joint + joints * worse.stacked.block)) % joints
     rows = np.maximum(rows_per_joint(worse), 1)
     ratio = np.log((energy_by_joint(worse) + rows) / (energy_by_joint(better) + rows))
     log_likelihood = 0.5 * float((np.bincount(seen, minlength=joints) * ratio).sum())

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from armloop.diagnosis.apart import Stage
+from armloop.diagnosis.confounded import Law, found_laws, lookalikes, pairs
 from armloop.diagnosis.diagnose import Diagnosis
+from armloop.diagnosis.isolability import Stage
 from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_ranges
-from armloop.diagnosis.rivals import Law, found_laws, lookalikes, pairs
 from armloop.experiment.design import sampled
 from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import Effect

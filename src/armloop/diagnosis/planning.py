@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.diagnosis.apart import Stage, context_of
+from armloop.diagnosis.confounded import Law, Rivalry
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.rivals import Law, Rivalry
+from armloop.diagnosis.isolability import Stage, context_of
 from armloop.experiment.design import (
     CRITERIA,
     Columns,

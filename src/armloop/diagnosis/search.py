@@ -19,8 +19,10 @@ from armloop.diagnosis.judgement import (
     gain,
     is_behind,
     is_worth,
+    lead,
     rows_per_joint,
     simplest_of_equals,
+    times_enough,
 )
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
@@ -51,6 +53,23 @@ class Found:
     shape: Shape
     share: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Strength:
+    """How far an effect stands above what would not be named.
+
+    Attributes:
+        times: how many times more of the held-out error it removes than the model's own shortcomings are.
+        errors: by how many standard errors over blocks the held-out error falls.
+    """
+
+    times: float
+    errors: float
+
+    def to_dict(self) -> dict[str, float]:
+        """JSON-ready values."""
+        return {"times_baseline": self.times, "standard_errors": self.errors}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +104,7 @@ def search(evidence: Evidence, progress: Progress) -> Outcome:
         found.append(best)
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of what can be explained")
         found = _exchanged(evidence, found, listed, explainable, progress)
-        found = _at_one_blow(evidence, nothing, found, explainable, progress)
+        found = _one_for_several(evidence, nothing, found, explainable, progress)
         known = _known(evidence, found)
         # What is added may be taken back by an exchange: the same effects a second time are the end of it.
         places = frozenset(f.effect.place for f in found)
@@ -149,7 +168,7 @@ def _exchanged(
     return found
 
 
-def _at_one_blow(
+def _one_for_several(
     evidence: Evidence, nothing: Known, found: list[Found], explainable: Array, progress: Progress
 ) -> list[Found]:
     """One effect of the whole arm where it does all that several did: a load shows on every joint."""
@@ -162,6 +181,15 @@ def _at_one_blow(
             progress(f"{effect.label()} explains alone what {len(found)} effects did")
             share = min(gain(nothing.fit, trial) / explainable.sum(), 1.0)
             return [Found(effect, trial.shapes[-1], share)]
+    return found
+
+
+def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
+    """How each effect found stands out beside the others."""
+    found = []
+    for k in range(len(outcome.found)):
+        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit
+        found.append(Strength(times_enough(evidence, others, outcome.after), lead(others, outcome.after)))
     return found
 
 

@@ -6,7 +6,7 @@ and directions, and reported only if both halves of the run choose it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -21,6 +21,7 @@ from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Estimate, FoundLaw, found_law
+from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
@@ -42,6 +43,7 @@ FAR_LESS = 0.5
 _FEWEST = 50
 _MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
+_RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,18 @@ class Unlisted:
     def added(self) -> list[AddedEffect]:
         """The law as an effect that a model can have; none where there is no law."""
         return [AddedEffect(FoundLaw(self.joint), self.parameters)] if self.parameters else []
+
+    def over(self, evidence: Evidence) -> Unlisted:
+        """The same law with the range of these samples, in which it was found to hold as well."""
+        rows, motion = evidence.rows[:, self.joint - 1], evidence.samples.motion
+        ends = {"low": np.min, "high": np.max}
+        wider = {
+            key: replace(e, value=ends[key[2:]](getattr(motion, key[0])[rows], axis=0).tolist())
+            if key in RANGE
+            else e
+            for key, e in self.parameters.items()
+        }
+        return replace(self, parameters=wider)
 
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``diagnosis.json``."""
@@ -192,9 +206,11 @@ class _Law:
 
 @lru_cache(maxsize=8)
 def _library(revolute: tuple[bool, ...]) -> AngleSums:
-    """The largest library that is searched for an arm's joints, with what it has found of itself."""
-    libraries = [AngleSums(revolute, N1, 2, "velocity") for N1 in (3, 2, 1)]
-    return next((each for each in libraries if each.size <= _MOST_CANDIDATES), libraries[-1])
+    """The richest library that is not too large: with many joints, waves of fewer of their angles together."""
+    libraries = (AngleSums(revolute, N1, 2, "velocity", few) for N1, few in _RICHEST_FIRST)
+    return next(
+        (each for each in libraries if each.size <= _MOST_CANDIDATES), AngleSums(revolute, 1, 2, "velocity")
+    )
 
 
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations_with_replacement, product
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,22 +30,29 @@ class AngleSums(Candidates):
         revolute: which joints turn.
         N1, N2: truncation orders; N1 bounds |k|₁ plus the powers of prismatic coordinates.
         second: a key of :data:`~armloop.features.double_feature_set.SECOND_SETS`.
+        together: so many joints at most have their angles (powers) in one candidate's first factor; None for any number.
     """
 
     revolute: tuple[bool, ...]
     N1: int
     N2: int
     second: str
+    together: int | None = None
 
     @cached_property
     def _degrees(self) -> list[tuple[int, ...]]:
         """Wave numbers of revolute and powers of prismatic joints; of a wave and its negative only one."""
-        ranges = [range(-self.N1 if turns else 0, self.N1 + 1) for turns in self.revolute]
-        found = []
-        for degrees in product(*ranges):
-            wave = [k for k, turns in zip(degrees, self.revolute, strict=True) if turns and k]
-            if sum(map(abs, degrees)) <= self.N1 and (not wave or wave[0] > 0):
-                found.append(degrees)
+        found: list[tuple[int, ...]] = [()]
+        for j, turns in enumerate(self.revolute):
+            extended = []
+            for degrees in found:
+                left = self.N1 - sum(map(abs, degrees))
+                if self.together is not None and sum(map(bool, degrees)) >= self.together:
+                    left = 0
+                first = not any(k for k, turned in zip(degrees, self.revolute[:j], strict=True) if turned)
+                least = -left if turns and not first else 0
+                extended += [(*degrees, k) for k in range(least, left + 1)]
+            found = extended
         return sorted(found, key=lambda d: (sum(map(abs, d)), [-k for k in d]))
 
     def _wave(self, degrees: tuple[int, ...]) -> tuple[int, ...]:

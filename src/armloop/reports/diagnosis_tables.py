@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armloop.diagnosis import probability
 from armloop.laws.effects.found import RANGE
 from armloop.reports.findings import blame, findings, nothing_to_supply, reasons, rivals
 from armloop.reports.tables import Table, make_table
@@ -26,19 +27,23 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
         for k, (key, e) in enumerate(added.parameters.items()):
             first = [effect_label(found.effect), "sensor" if found.effect.sensor else "arm"]
             label, where = first if k == 0 else ["", ""]
-            share = percent(found.share) if k == 0 else ""
-            rows.append(
-                [label, key.replace("_", " "), with_error(e.value, e.std_error), unit(e.unit), share, where]
+            share, likely = (
+                (percent(found.share), percent(probability.of_effect(found.share))) if k == 0 else ("", "")
             )
+            value = with_error(e.value, e.std_error)
+            rows.append([label, key.replace("_", " "), value, unit(e.unit), share, likely, where])
     if diagnosis.unlisted is not None:
         label = f"unlisted, joint {diagnosis.unlisted.joint}"
         terms = [(k, e) for k, e in diagnosis.unlisted.parameters.items() if k not in RANGE]
         for k, (key, e) in enumerate(terms):
-            rows.append(["" if k else label, key, with_error(e.value, e.std_error), unit(e.unit), "", ""])
+            likely = "" if k else percent(probability.UNLISTED.probability)
+            rows.append(
+                ["" if k else label, key, with_error(e.value, e.std_error), unit(e.unit), "", likely, ""]
+            )
         if not terms:
-            rows.append([label, "law", MISSING, "", "", ""])
-    headers = ["effect", "parameter", "value ± std. error", "unit", "share", "where"]
-    return make_table(headers, rows, title, left=(0, 1, 3, 5))
+            rows.append([label, "law", MISSING, "", "", percent(probability.UNLISTED.probability), ""])
+    headers = ["effect", "parameter", "value ± std. error", "unit", "share", "probability", "where"]
+    return make_table(headers, rows, title, left=(0, 1, 3, 6))
 
 
 def events_table(diagnosis: Diagnosis, title: str | None = "Events") -> Table:

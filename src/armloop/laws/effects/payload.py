@@ -9,6 +9,8 @@ import numpy as np
 from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import regressor
+from armloop.robot.newton_euler import inverse_dynamics
+from armloop.util.functions import NUMPY
 
 _FOUR = np.eye(4)
 _TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -68,7 +70,10 @@ class Payload(Effect):
         return Body(np.concatenate([np.zeros(10 * (arm.n - 1)), link_parameters(arm, parameters)]))
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        return self.columns(context, 0.0) @ link_parameters(context.arm, parameters)
+        arm, motion = context.arm, context.motion
+        alone = inverse_dynamics(arm, self.body(arm, parameters, None).parameters, functions=NUMPY)
+        tau = alone(list(motion.q.T), list(motion.v.T), list(motion.vdot.T))
+        return np.stack([np.broadcast_to(x, motion.samples) for x in tau], axis=1)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
         mass = max(float(x[0]), 1e-3)
