@@ -47,6 +47,7 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
     assert those("needs_model") == of_model
     order = sorted(those("sensor"), key=lambda name: EFFECTS[name].fault_order)
     assert order == ["encoder_offset", "torque_gain", "torque_offset", "time_delay"]
+    assert len({EFFECTS[name].fault_order for name in order}) == 4
     # what a reconstruction finds with the velocity, and with the direction alone
     steps = {
         e.step
@@ -166,3 +167,34 @@ def test_the_unit_of_a_law_found_is_that_of_its_torque_by_its_function(
     assert [found[key].unit for key in RANGE] == ["rad or m", "rad or m", "rad or m/s", "rad or m/s"]
     turning = replace(arm, joints=(arm.joints[0],) * n)
     assert found_law(turning, 1, {}, low, high)[RANGE[2]].unit == "rad/s"
+
+
+#: A drift is over for a controller, and what grows with the load is the model's to say.
+RUBBING = {n for n, kind in EFFECTS.items() if kind.rubs} - {"friction_drift", "load_dependent_friction"}
+
+
+@pytest.mark.parametrize("name", sorted(RUBBING))
+def test_a_joint_at_rest_is_supplied_no_friction_and_either_way_as_much(name: str) -> None:
+    n = an_arm().n
+    own = {p.name: 0.4 if p.default is None else p.default for p in EFFECTS[name].parameters}
+    law = effect(name, 2).pointwise(an_arm(), own, None)
+
+    def at(v: float) -> float:
+        return float(law(np.full(n, 0.3), v * np.eye(n)[1], np.zeros(n))[1])
+
+    assert at(0.0) == 0.0
+    odd = 1.0 if name in ("friction_asymmetry", "viscous_asymmetry") else -1.0
+    for v in (1e-3, 0.5):
+        assert at(v) != 0.0 and at(-v) == pytest.approx(odd * at(v))
+
+
+@pytest.mark.parametrize("link", [0, 2])
+def test_a_push_is_its_columns_times_its_force(link: int) -> None:
+    rng = np.random.default_rng(0)
+    given = context(1.0)
+    given.motion.q[:] = rng.uniform(-2, 2, given.motion.q.shape)
+    push, force = effect("external_contact", None), [5.0, -3.0, 8.0]
+    told = {"start": 0.0, "end": 1.0, "force": force} | ({"link": float(link)} if link else {})
+    torque = push.torque(given, told)
+    np.testing.assert_allclose(push.columns(given, float(link)) @ force, torque, atol=1e-12)
+    assert torque[:, 0].any() and torque[:, 2].any() == (link == 0)
