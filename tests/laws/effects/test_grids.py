@@ -9,9 +9,10 @@ import pytest
 from effect_arm import an_arm
 
 from armloop.data.motion import Motion
-from armloop.laws.effects import EFFECTS, Context, Estimate, effect
+from armloop.laws.effects import EFFECTS, Context, Estimate, effect, hypotheses
 from armloop.laws.effects.found import RANGE, found_law
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters
 
 #: Numbers a run decides about: by these the simplest of equals is named. A payload's inertia follows its mass and centre
 #: but for one number; presliding friction brings the change of its level.
@@ -198,3 +199,56 @@ def test_a_push_is_its_columns_times_its_force(link: int) -> None:
     torque = push.torque(given, told)
     np.testing.assert_allclose(push.columns(given, float(link)) @ force, torque, atol=1e-12)
     assert torque[:, 0].any() and torque[:, 2].any() == (link == 0)
+
+
+def test_every_place_is_asked_once() -> None:
+    asked = [h.place for h in hypotheses(an_arm())]
+    n = an_arm().n
+    for name, kind in EFFECTS.items():
+        joints = range(1, n + 1)
+        places: list[tuple[int | None, int | None]] = [(None, None)]
+        if kind.joint_wise:
+            places = [(j, None) for j in joints]
+        if kind.pair_wise:
+            places = [(j, k) for j in joints for k in joints if j < k]
+        expected = [(name, *place) for place in places] if kind.searched else []
+        assert [place for place in asked if place[0] == name] == expected
+
+
+def test_a_loads_centre_is_within_reach_of_the_flange() -> None:
+    arm = an_arm()
+    chain = np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum()
+
+    def farthest(own: Arm) -> float:
+        def possible(distance: float) -> bool:
+            told = {
+                "mass": Estimate(1.0, 0.0, "kg"),
+                "com": Estimate([0.0, -0.6 * distance, 0.8 * distance], [0.0] * 3, "m"),
+            }
+            return effect("payload", None).plausible(own, told)
+
+        return max(x for x in np.arange(0.005, 5.0, 0.01) if possible(x))
+
+    stub, long = arm.com.copy(), arm.com.copy()
+    stub[-1], long[-1] = 0.0, [0.0, 0.0, 1.2]
+    frames = arm.X_PF.copy()
+    frames[:, :3, 3] *= 0.1 / chain
+    assert farthest(replace(arm, com=stub)) == pytest.approx(0.5 * chain, abs=0.011)
+    assert farthest(replace(arm, com=long)) == pytest.approx(3.0, abs=0.011)
+    assert farthest(replace(arm, com=stub, X_PF=frames)) == pytest.approx(0.15, abs=0.011)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tilts_torque_is_its_columns_times_what_the_angles_make_of_gravity(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    given = context(0.2)
+    given.motion.q[:] = rng.uniform(-2, 2, given.motion.q.shape)
+    # gravity along all three axes: a base that hangs on a wall
+    arm = replace(an_arm(), gravity=np.array([3.0, -5.0, -8.0]))
+    given = replace(given, arm=arm, inertial=nominal_parameters(arm))
+    tilt, angles = effect("gravity_tilt", None), rng.uniform(-0.5, 0.5, 2)
+    beta, J = tilt.embed(angles)
+    torque = tilt.torque(given, {"roll": float(angles[0]), "pitch": float(angles[1])})
+    np.testing.assert_allclose(tilt.columns(given, 0.0) @ beta, torque, atol=1e-9)
+    slopes = [(tilt.embed(angles + h)[0] - tilt.embed(angles - h)[0]) / 2e-6 for h in 1e-6 * np.eye(2)]
+    np.testing.assert_allclose(J.T, slopes, atol=1e-8)
