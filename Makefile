@@ -95,7 +95,7 @@ wheel: setup
 bench: setup $(TESTING)
 	@set -e; for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python $$file; done
 
-# How many of the changes of one place in the numerics the quick tests see (hours; it goes on where it was ended).
+# How many of the changes of one place in the numerics the quick tests see (an hour; it goes on where it was ended).
 mutants: setup $(TESTING)
 	$(BIN)/python tests/mutants/run.py --mutants 200
 

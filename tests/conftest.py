@@ -23,6 +23,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (first.get(item.path, len(first)), item.path not in long))
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _no_teams() -> None:
+    """A diagnosis tries its hypotheses in the test's own process: every core has one already."""
+    from armloop.util import workers
+
+    workers._TEAM = 1
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The root of the checkout."""

@@ -40,7 +40,7 @@ def test_many_files_make_one_model(
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
-        (("--jobs", "0"), "--jobs 0: give a number of processes of at least 1"),
+        (("--jobs", "0"), "--jobs: '0' is no number of processes; give 1 to 1024"),
         (("--scheduler", "tcp://127.0.0.1:9"), "no Dask scheduler answers there"),
     ],
 )

@@ -179,6 +179,16 @@ def test_no_run_long_enough_is_an_error_that_says_how_long_it_must_be():
         preprocess([sines(time)], TEN_HZ)
 
 
+def test_a_sample_alone_between_gaps_is_a_run_too_short():
+    whole = sines(np.arange(0, 3, 0.004))
+    alone = preprocess([replace(whole, time=np.r_[-5.0, whole.time[1:]])], TEN_HZ)
+    np.testing.assert_array_equal(
+        alone.motion.time, preprocess([whole.select(slice(1, None))], TEN_HZ).motion.time
+    )
+    with pytest.raises(LogError, match="the longest run without a gap lasts 0 s"):
+        preprocess([whole.select(slice(0, 1))], TEN_HZ)
+
+
 def test_without_a_filter_samples_stay_and_accelerations_are_needed():
     log = sines(np.arange(0, 3, 0.004))
     with pytest.raises(LogError, match=r"sines: .* vdot1\.\.vdot2"):

@@ -9,7 +9,7 @@ from armloop.diagnosis import diagnose
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Shape, fit
 from armloop.diagnosis.search import search
-from armloop.diagnosis.trials import Known
+from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects import effect, hypotheses
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
@@ -134,5 +134,32 @@ def test_the_search_ends_where_what_is_added_is_taken_back(monkeypatch):
         return []
 
     assert search(evidence, silent).found
-    monkeypatch.setattr("armloop.diagnosis.search._exchanged", taken_back)
+    monkeypatch.setattr("armloop.diagnosis.search._Search._exchanged", taken_back)
     assert search(evidence, silent).found == []
+
+
+def test_a_search_dealt_over_processes_finds_the_same_to_the_bit(monkeypatch):
+    """Of a part of the run, as events leave it: every process fits what is known for itself."""
+    model = exact("three_axis")
+    motion = fourier_motion(20.0, 100.0, 3)
+    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + 2 * motion.v + [0.0, 0.0, 5.0] * motion.q
+    samples = preprocess([measured(motion, tau, 3)], model.conditioning)
+    few = [
+        effect(name, joint)
+        for name in ("viscous_friction", "coulomb_friction", "joint_spring")
+        for joint in (1, 2, 3)
+    ]
+    monkeypatch.setattr("armloop.diagnosis.trials.hypotheses", lambda arm: few)
+    whole = Evidence.of(model, samples, hypotheses(model.arm))
+    part = whole.only(whole.rows & (whole.blocks != 3)[:, None])
+    outcomes = []
+    for jobs in (1, 3):
+        with Hypotheses(whole, jobs) as panel:
+            outcomes.append(search(part, silent, panel))
+    one, three = outcomes
+    assert len(one.found) > 1
+    assert [(f.effect, f.shape, f.share, f.rivals) for f in one.found] == [
+        (f.effect, f.shape, f.share, f.rivals) for f in three.found
+    ]
+    assert one.after.parameters == three.after.parameters
+    np.testing.assert_array_equal(one.after.held_out, three.after.held_out)

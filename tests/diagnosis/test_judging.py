@@ -35,7 +35,7 @@ def test_a_gain_that_lies_in_few_blocks_is_no_chance() -> None:
     block = np.repeat(np.arange(34), 60)
     noise = rng.normal(size=len(block))
     fades = 30.0 * np.exp(-block / 5.0)
-    assert lead(left(noise + fades, block), left(noise, block)) > SIGNIFICANCE
+    assert lead(left(noise + fades, block).score, left(noise, block).score) > SIGNIFICANCE
 
 
 def test_a_law_that_bites_in_one_block_of_many_is_no_chance() -> None:
@@ -44,8 +44,8 @@ def test_a_law_that_bites_in_one_block_of_many_is_no_chance() -> None:
     block = np.repeat(np.arange(20), 60)
     before, after = rng.normal(size=(2, len(block)))
     before[block == 7] *= 9.0
-    worse, better = left(before, block), left(after, block)
-    spread = lead_of(worse.block_errors(), better.block_errors(), worse.block_rows())
+    worse, better = left(before, block).score, left(after, block).score
+    spread = lead_of(worse.block_errors, better.block_errors, worse.block_rows)
     assert spread < SIGNIFICANCE < lead(worse, better)
 
 
@@ -58,7 +58,7 @@ def test_what_shows_a_little_on_every_joint_adds_up(sizes: tuple[float, float], 
     after /= np.sqrt(np.mean(after.reshape(2, -1) ** 2, axis=1))[joint]
     before = after * np.sqrt(1 + 2.0 * np.array(sizes))[joint]
     evidence = cast(Evidence, SimpleNamespace(variation=np.array([2.0, 2.0])))
-    assert is_worth(evidence, left(before, block, joint), left(after, block, joint)) == worth
+    assert is_worth(evidence, left(before, block, joint).score, left(after, block, joint).score) == worth
 
 
 def accounted(
@@ -69,7 +69,7 @@ def accounted(
     Without it they explain the part ``of_event`` of what it did.
     """
 
-    def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
+    def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
         outcome: Any = SimpleNamespace(added=list)
         return accounts.Account(whole, contacts, evidence, outcome, None)
@@ -150,7 +150,7 @@ def test_noise_has_no_lead() -> None:
     block = np.repeat(np.arange(34), 60)
     for seed in range(20):
         one, other = np.random.default_rng(seed).normal(size=(2, len(block)))
-        assert lead(left(one, block), left(other, block)) < SIGNIFICANCE + 1
+        assert lead(left(one, block).score, left(other, block).score) < SIGNIFICANCE + 1
 
 
 def test_a_column_of_rounding_errors_does_not_mislead_a_load() -> None:
@@ -200,7 +200,7 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
     """The law leaves 50 of the run; a search among all samples finds something else, which leaves so much."""
     law = SimpleNamespace(over=lambda whole: "everywhere")
 
-    def of(whole: Any, contacts: list[Any], progress: object) -> accounts.Account:
+    def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
         outcome: Any = SimpleNamespace()
         return accounts.Account(whole, contacts, evidence, outcome, law if contacts else None)  # type: ignore[arg-type]

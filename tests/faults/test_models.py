@@ -36,6 +36,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("schema",), ["armloop/model/3", "armloop/loop/1", 1, None, [], ...], "schema is"),
     (("arm",), [None, [], 3, "three_axis"], r"arm is .*a mapping of fields"),
     (("arm", "name"), [None, 3, "x" * 1000], r"arm\.name"),
+    (("arm", "joints", 1, "name"), [None, "", " ", "joint_1"], r"arm\.joints\[2\]\.name"),
     (("arm", "joints"), [None, [], {}, "3", ...], r"joints"),
     (("arm", "joints", 0, "kind"), ["ball", None, 1, ""], r"arm\.joints\[1\]\.kind is .*there are|text"),
     (("arm", "joints", 0, "lower"), ["low", None, 1e300, 5.0, []], r"joints\[1\]\.lower|lower below upper"),
@@ -120,6 +121,21 @@ SENSORS: dict[str, tuple[str, int | None, dict[str, float]]] = {
 }
 
 
+RANGE = {
+    key: [-1.0] * 3 if key.endswith("low") else [1.0] * 3 for key in ("q_low", "q_high", "v_low", "v_high")
+}
+ADOPTED: dict[str, tuple[dict[str, Any], str]] = {
+    "no term": (RANGE, "has no term"),
+    "no wave": ({**RANGE, "tan(q1)": 1.0}, "unknown term 'tan\\(q1\\)'"),
+    "no power": ({**RANGE, "cos(q1)^0": 1.0}, "a power is at least 1"),
+    "joint 0": ({**RANGE, "q0*v1": 1.0}, "joints are counted from 1"),
+    "another arm's joint": ({**RANGE, "cos(q1-q9)": 1.0}, "a joint that its range does not know"),
+    "a range turned round": ({**RANGE, "v_low": [2.0] * 3, "v1": 1.0}, "a v_low above its v_high"),
+    "half a range": ({"q_low": [0.0] * 3, "v1": 1.0}, "needs q_low, q_high, v_low, v_high"),
+    "a range of two joints": ({**RANGE, "q_high": [1.0] * 2, "v1": 1.0}, "needs q_low, q_high"),
+}
+
+
 def cases() -> Iterator[tuple[str, Callable[[Any], None], str]]:
     for keys, values, said in ROWS:
         for value in values:
@@ -131,6 +147,13 @@ def cases() -> Iterator[tuple[str, Callable[[Any], None], str]]:
         parameters = {key: {"value": x, "std_error": 0.1, "unit": "1"} for key, x in values.items()}
         added = {"effect": effect, "joint": joint, "parameters": parameters}
         yield name, lambda data, a=added: data["effects"].append(a), f"{effect}.*cannot be"
+    for name, (values, said) in ADOPTED.items():
+        parameters = {
+            key: {"value": x, "std_error": [0.0] * len(x) if isinstance(x, list) else 0.1, "unit": "1"}
+            for key, x in values.items()
+        }
+        added = {"effect": "unlisted", "joint": 2, "parameters": parameters}
+        yield f"adopted: {name}", lambda data, a=added: data["effects"].append(a), said
 
 
 CASES = {name: (change, said) for name, change, said in cases()}

@@ -339,3 +339,14 @@ def test_a_models_file_says_who_wrote_it_and_can_be_read(place: Path) -> None:
         model.save(place / "again.json")
     assert json.loads((place / "again.json").read_text())["written_by"] == "armloop diagnose"
     assert load_model(place / "again.json").to_dict() == model.to_dict()
+
+
+def test_a_drake_program_that_does_not_run_is_not_written(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("armloop.export.drake_bundle._PROGRAM", "raise RuntimeError({step}, {smoothing})")
+    before = contents(place)
+    assert main(["export", "model.json", "--to", "drake", "--out", "bundle"]) == 2
+    assert re.fullmatch(r"armloop: bundle: the program does not run in Drake: .*\n", capsys.readouterr().err)
+    left = {path: content for path, content in contents(place).items() if not path.endswith(".armloop")}
+    assert left == before

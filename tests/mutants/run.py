@@ -2,249 +2,230 @@
 
     python tests/mutants/run.py --rooms regression laws --mutants 40 --seed 1
 
-A mutant is one comparison, operator, number, sign or choice put otherwise, in a copy of the package. It is dead if the
-room's quick tests fail or take too long. Results are kept in ``out/mutants.jsonl`` by the content of the file that was
-changed and of its tests, so that a run that was ended goes on where it was.
+A mutant is one comparison, operator, number, sign or choice put otherwise, in a copy of the package. It is tried on those
+of its room's quick tests that execute its statement, in a fork of a process that has numpy and Drake at hand; it is dead
+if one fails or takes five times as long as without it. Results are kept in ``out/mutants/`` by the content of the file that
+was changed and of the tests that decided, so that a run that was ended goes on where it was; what is done until then is
+a random sample too.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
+import bisect
 import hashlib
+import itertools
 import json
+import math
 import os
-import random
+import re
+import resource
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import defaultdict
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGE = Path("src/armloop")
-#: Rooms whose numerics are changed, and the tests that must see it.
-ROOMS = {
-    "regression": ["tests/regression"],
-    "identification/uncertainty": ["tests/identification/uncertainty"],
-    "laws": ["tests/laws"],
-    "identification/reconstruction": ["tests/identification/reconstruction"],
-    "diagnosis": ["tests/diagnosis"],
-    "drake": ["tests/drake"],
+os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+sys.dont_write_bytecode = True
+
+import pytest  # noqa: E402
+from places import PACKAGE, ROOT, Mutant, mutants  # noqa: E402
+from trace_lines import ARGUMENTS, KEPT, Traced, ends_with_parent, traced  # noqa: E402
+
+#: Rooms whose numerics are changed; the tests that must see it lie in the folder of the same name.
+ROOMS = (
+    "regression",
+    "identification/uncertainty",
+    "laws",
+    "drake",
+    "identification/reconstruction",
+    "diagnosis",
+)
+#: Tests of other rooms that guard a room's numerics too.
+GUARDS = {
+    "laws": ("dynamics", "model"),
+    "identification/reconstruction": ("identification/goodness", "identification/validation"),
 }
-_COMPARE = {
-    ast.Lt: "<=",
-    ast.LtE: "<",
-    ast.Gt: ">=",
-    ast.GtE: ">",
-    ast.Eq: "!=",
-    ast.NotEq: "==",
-    ast.In: "not in",
-    ast.NotIn: "in",
-    ast.Is: "is not",
-    ast.IsNot: "is",
-}
-_BINARY = {
-    ast.Add: "-",
-    ast.Sub: "+",
-    ast.Mult: "/",
-    ast.Div: "*",
-    ast.Pow: "*",
-    ast.MatMult: "*",
-    ast.BitAnd: "|",
-    ast.BitOr: "&",
-}
-_SIGNS = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-    ast.MatMult: "@",
-    ast.BitAnd: "&",
-    ast.BitOr: "|",
-}
-_NAMES = {
-    "min": "max",
-    "max": "min",
-    "all": "any",
-    "any": "all",
-    "sin": "cos",
-    "cos": "sin",
-    "minimum": "maximum",
-    "maximum": "minimum",
-}
+#: What a trial's process has imported already.
+AT_HAND = (
+    "numpy scipy.optimize scipy.signal scipy.stats scipy.linalg sklearn.linear_model sklearn.cluster matplotlib.pyplot "
+    "pydrake.all control osqp pysindy pyarrow.csv pyarrow.parquet msgspec hypothesis yaml jinja2 coverage"
+)
+#: Times what its tests take that a mutant may take, and seconds that everything else may.
+PATIENCE, MARGIN = 5.0, 20.0
+#: Seconds after which a mutant that waits for something is dead.
+WAITING = 900.0
+#: Seconds of its room's tests, and of those elsewhere, that a mutant is tried on: the quickest that execute its statement.
+#: One that they do not see counts as survived, though a longer test may see it.
+NEAR, ELSEWHERE = 60.0, 30.0
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """One change of one file: characters start … end are replaced."""
-
-    path: Path
-    line: int
-    start: int
-    end: int
-    old: str
-    new: str
+@cache
+def _of(folder: str) -> list[Traced]:
+    return [test for file in sorted((ROOT / "tests" / folder).rglob("test_*.py")) for test in traced(file)]
 
 
-class _Finder(ast.NodeVisitor):
-    """Every place of a file where its meaning can be changed; not its texts, types and messages."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.text, self.found = path, (ROOT / path).read_text(encoding="utf-8"), list[Mutant]()
-        self._lines = [0]
-        for line in self.text.splitlines(keepends=True):
-            self._lines.append(self._lines[-1] + len(line))
-
-    def _at(self, line: int, column: int) -> int:
-        begin = self._lines[line - 1]
-        raw = self.text[begin : self._lines[line]].encode()
-        return begin + len(raw[:column].decode())
-
-    def _span(self, node: ast.AST) -> tuple[int, int]:
-        return self._at(node.lineno, node.col_offset), self._at(node.end_lineno, node.end_col_offset)  # type: ignore[attr-defined]
-
-    def _add(self, node: ast.AST, start: int, end: int, new: str) -> None:
-        self.found.append(Mutant(self.path, node.lineno, start, end, self.text[start:end], new))  # type: ignore[attr-defined]
-
-    def _between(self, node: ast.AST, left: ast.AST, right: ast.AST, old: str, new: str) -> None:
-        start, end = self._span(left)[1], self._span(right)[0]
-        at = self.text.find(old, start, end)
-        if at >= 0:
-            self._add(node, at, at + len(old), new)
-
-    def visit_Compare(self, node: ast.Compare) -> None:
-        sides = [node.left, *node.comparators]
-        for k, operator in enumerate(node.ops):
-            new = _COMPARE[type(operator)]
-            old = {v: t for t, v in ((ast.LtE, "<="), (ast.Lt, "<"), (ast.GtE, ">="), (ast.Gt, ">"))}
-            sign = next((text for text, kind in old.items() if kind is type(operator)), None)
-            sign = (
-                sign
-                or {
-                    ast.Eq: "==",
-                    ast.NotEq: "!=",
-                    ast.In: "in",
-                    ast.NotIn: "not in",
-                    ast.Is: "is",
-                    ast.IsNot: "is not",
-                }[type(operator)]
-            )
-            self._between(node, sides[k], sides[k + 1], sign, new)
-        self.generic_visit(node)
-
-    def visit_BinOp(self, node: ast.BinOp) -> None:
-        kind = type(node.op)
-        if kind in _BINARY and not isinstance(node.left, ast.Constant | ast.JoinedStr):
-            self._between(node, node.left, node.right, _SIGNS[kind], _BINARY[kind])
-        self.generic_visit(node)
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> None:
-        old, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
-        self._between(node, node.values[0], node.values[1], old, new)
-        self.generic_visit(node)
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
-        if isinstance(node.op, ast.Not | ast.USub | ast.Invert):
-            start = self._span(node)[0]
-            self._add(node, start, self._span(node.operand)[0], " " if isinstance(node.op, ast.Not) else "")
-        self.generic_visit(node)
-
-    def visit_Constant(self, node: ast.Constant) -> None:
-        start, end = self._span(node)
-        if isinstance(node.value, bool):
-            self._add(node, start, end, str(not node.value))
-        elif isinstance(node.value, int):
-            self._add(node, start, end, str(node.value + 1))
-        elif isinstance(node.value, float):
-            self._add(node, start, end, repr(2 * node.value if node.value else 1.0))
-
-    def visit_Name(self, node: ast.Name) -> None:
-        if node.id in _NAMES:
-            self._add(node, *self._span(node), _NAMES[node.id])
-
-    def visit_Attribute(self, node: ast.Attribute) -> None:
-        if node.attr in _NAMES:
-            end = self._span(node)[1]
-            self._add(node, end - len(node.attr), end, _NAMES[node.attr])
-        self.generic_visit(node)
-
-    def visit_Raise(self, node: ast.Raise) -> None:
-        """What a message says is no numerics."""
-
-    def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
-        """Nor is text."""
-
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
-        if node.value is not None:
-            self.visit(node.value)
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        if node.name in ("sentence", "label", "to_dict", "words", "__repr__"):
-            return
-        for each in (*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None), *node.body):
-            self.visit(each)
+def own(room: str) -> list[Traced]:
+    """The quick tests of the room."""
+    return _of(room)
 
 
-def mutants(rooms: list[str], count: int, seed: int) -> list[tuple[str, Mutant]]:
-    """So many, drawn evenly from all places of the rooms."""
-    places: list[tuple[str, Mutant]] = []
-    for room in rooms:
-        for file in sorted((ROOT / PACKAGE / room).rglob("*.py")):
-            finder = _Finder(file.relative_to(ROOT))
-            finder.visit(ast.parse(finder.text))
-            places += [(room, mutant) for mutant in finder.found]
-    return random.Random(seed).sample(places, min(count, len(places)))
+def others(room: str) -> list[Traced]:
+    """Those of rooms that guard it too."""
+    return [test for name in GUARDS.get(room, ()) for test in _of(name)]
 
 
-def digest(room: str, mutant: Mutant) -> str:
-    """What a result depends on: the file, the change, and the room's tests."""
+def concerned(mutant: Mutant, tests: list[Traced], most: float) -> list[Traced]:
+    """The tests that execute the mutant's statement, those of the file named for its module first, then quickest first."""
+    wanted: dict[str, set[int]] = defaultdict(set)
+    if mutant.names is None:
+        wanted[str(mutant.path)] = set(range(mutant.first, mutant.last + 1))
+    else:  # executed by the import: seen by those that execute a line with what it defines
+        name = re.compile(r"\b(" + "|".join(mutant.names or (".",)) + r")\b")
+        for file in (ROOT / PACKAGE).rglob("*.py") if mutant.names else [ROOT / mutant.path]:
+            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+                if name.search(line):
+                    wanted[str(file.relative_to(ROOT))].add(number)
+        wanted[str(mutant.path)] -= set(range(mutant.first, mutant.last + 1))
+    found = [
+        test
+        for test in tests
+        if any(lines & test.lines.get(path, frozenset()) for path, lines in wanted.items())
+    ]
+    found.sort(key=lambda test: test.seconds)
+    edge = bisect.bisect_right(list(itertools.accumulate(test.seconds for test in found)), most)
+    found = found[:edge]
+    # a file's tests share its fixtures
+    takes: dict[str, float] = defaultdict(float)
+    for test in found:
+        takes[test.name.split("::")[0]] += test.seconds
+
+    def order(test: Traced) -> tuple[bool, float, str, float]:
+        file = test.name.split("::")[0]
+        return mutant.path.stem not in Path(file).stem, takes[file], file, test.seconds
+
+    return sorted(found, key=order)
+
+
+class _Only:
+    """A plugin of pytest: these tests in this order; the first that fails goes into the pipe."""
+
+    def __init__(self, names: list[str], pipe: int) -> None:
+        self.place, self.pipe = {name: k for k, name in enumerate(names)}, pipe
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        items[:] = sorted(
+            (i for i in items if i.nodeid in self.place), key=lambda item: self.place[item.nodeid]
+        )
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            os.write(self.pipe, report.nodeid.encode())
+            self.pytest_runtest_logreport = lambda report: None  # type: ignore[method-assign]
+
+
+def _try(tests: list[Traced], source: Path, pipe: int) -> None:
+    """In the fork: end with pytest's status."""
+    os.setsid()
+    ends_with_parent()
+    seconds = math.ceil(PATIENCE * sum(test.seconds for test in tests) + MARGIN)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for each in (0, 1, 2):
+        os.dup2(nowhere, each)
+    os.environ["PYTHONPATH"] = str(source)
+    sys.path.insert(0, str(source))
+    files = list(dict.fromkeys(str(ROOT / test.name.split("::")[0]) for test in tests))
+    os._exit(pytest.main([*ARGUMENTS, *files], plugins=[_Only([test.name for test in tests], pipe)]))
+
+
+def killer(tests: list[Traced], source: Path) -> str | None:
+    """The first of the tests that fails with the package there, or what else ended them; None if all pass."""
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            _try(tests, source, write)
+        finally:
+            os._exit(99)
+    os.close(write)
+    # the limit is on the processor's time, which others do not take; this one is for a test that waits
+    end = time.monotonic() + WAITING
+    status = 0
+    while not (done := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < end:
+        time.sleep(0.02)
+    try:
+        os.killpg(child, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        pass
+    if not done[0]:
+        done = os.waitpid(child, 0)
+    status = os.waitstatus_to_exitcode(done[1])
+    name = os.read(read, 10_000).decode()
+    os.close(read)
+    if status == pytest.ExitCode.OK:
+        return None
+    if status == 99:
+        raise RuntimeError("a trial could not begin")
+    return name or ("time" if status < 0 else "import")
+
+
+def digest(paths: list[Path]) -> str:
+    """What files contain."""
     parts = hashlib.sha256()
-    for path in [
-        ROOT / mutant.path,
-        *(p for tests in ROOMS[room] for p in sorted((ROOT / tests).rglob("*.py"))),
-    ]:
+    for path in paths:
         parts.update(path.read_bytes())
-    parts.update(repr((mutant.start, mutant.end, mutant.new)).encode())
     return parts.hexdigest()[:24]
 
 
-def run(tests: list[str], package: Path, seconds: float) -> tuple[bool, float]:
-    """Whether the tests pass with the package, and how long they took."""
-    environment = {**os.environ, "PYTHONPATH": str(package), "PYTHONDONTWRITEBYTECODE": "1"}
-    environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "-n",
-        "0",
-        "-m",
-        "not slow",
-        "-p",
-        "no:cacheprovider",
-    ]
-    begin = time.monotonic()
-    try:
-        done = subprocess.run(
-            [*command, *tests], cwd=ROOT, env=environment, capture_output=True, timeout=seconds, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return False, time.monotonic() - begin
-    return done.returncode == 0, time.monotonic() - begin
+class Results:
+    """Trials that were made, by what they depend on."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.known = file, dict[str, dict[str, Any]]()
+        if file.exists():
+            for line in file.read_text(encoding="utf-8").splitlines():
+                if line.endswith("}"):
+                    each = json.loads(line)
+                    self.known[each["key"]] = each
+
+    def get(self, key: str, room: str) -> dict[str, Any] | None:
+        """The trial of this key, if the tests that decided it are what they were."""
+        each = self.known.get(key)
+        return each if each and each["tests"] == self.tests(each["killer"], room) else None
+
+    def tests(self, by: str | None, room: str) -> str:
+        """The content of the test file that killed, or of all tests of the room."""
+        file = ROOT / (by or "").split("::")[0]
+        if by and file.is_file():
+            return digest([file])
+        folders = () if by else (room, *GUARDS.get(room, ()))
+        return digest([path for name in folders for path in sorted((ROOT / "tests" / name).rglob("*.py"))])
+
+    def add(self, key: str, room: str, mutant: Mutant, by: str | None, seconds: float) -> dict[str, Any]:
+        """Keep one more."""
+        each = {
+            **{"key": key, "room": room, "path": str(mutant.path), "line": mutant.line},
+            **{"old": mutant.old, "new": mutant.new, "killer": by, "seconds": round(seconds, 1)},
+            "tests": self.tests(by, room),
+        }
+        self.known[key] = each
+        with self.file.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(each) + "\n")
+        return each
 
 
-def survivors(answers: list[dict[str, object]]) -> Iterator[str]:
-    """One line per mutant that no test saw."""
-    for each in answers:
-        if each["survived"]:
-            yield f"  {each['path']}:{each['line']}  {each['old']!r} -> {each['new']!r}"
+def wilson(hits: int, of: int) -> tuple[float, float]:
+    """The 95 % interval of a share (Wilson's score interval)."""
+    z = 1.96
+    middle, spread = hits + z * z / 2, z * math.sqrt(hits * (of - hits) / of + z * z / 4)
+    return (middle - spread) / (of + z * z), (middle + spread) / (of + z * z)
 
 
 def main() -> None:
@@ -255,59 +236,70 @@ def main() -> None:
     parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=list(ROOMS))
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--minutes", type=float, default=math.inf, help="end after so long; a new run goes on"
+    )
     options = parser.parse_args()
-    kept = ROOT / "out" / "mutants.jsonl"
-    kept.parent.mkdir(exist_ok=True)
-    known = {}
-    if kept.exists():
-        for line in kept.read_text(encoding="utf-8").splitlines():
-            if line.endswith("}"):
-                each = json.loads(line)
-                known[each["digest"]] = each
-    patience: dict[str, float] = {}
-    answers: list[dict[str, object]] = []
+    begin = time.monotonic()
+    drawn = mutants(options.rooms, options.mutants, options.seed)
+    KEPT.mkdir(parents=True, exist_ok=True)
+    results = Results(KEPT / "results.jsonl")
+    # on one core there are no worker processes, whose lines would not be seen
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    for name in AT_HAND.split():
+        __import__(name)
+    answers: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as scratch:
-        copy = Path(scratch) / "src"
-        shutil.copytree(ROOT / "src", copy)
+        source = Path(scratch) / "src"
+        shutil.copytree(ROOT / "src", source)
         for name in ("urdf", "scenarios"):
             (Path(scratch) / name).symlink_to(ROOT / name)
-        for room, mutant in mutants(options.rooms, options.mutants, options.seed):
-            key = digest(room, mutant)
-            if key not in known:
-                if room not in patience:
-                    passed, took = run(ROOMS[room], copy, 1800)
-                    if not passed:
-                        sys.exit(f"the quick tests of {room} fail without any change")
-                    patience[room] = 3 * took + 30
-                file = Path(scratch) / mutant.path
-                text = file.read_text(encoding="utf-8")
-                file.write_text(text[: mutant.start] + mutant.new + text[mutant.end :], encoding="utf-8")
+        for room, mutant in drawn:
+            file = Path(scratch) / mutant.path
+            text = file.read_text(encoding="utf-8")
+            key = digest([ROOT / mutant.path]) + f":{mutant.start}:{mutant.end}:{mutant.new}"
+            each = results.get(key, room)
+            if each is None:
+                if time.monotonic() - begin > 60 * options.minutes:
+                    print(f"ended after {options.minutes:g} minutes, with {len(answers)} of {len(drawn)}")
+                    break
+                started, by = time.monotonic(), None
+                kept, tried = file.stat(), 0
+                file.write_text(mutant.mutated(text), encoding="utf-8")
                 try:
-                    survived, took = run(ROOMS[room], copy, patience[room])
+                    for guards, most in ((own, NEAR), (others, ELSEWHERE)):
+                        if by is None and (chosen := concerned(mutant, guards(room), most)):
+                            tried += len(chosen)
+                            by = killer(chosen, source)
                 finally:
                     file.write_text(text, encoding="utf-8")
-                known[key] = {
-                    "digest": key,
-                    "room": room,
-                    "path": str(mutant.path),
-                    "line": mutant.line,
-                    "old": mutant.old,
-                    "new": mutant.new,
-                    "survived": survived,
-                    "seconds": round(took, 1),
-                }
-                with kept.open("a", encoding="utf-8") as file_of_all:
-                    file_of_all.write(json.dumps(known[key]) + "\n")
-            answers.append(known[key])
-            each = known[key]
-            print(
-                f"{'SURVIVED' if each['survived'] else 'dead':9}{each['path']}:{each['line']}  "
-                f"{each['old']!r} -> {each['new']!r}  ({each['seconds']:.0f} s)",
-                flush=True,
+                    os.utime(file, ns=(kept.st_atime_ns, kept.st_mtime_ns))
+                each = results.add(key, room, mutant, by, time.monotonic() - started)
+                print(_line(each), f"({each['seconds']:.1f} s, {tried} tests)", flush=True)
+            answers.append(each)
+    report(answers)
+
+
+def _line(each: dict[str, Any]) -> str:
+    fate = "dead" if each["killer"] else "SURVIVED"
+    return f"{fate:9}{each['path']}:{each['line']}  {each['old']!r} -> {each['new']!r}"
+
+
+def report(answers: list[dict[str, Any]]) -> None:
+    """The score, by room and of all, and who survived."""
+    print("\nroom, mutants, dead by the room's quick tests, by these or others' (95 % interval)")
+    for room in (*ROOMS, ""):
+        of = [each for each in answers if each["room"].startswith(room)]
+        if of:
+            dead = [each for each in of if each["killer"]]
+            near = sum(
+                each["killer"].startswith((f"tests/{each['room']}/", "time", "import")) for each in dead
             )
-    dead = sum(not each["survived"] for each in answers)
-    print(f"\n{dead} of {len(answers)} mutants died ({dead / max(len(answers), 1):.0%})")
-    print("\n".join(survivors(answers)))
+            low, high = wilson(len(dead), len(of))
+            print(
+                f"{room or 'all':30}{len(of):5}{near / len(of):8.0%}{len(dead) / len(of):8.0%} ({low:.0%} to {high:.0%})"
+            )
+    print("\n".join(_line(each) for each in answers if not each["killer"]))
 
 
 if __name__ == "__main__":

@@ -88,3 +88,45 @@ def test_however_many_work_each_has_one_blas_thread() -> None:
     with threadpool_limits(2):
         for workers in (Serial(), Processes(1), Processes(2)):
             assert list(workers.map(threads, [0, 1])) == [1, 1]
+
+
+def test_a_team_keeps_what_each_has_computed() -> None:
+    """Of eleven every process does the same ones whenever it is asked, so that it need not do them again."""
+    from armloop.util.workers import Team
+
+    with Team(set(), 3) as team:
+        first = team.map(_known_before, "a", 11, lambda done: None)
+        again = team.map(_known_before, "b", 11, lambda done: None)
+    assert [k for k, _, _ in first] == list(range(11))
+    assert not any(known for _, known, _ in first) and all(known for _, known, _ in again)
+    assert [task for _, _, task in again] == ["b"] * 11
+
+
+def test_a_teams_fault_is_the_users_and_ends_it() -> None:
+    from armloop.util.workers import Team
+
+    for jobs in (1, 2):
+        with pytest.raises(LogError, match="row 3"), Team(None, jobs) as team:
+            team.map(_wrong_at_three, None, 5, lambda done: None)
+
+
+def test_within_a_pool_nobody_makes_a_team() -> None:
+    assert list(Processes(2).map(lambda k: _team_of_eight(), [0, 1])) == [1, 1]
+
+
+def _known_before(held: set[int], task: str, k: int) -> tuple[int, bool, str]:
+    known = k in held
+    held.add(k)
+    return k, known, task
+
+
+def _wrong_at_three(held: None, task: None, k: int) -> int:
+    if k == 3:
+        raise LogError(f"file.csv: row {k} is wrong")
+    return k
+
+
+def _team_of_eight() -> int:
+    from armloop.util.workers import Team
+
+    return Team(None, 8).jobs

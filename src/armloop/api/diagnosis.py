@@ -89,6 +89,7 @@ def diagnose(
     *,
     held_out: MotionLog | Sequence[MotionLog] = (),
     adopt: bool = False,
+    jobs: int | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Find what a model lacks on a measured run, trace it to a physical effect, and add it; see ``armloop diagnose``.
@@ -97,13 +98,14 @@ def diagnose(
         logs: the run, or several of the same arm.
         held_out: further runs of the arm as it is now, never fitted: error before and after on each.
         adopt: put an unlisted law that was found into the model; it acts where the run has been.
+        jobs: processes that try the hypotheses; up to four cores by default. The answer does not depend on it.
 
     Raises:
         InputError: a log does not fit the model.
     """
     runs = logs_for(model, as_logs(logs))
     plain = Model.of(model).plain()
-    found = run(plain, runs, progress)
+    found = run(plain, runs, progress, jobs)
     found = found.adopt() if adopt else found
     closing = close(plain, found.model, found.samples, logs_for(model, as_logs(held_out)))
     return Diagnosis(found, model, runs, closing)

@@ -53,6 +53,21 @@ def seed(text: str) -> int:
     return int(text)
 
 
+#: Most processes that may be asked for.
+_PROCESSES = 1024
+
+
+def add_jobs(p: argparse.ArgumentParser, what: str, default: int | None = None) -> None:
+    """How many processes do something."""
+    p.add_argument("--jobs", type=_processes, default=default, metavar="N", help=f"processes that {what}")
+
+
+def _processes(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text[:9]) <= _PROCESSES:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 1 to {_PROCESSES}")
+    return int(text)
+
+
 def add_json(p: argparse.ArgumentParser) -> None:
     """The choice of a machine-readable answer."""
     p.add_argument("--json", action="store_true", help="print one JSON object and nothing else")

@@ -65,12 +65,14 @@ def run(options: argparse.Namespace) -> None:
     """Convert, or suggest a map."""
     from pathlib import Path
 
-    from armloop.commands.shared import arm_of, drive_gains, out_file, print_json
+    from armloop.commands.shared import CURRENTS_ONLY, drive_gains, out_file, print_json, stated_arm
     from armloop.convert import Answers, convert, read_map
     from armloop.data.tables import write_columns
     from armloop.util.errors import InputError
 
-    arm = arm_of(options) if options.arm else None
+    arm = stated_arm(options)
+    if options.drive_gains is not None and options.tau_unit == "N*m":
+        raise InputError(CURRENTS_ONLY)
     if options.suggest:
         _suggest(options, arm)
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import ARM_HELP, add_chain, add_json, add_logs, add_recorded
+from armloop.commands.arguments import ARM_HELP, add_chain, add_jobs, add_json, add_logs, add_recorded
 
 HELP = "reconstruct with each log, or alternating blocks, left out in turn, and score what was left out"
 EXAMPLE = "armloop crossvalidate run1.csv run2.csv run3.csv --arm arm.urdf"
@@ -55,13 +55,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="folder for crossvalidation.json; each fit is kept there until the end, so that the same call goes on where "
         "it was ended",
     )
-    p.add_argument(
-        "--jobs",
-        type=int,
-        default=None,
-        metavar="N",
-        help="processes that make the fits, which are the same for any number (default: one per core)",
-    )
+    add_jobs(p, "make the fits, which are the same for any number (default: one per core)")
     add_recorded(p, "N*m")
     add_json(p)
 
@@ -96,8 +90,6 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
-    if options.jobs is not None and options.jobs < 1:
-        raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
     arm = arm_of(options)
     logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
     folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from armloop.commands.arguments import add_chain, add_json, add_logs, add_recorded
+from armloop.commands.arguments import add_chain, add_jobs, add_json, add_logs, add_recorded
 from armloop.commands.next_run import add_next_run
 
 HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
@@ -36,6 +36,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     add_chain(p)
     add_recorded(p, "as the model's training logs")
     add_next_run(p)
+    add_jobs(p, "try the hypotheses (default: one per core, at most four); the answer does not depend on it")
     add_json(p)
 
 
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> None:
     model, logs = model_and_logs(options)
     apart = held_out_logs(options, model, logs)
     wanted = wish(options, model)
-    result = run(model, logs, progress(options))
+    result = run(model, logs, progress(options), options.jobs)
     result = result.adopt() if options.adopt else result
     closing = close(model, result.model, result.samples, apart)
     answer = {**result.to_dict(), **closing.to_dict()}

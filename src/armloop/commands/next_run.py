@@ -6,7 +6,7 @@ import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from armloop.commands.ranges import add_ranges, ranges_stated, read_ranges
+from armloop.commands.ranges import add_ranges, ranges_stated, read_ranges, reserve_stated
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
@@ -47,8 +47,8 @@ def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
     from armloop.util.errors import InputError
 
     if options.next_run is None:
-        if ranges_stated(options) or options.next_run_duration is not None:
-            raise InputError("ranges and durations are those of --next-run REF.csv: give it, too")
+        if ranges_stated(options) or reserve_stated(options) or options.next_run_duration is not None:
+            raise InputError("ranges, reserve and duration are those of --next-run REF.csv: give it, too")
         return None
     out_file(options.next_run, "--next-run")
     if not options.next_run.endswith((CSV, PARQUET)):

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from armloop.experiment.excitation import MotionRanges
     from armloop.robot.arm import Arm
 
+#: Part of the effort limits that is kept free unless an option says otherwise.
+RESERVE = 0.2
 _NAMES = ("lower", "upper", "velocity", "acceleration")
 
 
@@ -38,7 +40,7 @@ def add_ranges(p: argparse._ActionsContainer, ranges: str, acceleration: str) ->
     p.add_argument(
         "--reserve",
         type=float,
-        default=0.2,
+        default=RESERVE,
         help="part of the URDF's effort limits that is kept free (%(default)s)",
     )
 
@@ -46,6 +48,11 @@ def add_ranges(p: argparse._ActionsContainer, ranges: str, acceleration: str) ->
 def ranges_stated(options: argparse.Namespace) -> bool:
     """Whether any range is stated."""
     return any(getattr(options, name) is not None for name in ("ranges", *_NAMES))
+
+
+def reserve_stated(options: argparse.Namespace) -> bool:
+    """Whether another reserve than the default is stated."""
+    return bool(options.reserve != RESERVE)
 
 
 def read_ranges(

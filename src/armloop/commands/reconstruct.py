@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from armloop.commands.arguments import ARM_HELP, add_chain, add_json, add_logs, add_recorded
+from armloop.commands.arguments import ARM_HELP, add_chain, add_jobs, add_json, add_logs, add_recorded
 
 HELP = "reconstruct a readable model of the joint torques from logs"
 EXAMPLE = "armloop reconstruct out/logs/*.csv --arm three_axis --out model.json"
@@ -74,13 +74,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         action="store_true",
         help="do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)",
     )
-    p.add_argument(
-        "--jobs",
-        type=int,
-        default=None,
-        metavar="N",
-        help="processes that pass over logs of more than 500,000 samples, which are read piece by piece (default: one "
-        "per core)",
+    add_jobs(
+        p,
+        "pass over logs of more than 500,000 samples, which are read piece by piece (default: one per core)",
     )
     p.add_argument(
         "--scheduler",
@@ -116,8 +112,6 @@ def run(options: argparse.Namespace) -> None:
         raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
     if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
         raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
-    if options.jobs is not None and options.jobs < 1:
-        raise InputError(f"--jobs {options.jobs}: give a number of processes of at least 1")
     _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")

@@ -46,7 +46,7 @@ def out_file(path: str | None, option: str) -> None:
 
 def arm_of(options: argparse.Namespace) -> Arm:
     """The arm of ``--arm`` (or ARM), with what ``--lock`` and ``--tip`` say; raises ``InputError``."""
-    lock = {}
+    lock: dict[str, float] = {}
     for text in options.lock:
         name, equals, value = text.rpartition("=")
         try:
@@ -55,7 +55,19 @@ def arm_of(options: argparse.Namespace) -> Arm:
             equals = ""
         if not (name and equals):
             raise InputError(f"--lock {text}: give JOINT=VALUE, such as finger_joint=0.02")
+        if [other.rpartition("=")[0] for other in options.lock].count(name) > 1:
+            raise InputError(f"--lock {text}: joint {name!r} is locked twice; give it once")
     return load_arm(options.arm, lock, options.tip)
+
+
+def stated_arm(options: argparse.Namespace) -> Arm | None:
+    """:func:`arm_of` where ``--arm`` is given, else None; raises ``InputError``."""
+    if options.arm:
+        return arm_of(options)
+    for name, value in (("--lock", options.lock), ("--tip", options.tip)):
+        if value:
+            raise InputError(f"{name} is of the URDF that --arm names: give it, too")
+    return None
 
 
 def drive_gains(text: str | None) -> list[float] | None:
@@ -71,14 +83,15 @@ def drive_gains(text: str | None) -> list[float] | None:
     return gains
 
 
+CURRENTS_ONLY = "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
+
+
 def recorded_as(options: argparse.Namespace, default: dict[str, Any]) -> dict[str, Any]:
     """What the torque columns hold, by the options or else as ``default`` says."""
     gains = drive_gains(options.drive_gains)
     unit = options.tau_unit
     if gains is not None and unit == "N*m":
-        raise InputError(
-            "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
-        )
+        raise InputError(CURRENTS_ONLY)
     if gains is None and unit is None:
         return default
     if gains is not None:
@@ -99,8 +112,7 @@ TORQUE = {"unit": "N*m", "drive_gains": None}
 
 def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, list[MotionLog]]:
     """The model of a command line and the logs that are to be compared with it."""
-    arm: Arm | None = arm_of(options) if options.arm else None
-    model = load_model(options.model, arm)
+    model = load_model(options.model, stated_arm(options))
     recorded = recorded_as(options, model.recorded)
     if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":
         raise ModelError(f"{options.model}: predicts torque in N·m; currents in A need --drive-gains")
@@ -119,6 +131,11 @@ def held_out_logs(
                     f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
                     "--held-out takes runs that are not fitted"
                 )
-    for log in logs:
+    for k, log in enumerate(logs):
+        for other in logs[:k]:
+            if same_measurement(log, other):
+                raise InputError(
+                    f"{options.held_out[k]}: holds the measurement of {other.name} once more; give each run once"
+                )
         preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from armloop.commands.arguments import add_json
+from armloop.commands.arguments import add_jobs, add_json
 
 if TYPE_CHECKING:
     from armloop.watch.store import Store
@@ -68,9 +68,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="map over a Dask cluster, such as tcp://10.0.0.7:8786",
     )
-    p.add_argument(
-        "--jobs", type=_count, default=1, metavar="N", help="processes of this machine (default: 1)"
-    )
+    add_jobs(p, "watch arms side by side on this machine (default: 1)", 1)
     add_json(p)
 
 

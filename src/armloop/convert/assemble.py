@@ -14,7 +14,7 @@ from armloop.convert.joints import match, may_be_unordered
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording
 from armloop.convert.units import CURRENTS, FACTORS, canonical
-from armloop.data.log import GAP_PERIODS, MotionLog, unchecked_log
+from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
@@ -59,6 +59,10 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         LogError: a column is missing or holds no numbers, a unit is not said, or joints do not match the arm's.
     """
     where = str(recording.path)
+    if recording.samples < FEWEST_SAMPLES:
+        raise LogError(
+            f"{where}: {recording.samples} {recording.rows}s; a motion log has at least {FEWEST_SAMPLES}"
+        )
     mapping = _answered(recording, mapping, arm, answers)
     notes = list(recording.notes)
     order = _order(recording, mapping, arm, notes)
@@ -67,6 +71,11 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     for kind, quantity in mapping.quantities().items():
         values[kind] = np.stack([_column(recording, quantity, kind, j) for j in order], axis=1)
     time, keep, starts = _time(recording, mapping, notes)
+    if len(keep) < FEWEST_SAMPLES:
+        raise LogError(
+            f"{where}: {len(keep)} of {N} {recording.rows}s have a time of their own; a motion log has at least "
+            f"{FEWEST_SAMPLES}"
+        )
     cells = {name: cells[keep] for name, cells in values.items()}
     if not np.any(cells["tau"]):
         raise LogError(f"{where}: the torques are zero throughout; this source did not record them")

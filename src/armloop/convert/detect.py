@@ -19,6 +19,8 @@ def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | No
     if not path.exists():
         raise LogError(f"{path}: no such file; give {KNOWN}")
     suffix = path.suffix.lower()
+    if not (path.is_file() or path.is_dir()):
+        raise LogError(f"{path}: is a device or a pipe; give {KNOWN}")
     try:
         if suffix in (".db3", ".mcap", ".bag") or (path.is_dir() and (path / "metadata.yaml").is_file()):
             from armloop.convert.rosbag import read_rosbag

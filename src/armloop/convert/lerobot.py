@@ -7,7 +7,6 @@ the data set says neither, so both are asked for.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording, flatten
 from armloop.util.errors import LogError
+from armloop.util.reading import read_json
 
 _TORQUES = (
     "observation.effort",
@@ -62,15 +62,16 @@ def read_lerobot(path: Path) -> Recording:
         parts = [_array(table.column(name)) for table in tables if name in table.column_names]
         if len(parts) == len(tables) and all(part is not None for part in parts):
             arrays[name] = np.concatenate([part for part in parts if part is not None])
-    features = info.get("features", {})
+    features = info.get("features")
     columns: dict[str, Array] = {}
     for name, values in arrays.items():
-        entries = _names(features.get(name, {}).get("names"))
+        feature = features.get(name) if isinstance(features, dict) else None
+        entries = _names(feature.get("names")) if isinstance(feature, dict) else []
         if values.ndim == 2 and len(entries) == values.shape[1]:
             columns |= {f"{name}/{entry}": values[:, k] for k, entry in enumerate(entries)}
         else:
             columns |= flatten({name: values})
-    mapping, named = _mapping(columns, info)
+    mapping, named = _mapping(columns, _rate(info, path))
     if mapping is None:
         raise LogError(
             f"{path}: no torques or currents among {', '.join(sorted(arrays))}; a log needs them "
@@ -82,9 +83,18 @@ def read_lerobot(path: Path) -> Recording:
     return Recording(path, "LeRobot data set", columns, mapping, named=named, starts=starts, notes=notes)
 
 
-def _mapping(columns: dict[str, Array], info: dict[str, Any]) -> tuple[Mapping | None, bool]:
+def _rate(info: dict[str, Any], path: Path) -> float | None:
+    """Frames per second; None where the data set does not say."""
     fps = info.get("fps")
-    time = TimeMap("timestamp", "s") if "timestamp" in columns else TimeMap(rate=float(fps) if fps else None)
+    if fps is None:
+        return None
+    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 0 < fps < 1e6:
+        raise LogError(f"{path}: meta/info.json: fps is {fps!r:.60}; it must be a positive number of Hz")
+    return float(fps)
+
+
+def _mapping(columns: dict[str, Array], fps: float | None) -> tuple[Mapping | None, bool]:
+    time = TimeMap("timestamp", "s") if "timestamp" in columns else TimeMap(rate=fps)
     states = [name for name in columns if name.startswith("observation.state")]
     by_ending = {kind: [n for n in states if _ending(n) in endings] for kind, endings in _ENDINGS.items()}
     torques = next((found for stem in _TORQUES if (found := _of(columns, stem))), by_ending["tau"])
@@ -146,12 +156,7 @@ def _info(path: Path) -> dict[str, Any]:
     for folder in folders:
         file = folder / "meta" / "info.json"
         if file.is_file():
-            try:
-                found = json.loads(file.read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                raise LogError(
-                    f"{file}: no JSON ({error}); a LeRobot data set describes itself there"
-                ) from error
+            found = read_json(file, LogError, "the JSON in which a LeRobot data set describes itself")
             return found if isinstance(found, dict) else {}
     return {}
 

@@ -19,6 +19,7 @@ def read_matlab(path: Path) -> Recording:
         LogError: the file is none that can be read, or holds nothing that looks like a log.
     """
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         content = loadmat(path, squeeze_me=False, struct_as_record=True)
@@ -26,7 +27,7 @@ def read_matlab(path: Path) -> Recording:
         raise LogError(
             f"{path}: MATLAB 7.3 (HDF5) is not read; in MATLAB, save it with save(…, '-v7')"
         ) from error
-    except (ValueError, TypeError, OSError, EOFError, IndexError) as error:
+    except (MatReadError, ValueError, TypeError, OSError, EOFError, IndexError, MemoryError) as error:
         raise LogError(f"{path}: no MATLAB file ({error}); save it with save(…, '-v7')") from error
     arrays: dict[str, Any] = {}
     for name, value in content.items():

@@ -24,6 +24,8 @@ def read_npz(path: Path) -> Recording:
                     arrays[name] = content[name]
                 except ValueError:
                     objects.append(name)
+    except MemoryError as error:  # what an array's header claims, whatever the file has
+        raise LogError(f"{path}: holds more than there is memory for; write its parts one by one") from error
     except (ValueError, OSError, EOFError, zipfile.BadZipFile, AttributeError) as error:
         raise LogError(f"{path}: no NumPy archive ({error}); write one with numpy.savez") from error
     recording = from_arrays(path, "NumPy archive", arrays)

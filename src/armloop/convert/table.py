@@ -7,7 +7,7 @@ from pathlib import Path
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import clock_seconds, read_text
+from armloop.convert.text import clock_seconds, numbers_of, read_text
 from armloop.util.errors import LogError
 
 
@@ -67,7 +67,7 @@ def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str], dict[s
             or pyarrow.types.is_integer(kind)
             or pyarrow.types.is_boolean(kind)
         ):
-            columns[name] = table.column(name).cast(pyarrow.float64()).to_numpy()
+            columns[name] = numbers_of(table.column(name))
         elif (seconds := clock_seconds(table.column(name))) is not None:
             columns[name], units[name] = seconds, "s"
         else:

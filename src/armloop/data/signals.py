@@ -190,9 +190,11 @@ def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
 
     It is taken to be as strong below the corner as in the octave above it, where there is hardly any
     motion; the median over the run with the most samples keeps impacts and reversals out. It is never
-    less than what rounding the recorded v leaves.
+    less than what rounding the recorded v leaves. Of a log without a run long enough for a filter it is zero.
     """
     run = max(log.runs(), key=lambda run: run.stop - run.start)
+    if run.stop - run.start < FEWEST_SAMPLES:
+        return np.zeros(log.joints)
     v, period = log.v[run], uniform_period(log.time[run])
     octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
     rough = np.median(np.abs(octave), axis=0) / 0.6745

@@ -12,6 +12,7 @@ from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import MOST
 from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects.found import RANGE
 from armloop.util.progress import Progress
@@ -41,10 +42,12 @@ class Account:
     unlisted: Unlisted | None
 
     @staticmethod
-    def of(whole: Evidence, contacts: list[Contact], progress: Progress) -> Account:
+    def of(
+        whole: Evidence, contacts: list[Contact], progress: Progress, panel: Hypotheses | None = None
+    ) -> Account:
         """Search a run in which these contacts are taken for granted."""
         evidence = without(whole, contacts)
-        outcome = search(evidence, progress)
+        outcome = search(evidence, progress, panel)
         unlisted, outcome = find_law(evidence, outcome, progress)
         return Account(whole, contacts, evidence, outcome, unlisted)
 
@@ -88,14 +91,21 @@ class Account:
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), 1e-300)
 
 
-def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, progress: Progress) -> Account:
+def best_account(
+    whole: Evidence,
+    contacts: list[Contact],
+    plain_counts: bool,
+    progress: Progress,
+    panel: Hypotheses | None = None,
+) -> Account:
     """The account with contacts where there are any, unless effects or a law explain those bursts as well.
 
     Args:
         contacts: what looks like contacts before anything else is known.
         plain_counts: whether the run moves enough to be judged without contacts, too.
+        panel: who tries the hypotheses; in this process by default.
     """
-    account = plain = Account.of(whole, contacts, progress)
+    account = plain = Account.of(whole, contacts, progress, panel)
     # What effects and law leave shows events that they covered, and takes back those that they explain.
     residual = account.remaining()
     again = find_contacts(whole, residual)
@@ -103,7 +113,7 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
     if (without(whole, again).rows == account.evidence.rows).all():
         account = looked  # in the same samples, without what the effects do there
     else:
-        account = Account.of(whole, again, progress)
+        account = Account.of(whole, again, progress, panel)
         # Beside what only looked like an event, a search may go another way than without it.
         if not again and looked.left(residual) < account.left(residual):
             law = looked.unlisted
@@ -111,7 +121,7 @@ def best_account(whole: Evidence, contacts: list[Contact], plain_counts: bool, p
     if not account.contacts or not plain_counts:
         return account
     if contacts:
-        plain = Account.of(whole, [], progress)
+        plain = Account.of(whole, [], progress, panel)
     enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
     same = account.unlisted and plain.unlisted and account.unlisted.joint == plain.unlisted.joint
     bare, plain_left, left = (

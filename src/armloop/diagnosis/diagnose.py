@@ -22,6 +22,7 @@ from armloop.diagnosis.reasons import Standing, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import Found, Outcome, Strength, strengths
+from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.laws.effects import hypotheses
@@ -217,11 +218,17 @@ def _null(value: Any) -> Any:
 
 
 @one_thread
-def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Progress = silent) -> Diagnosis:
+def diagnose(
+    model: ReconstructedModel,
+    logs: Sequence[MotionLog],
+    progress: Progress = silent,
+    jobs: int | None = None,
+) -> Diagnosis:
     """Find what the model lacks on a measured run.
 
     Args:
         logs: one or more runs of the same arm under the same circumstances, torque in the model's unit.
+        jobs: processes that try the hypotheses; up to four cores by default. The answer does not depend on it.
 
     Raises:
         InputError: the logs do not fit the model.
@@ -264,7 +271,8 @@ def diagnose(model: ReconstructedModel, logs: Sequence[MotionLog], progress: Pro
         return replace(found, standing=replace(stand, reasons=[too_still(evidence), *stand.reasons]))
     blocks = len(np.unique(evidence.blocks))
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
-    account = best_account(whole, contacts, not too_still(whole), progress)
+    with Hypotheses(whole, jobs) as panel:
+        account = best_account(whole, contacts, not too_still(whole), progress, panel)
     contacts, evidence = account.contacts, account.evidence
     outcome, unlisted = account.outcome, account.unlisted
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows

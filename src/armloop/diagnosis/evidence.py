@@ -125,19 +125,32 @@ class Evidence:
         """(R,) sample of every stacked row."""
         return self.kept[np.nonzero(self.rows[self.kept])[0]]
 
+    @cached_property
+    def independent(self) -> NDArray[np.intp]:
+        """(M,) samples of which the filter has left each something of its own to say."""
+        return np.flatnonzero(independent_rows(self.samples))
+
     def smoothed(self, effect: Effect, shape: float) -> Array:
-        """(N, p) columns of an effect on its joint, or (N, n, p) on all, through the run's filter; computed once."""
+        """(M, p) columns of an effect on its joint, or (M, n, p) on all, through the run's filter, at
+        :attr:`independent` samples; computed once.
+        """
         key = (effect.place, shape)
         cache = self._of_model if effect.needs_model else self._of_motion
         if key in cache:
             return cache[key]
-        columns = smooth(self.samples, effect.columns(self.context, shape))
+        columns = smooth(self.samples, effect.columns(self.context, shape))[self.independent]
         cache.keep(key, columns)
         return columns
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(K, n, p) columns of an effect through the run's filter, at the samples kept."""
-        return effect.on_all_joints(self.smoothed(effect, shape)[self.kept], self.rows.shape[1])
+        return effect.on_all_joints(self.smoothed(effect, shape)[self._places], self.rows.shape[1])
+
+    @cached_property
+    def _places(self) -> NDArray[np.intp]:
+        places = np.searchsorted(self.independent, self.kept)
+        assert (self.independent.take(places, mode="clip") == self.kept).all()
+        return places
 
     def only(self, rows: NDArray[np.bool_]) -> Evidence:
         """The same run where only rows (N, n) count."""

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
+from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
 from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
@@ -59,18 +59,12 @@ class Fit:
         """(R,) residual of every row after parameters fitted on the other folds: what judges."""
         return np.asarray(self.outside[self.stacked.fold, np.arange(len(self.stacked.y))])
 
-    @property
-    def complexity(self) -> int:
-        """Free parameters of all effects."""
-        return sum(effect.complexity for effect in self.effects)
-
-    def block_errors(self) -> Array:
-        """(B,) held-out squared error of each block."""
-        return block_sums(self.held_out**2, self.stacked.block)
-
-    def block_rows(self) -> Array:
-        """(B,) rows of each block."""
-        return block_sums(np.ones(len(self.stacked.block)), self.stacked.block)
+    @cached_property
+    def score(self) -> Score:
+        """What judges it."""
+        rows = self.stacked
+        complexity = sum(effect.complexity for effect in self.effects)
+        return Score.of(complexity, self.held_out, rows.joint, rows.block, rows.joints)
 
 
 def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: Sequence[Shape]) -> Fit:
@@ -149,10 +143,10 @@ def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:
     """
     G = X.T @ X
     scores = X * left[:, None]
-    _, index = np.unique(block, return_inverse=True)
-    sums = np.zeros((index.max(initial=-1) + 1, X.shape[1]))
-    np.add.at(sums, index, scores)
+    blocks, index = np.unique(block, return_inverse=True)
+    sums = np.zeros((len(blocks), X.shape[1]))
+    for k, score in enumerate(scores.T):
+        sums[:, k] = np.bincount(index, weights=score, minlength=len(blocks))
     scale = unit_scale(G)
     bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
-    blocks = len(sums)
-    return np.asarray(bread @ (sums.T @ sums) @ bread) * blocks / max(blocks - 1, 1)
+    return np.asarray(bread @ (sums.T @ sums) @ bread) * len(blocks) / max(len(blocks) - 1, 1)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.score import Score
 
 Array = NDArray[np.float64]
 
@@ -24,55 +26,52 @@ ALIKE, NEARLY = 0.4, 0.003
 MOST = 0.75
 
 
-def gain(current: Fit, trial: Fit) -> float:
+def gain(current: Score, trial: Score) -> float:
     """How much held-out squared error, weighted, a trial removes."""
-    return float((current.held_out**2).sum() - (trial.held_out**2).sum())
+    return current.error - trial.error
 
 
-def is_worth(evidence: Evidence, current: Fit, trial: Fit) -> bool:
+def is_worth(evidence: Evidence, current: Score, trial: Score) -> bool:
     """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
     return times_enough(evidence, current, trial) > 1.0
 
 
-def times_enough(evidence: Evidence, current: Fit, trial: Fit) -> float:
+def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:
     """How many times more than the model's own shortcomings a trial removes.
 
     What a load or a delay changes shows a little on every joint: the joints' parts add up.
     """
-    return float((by_joint(current, trial) / enough(evidence, current)).sum())
+    return float(((current.energy - trial.energy) / enough(evidence, current)).sum())
 
 
-def enough(evidence: Evidence, fit: Fit) -> Array:
+def enough(evidence: Evidence, score: Score) -> Array:
     """(n,) squared error, weighted, of each joint that is more than the model's own shortcomings."""
-    return np.asarray(BASELINE_SHARE * evidence.variation * np.maximum(rows_per_joint(fit), 1))
+    return np.asarray(BASELINE_SHARE * evidence.variation * np.maximum(score.rows, 1))
 
 
-def simplest_of_equals(current: Fit, trials: list[Fit]) -> Fit:
-    """Among trials as good as the best, the one with the fewest parameters.
+def simplest_of_equals(current: Score, trials: Sequence[Score]) -> int:
+    """Which of the trials that are as good as the best has the fewest parameters.
 
     As good is one that removes most of what the best removes and is behind it by no more than chance over
     blocks, or, on every joint, by no more than the model's own shortcomings there.
     """
-    best = max(trials, key=lambda trial: gain(current, trial))
-    equals = [trial for trial in trials if trial is best or not is_behind(current, trial, best)]
-    return min(equals, key=lambda trial: (trial.complexity, -gain(current, trial)))
+    best = max(range(len(trials)), key=lambda k: gain(current, trials[k]))
+    equals = [k for k, trial in enumerate(trials) if k == best or not is_behind(current, trial, trials[best])]
+    return min(equals, key=lambda k: (trials[k].complexity, -gain(current, trials[k])))
 
 
-def is_behind(current: Fit, trial: Fit, best: Fit) -> bool:
+def is_behind(current: Score, trial: Score, best: Score) -> bool:
     """Whether a trial does worse than the best by more than chance and the model's own shortcomings."""
-    soaked = np.maximum(ALIKE * rows_per_joint(trial), NEARLY * by_joint(current, best))
-    alike = lead(trial, best) <= CHANCE or bool((by_joint(trial, best) <= soaked).all())
+    soaked = np.maximum(ALIKE * trial.rows, NEARLY * (current.energy - best.energy))
+    alike = lead(trial, best) <= CHANCE or bool((trial.energy - best.energy <= soaked).all())
     return not alike or gain(current, trial) < MOST * gain(current, best)
 
 
-def lead(worse: Fit, better: Fit) -> float:
+def lead(worse: Score, better: Score) -> float:
     """By how many standard errors, over blocks, one fit leaves more held-out error than another."""
-    return max(
-        lead_of(worse.block_errors(), better.block_errors(), worse.block_rows()),
-        _likelier(worse, better),
-    )
+    return max(lead_of(worse.block_errors, better.block_errors, worse.block_rows), _likelier(worse, better))
 
 
 def lead_of(worse: Array, better: Array, rows: Array) -> float:
@@ -86,36 +85,17 @@ def lead_of(worse: Array, better: Array, rows: Array) -> float:
     return max(_standard_errors(difference), _standard_errors(difference / (worse + better + rows)))
 
 
-def _likelier(worse: Fit, better: Fit) -> float:
+def _likelier(worse: Score, better: Score) -> float:
     """Likelihood ratio of two fits' held-out errors as standard errors: sqrt(2 log L), each block one observation.
 
     Errors are normal with a variance of each joint's own, and count on top of the baseline's. A law that bites in few
     blocks, hard, is no chance, though neither the sum's spread nor the number of blocks that agree says so.
     """
-    joints = worse.stacked.joints
-    seen = np.flatnonzero(np.bincount(worse.stacked.joint + joints * worse.stacked.block)) % joints
-    rows = np.maximum(rows_per_joint(worse), 1)
-    ratio = np.log((energy_by_joint(worse) + rows) / (energy_by_joint(better) + rows))
-    log_likelihood = 0.5 * float((np.bincount(seen, minlength=joints) * ratio).sum())
+    rows = np.maximum(worse.rows, 1)
+    log_likelihood = 0.5 * float((worse.seen * np.log((worse.energy + rows) / (better.energy + rows))).sum())
     return float(np.sign(log_likelihood) * np.sqrt(2 * abs(log_likelihood)))
 
 
 def _standard_errors(differences: Array) -> float:
     spread = float(np.sqrt(len(differences)) * differences.std(ddof=1))
     return float(differences.sum()) / max(spread, 1e-12)
-
-
-def rows_per_joint(fit: Fit) -> NDArray[np.intp]:
-    """(n,) rows of each joint."""
-    return np.bincount(fit.stacked.joint, minlength=fit.stacked.joints)
-
-
-def energy_by_joint(fit: Fit) -> Array:
-    """(n,) held-out squared error, weighted, of each joint."""
-    return np.asarray(np.bincount(fit.stacked.joint, weights=fit.held_out**2, minlength=fit.stacked.joints))
-
-
-def by_joint(worse: Fit, better: Fit) -> Array:
-    """(n,) how much held-out squared error one fit leaves more than another, joint by joint."""
-    difference = worse.held_out**2 - better.held_out**2
-    return np.asarray(np.bincount(worse.stacked.joint, weights=difference, minlength=worse.stacked.joints))

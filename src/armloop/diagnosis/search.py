@@ -13,18 +13,8 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.judgement import (
-    by_joint,
-    energy_by_joint,
-    gain,
-    is_behind,
-    is_worth,
-    lead,
-    rows_per_joint,
-    simplest_of_equals,
-    times_enough,
-)
-from armloop.diagnosis.trials import Known
+from armloop.diagnosis.judgement import gain, is_behind, is_worth, lead, simplest_of_equals, times_enough
+from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array
@@ -89,107 +79,119 @@ class Outcome:
         ]
 
 
-def search(evidence: Evidence, progress: Progress) -> Outcome:
-    """Greedy forward search; all effects are re-estimated together, and exchanged where another does better."""
-    listed = hypotheses(evidence.model.arm)
-    nothing = known = Known.of(evidence)
-    explainable = np.maximum(energy_by_joint(nothing.fit) - rows_per_joint(nothing.fit), 1e-9)
-    tell = paced(progress)
-    found: list[Found] = []
-    seen: set[frozenset[tuple[str, int | None, int | None]]] = {frozenset()}
-    while len(found) < _MOST_EFFECTS:
-        best = _best(known, listed, explainable, tell)
-        if best is None:
-            break
-        found.append(best)
-        progress(f"found {best.effect.label()}: removes {best.share:.0%} of what can be explained")
-        found = _exchanged(evidence, found, listed, explainable, progress)
-        found = _one_for_several(evidence, nothing, found, explainable, progress)
-        known = _known(evidence, found)
-        # What is added may be taken back by an exchange: the same effects a second time are the end of it.
-        places = frozenset(f.effect.place for f in found)
-        if places in seen:
-            break
-        seen.add(places)
-    return Outcome(found, nothing.fit, known.fit, nothing.residual)
+def search(evidence: Evidence, progress: Progress, panel: Hypotheses | None = None) -> Outcome:
+    """Greedy forward search; all effects are re-estimated together, and exchanged where another does better.
+
+    Args:
+        panel: who tries the hypotheses; in this process by default.
+    """
+    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1)).outcome()
+
+
+class _Search:
+    """One search: what could be explained at first, and what was the best beside the same effects before."""
+
+    def __init__(self, evidence: Evidence, progress: Progress, panel: Hypotheses) -> None:
+        self.evidence, self.progress, self.panel = evidence, progress, panel
+        self.nothing = Known.of(evidence)
+        bare = self.nothing.fit.score
+        self.explainable: Array = np.maximum(bare.energy - bare.rows, 1e-9)
+        self._best_beside: dict[
+            tuple[tuple[tuple[str, int | None, int | None], Shape], ...], Found | None
+        ] = {}
+
+    def outcome(self) -> Outcome:
+        """Effects added one by one until none is worth it."""
+        found: list[Found] = []
+        known = self.nothing
+        seen: set[frozenset[tuple[str, int | None, int | None]]] = {frozenset()}
+        while len(found) < _MOST_EFFECTS:
+            best = self._best(found)
+            if best is None:
+                break
+            found.append(best)
+            self.progress(f"found {best.effect.label()}: removes {best.share:.0%} of what can be explained")
+            found = self._one_for_several(self._exchanged(found))
+            known = _known(self.evidence, found)
+            # What is added may be taken back by an exchange: the same effects a second time are the end of it.
+            places = frozenset(f.effect.place for f in found)
+            if places in seen:
+                break
+            seen.add(places)
+        return Outcome(found, self.nothing.fit, known.fit, self.nothing.residual)
+
+    def _best(self, beside: Sequence[Found]) -> Found | None:
+        """The simplest of the best further effects, with its rivals; None where none is worth it."""
+        key = tuple((f.effect.place, f.shape) for f in beside)
+        if key not in self._best_beside:
+            self._best_beside[key] = self._tried(_known(self.evidence, beside) if beside else self.nothing)
+        return self._best_beside[key]
+
+    def _tried(self, known: Known) -> Found | None:
+        current = known.fit.score
+        trials = [
+            trial
+            for trial in self.panel.tried(known, paced(self.progress))
+            if is_worth(self.evidence, current, trial.score)
+            and (current.energy - trial.score.energy >= LEAST_SHARE * self.explainable).any()
+        ]
+        if not trials:
+            return None
+        best = trials[simplest_of_equals(current, [trial.score for trial in trials])]
+        most, whole = gain(current, best.score), float(self.explainable.sum())
+        rivals = [
+            (trial.effect, gain(current, trial.score) / whole)
+            for trial in trials
+            if trial is not best and gain(current, trial.score) >= RIVAL_SHARE * most
+        ]
+        return Found(best.effect, best.shape, min(most / whole, 1.0), rivals)
+
+    def _exchanged(self, found: list[Found]) -> list[Found]:
+        """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
+        for _ in range(_ROUNDS if len(found) > 1 else 0):
+            changed = False
+            for k in range(len(found) - 1, -1, -1):
+                others = [f for i, f in enumerate(found) if i != k]
+                best, label = self._best(others), found[k].effect.label()
+                if best is None:
+                    self.progress(f"beside the others {label} explains nothing")
+                    return self._exchanged(others)
+                if best.effect.place != found[k].effect.place:
+                    self.progress(f"beside the others {best.effect.label()} does better than {label}")
+                    changed = True
+                found = [best if i == k else f for i, f in enumerate(found)]
+            if not changed:
+                break
+        return found
+
+    def _one_for_several(self, found: list[Found]) -> list[Found]:
+        """One effect of the whole arm where it does all that several did: a load shows on every joint."""
+        several = _known(self.evidence, found).fit.score
+        kinds = {f.effect.name for f in found}
+        whole = [
+            e for e in hypotheses(self.evidence.model.arm) if e.joint is None or e.other_joint is not None
+        ]
+        bare = self.nothing.fit.score
+        for effect in whole if len(found) > 1 else []:
+            trial = self.nothing.trial(effect) if effect.name not in kinds else None
+            if trial is not None and not is_behind(bare, trial.score, several):
+                self.progress(f"{effect.label()} explains alone what {len(found)} effects did")
+                share = min(gain(bare, trial.score) / float(self.explainable.sum()), 1.0)
+                return [Found(effect, trial.shapes[-1], share)]
+        return found
 
 
 def _known(evidence: Evidence, found: Sequence[Found]) -> Known:
     return Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
 
 
-def _best(known: Known, listed: Sequence[Effect], explainable: Array, tell: Progress) -> Found | None:
-    """The simplest of the best further effects, with its rivals; None where none is worth it."""
-    trials = []
-    taken = {effect.place for effect in known.fit.effects}
-    for k, effect in enumerate(listed):
-        tell(f"{k} of {len(listed)} hypotheses tried")
-        trial = known.trial(effect) if effect.place not in taken else None
-        if trial is None or not is_worth(known.evidence, known.fit, trial):
-            continue
-        if (by_joint(known.fit, trial) >= LEAST_SHARE * explainable).any():
-            trials.append(trial)
-    if not trials:
-        return None
-    best = simplest_of_equals(known.fit, trials)
-    most = gain(known.fit, best)
-    rivals = [
-        (trial.effects[-1], gain(known.fit, trial) / explainable.sum())
-        for trial in trials
-        if trial is not best and gain(known.fit, trial) >= RIVAL_SHARE * most
-    ]
-    return Found(best.effects[-1], best.shapes[-1], min(most / explainable.sum(), 1.0), rivals)
-
-
-def _exchanged(
-    evidence: Evidence,
-    found: list[Found],
-    listed: Sequence[Effect],
-    explainable: Array,
-    progress: Progress,
-) -> list[Found]:
-    """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
-    for _ in range(_ROUNDS if len(found) > 1 else 0):
-        changed = False
-        for k in range(len(found) - 1, -1, -1):
-            others = [f for i, f in enumerate(found) if i != k]
-            best = _best(_known(evidence, others), listed, explainable, paced(progress))
-            if best is None:
-                progress(f"beside the others {found[k].effect.label()} explains nothing")
-                return _exchanged(evidence, others, listed, explainable, progress)
-            if best.effect.place != found[k].effect.place:
-                progress(
-                    f"beside the others {best.effect.label()} does better than {found[k].effect.label()}"
-                )
-                changed = True
-            found = [best if i == k else f for i, f in enumerate(found)]
-        if not changed:
-            break
-    return found
-
-
-def _one_for_several(
-    evidence: Evidence, nothing: Known, found: list[Found], explainable: Array, progress: Progress
-) -> list[Found]:
-    """One effect of the whole arm where it does all that several did: a load shows on every joint."""
-    several = _known(evidence, found).fit
-    kinds = {f.effect.name for f in found}
-    whole = [e for e in hypotheses(evidence.model.arm) if e.joint is None or e.other_joint is not None]
-    for effect in whole if len(found) > 1 else []:
-        trial = nothing.trial(effect) if effect.name not in kinds else None
-        if trial is not None and not is_behind(nothing.fit, trial, several):
-            progress(f"{effect.label()} explains alone what {len(found)} effects did")
-            share = min(gain(nothing.fit, trial) / explainable.sum(), 1.0)
-            return [Found(effect, trial.shapes[-1], share)]
-    return found
-
-
 def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
     """How each effect found stands out beside the others."""
     found = []
     for k in range(len(outcome.found)):
-        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit
-        found.append(Strength(times_enough(evidence, others, outcome.after), lead(others, outcome.after)))
+        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit.score
+        after = outcome.after.score
+        found.append(Strength(times_enough(evidence, others, after), lead(others, after)))
     return found
 
 
@@ -206,7 +208,7 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     for k in range(len(outcome.found)):
         others = [f for i, f in enumerate(outcome.found) if i != k]
         known = _known(evidence, others)
-        if not is_worth(evidence, known.fit, outcome.after):
+        if not is_worth(evidence, known.fit.score, outcome.after.score):
             return pruned(evidence, Outcome(others, outcome.before, known.fit, outcome.residual))
     return outcome
 

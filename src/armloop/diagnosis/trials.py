@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
-from armloop.laws.effects import Effect
+from armloop.diagnosis.score import Score
+from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array
+from armloop.util.progress import Progress
+from armloop.util.workers import Team
 
 _REFITS = 2
 
@@ -48,7 +52,7 @@ class Known:
     @property
     def error(self) -> float:
         """Held-out squared error, weighted."""
-        return float((self.fit.held_out**2).sum())
+        return self.fit.score.error
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""
@@ -76,6 +80,78 @@ class Known:
         if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
             return None
         return trial if effect.resolved(trial.parameters[-1], shapes) else None
+
+
+class Tried(NamedTuple):
+    """One more effect beside what is known, with the nonlinear parameter chosen for it, and how all of them do."""
+
+    effect: Effect
+    shape: Shape
+    score: Score
+
+
+#: Samples that count, packed, and the effects that are known: their number in the list of hypotheses, and shapes.
+_Task = tuple[bytes, tuple[tuple[int, Shape], ...]]
+
+
+class Hypotheses:
+    """Every effect that may be named, tried beside what is known of a run, each process with its own share of them.
+
+    A column that was computed once serves every further pass; the answers are the same however many processes there are.
+
+    Args:
+        whole: the run; what is known may be known of fewer of its samples.
+        jobs: processes, see :class:`armloop.util.workers.Team`.
+    """
+
+    def __init__(self, whole: Evidence, jobs: int | None = None) -> None:
+        self._bench = _Bench(whole)
+        self._number = {effect.place: k for k, effect in enumerate(self._bench.listed)}
+        self._team = Team(self._bench, jobs)
+
+    def __enter__(self) -> Hypotheses:
+        self._team.__enter__()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self._team.__exit__(*raised)
+
+    def tried(self, known: Known, tell: Progress) -> list[Tried]:
+        """Trials of all further effects that can be there."""
+        numbers = (self._number[effect.place] for effect in known.fit.effects)
+        task = np.packbits(known.evidence.rows).tobytes(), tuple(zip(numbers, known.fit.shapes, strict=True))
+        self._bench.task, self._bench.known = task, known
+        listed = self._bench.listed
+        every = self._team.map(
+            _tried, task, len(listed), lambda k: tell(f"{k} of {len(listed)} hypotheses tried")
+        )
+        return [
+            Tried(effect, *trial) for effect, trial in zip(listed, every, strict=True) if trial is not None
+        ]
+
+
+class _Bench:
+    """A run, all hypotheses, and what was known last."""
+
+    task: _Task | None = None
+    known: Known
+
+    def __init__(self, whole: Evidence) -> None:
+        self.whole, self.listed = whole, hypotheses(whole.model.arm)
+
+
+def _tried(bench: _Bench, task: _Task, k: int) -> tuple[Shape, Score] | None:
+    """The trial of a hypothesis beside others; what is known is fitted by every process for itself."""
+    if bench.task != task:
+        packed, found = task
+        rows = np.unpackbits(np.frombuffer(packed, np.uint8), count=bench.whole.rows.size).astype(bool)
+        evidence = bench.whole.only(rows.reshape(bench.whole.rows.shape))
+        effects, shapes = [bench.listed[number] for number, _ in found], [shape for _, shape in found]
+        bench.known, bench.task = Known.of(evidence, effects, shapes), task
+    effect = bench.listed[k]
+    taken = {known.place for known in bench.known.fit.effects}
+    trial = None if effect.place in taken else bench.known.trial(effect)
+    return None if trial is None else (trial.shapes[-1], trial.score)
 
 
 def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
@@ -113,11 +189,11 @@ def _shape_problem(
     width = each[0].shape[-1]
     parts, left, outside, fold = [], [], [], []
     for j in joints:
-        rows = evidence.rows[:, j]
+        rows = evidence.rows[evidence.independent, j]
         columns = np.hstack([(c if c.ndim == 2 else c[:, j])[rows] for c in each])
         parts.append(columns.reshape(len(columns), len(shapes), width) / evidence.scale[j])
         mine = current.stacked.joint == j
         left.append(current.held_out[mine])
         outside.append(current.outside[:, mine])
-        fold.append(evidence.fold[rows])
+        fold.append(evidence.fold[evidence.independent][rows])
     return np.concatenate(parts), np.concatenate(left), np.hstack(outside), np.concatenate(fold)

@@ -111,7 +111,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     bare = without_effects_at(evidence, outcome, j)
     law = _law(evidence, outcome.after, j)
     if len(bare.found) < len(outcome.found):
-        parameters = outcome.after.complexity - bare.after.complexity
+        parameters = outcome.after.score.complexity - bare.after.score.complexity
         simpler = _law(evidence, bare.after, j)
         left = _energy(outcome.after, j)
         if 0 < len(simpler.terms) <= parameters and simpler.energy <= FAR_LESS * left:
@@ -153,7 +153,7 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
 
 def _follows_a_law(evidence: Evidence, after: Fit, j: int) -> bool:
     """Whether a law explains of a joint's held-out residual what an effect has to: significantly, and enough."""
-    mine, least = after.stacked.joint == j, float(enough(evidence, after)[j])
+    mine, least = after.stacked.joint == j, float(enough(evidence, after.score)[j])
     if _energy(after, j) <= least:
         return False  # even all of it would not be
     before, left = after.held_out[mine] ** 2, _law(evidence, after, j).left ** 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import runpy
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from armloop.model import ReconstructedModel
 from armloop.robot.newton_euler import mass_matrix
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-from armloop.util.files import write_text
+from armloop.util.files import strict, write_text
 from armloop.util.functions import MATH
 from armloop.util.quiet import quiet
 
@@ -61,18 +62,25 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     """
     what = said(model, nearest_friction=False)
     smoothing = _smoothing(model, what)
-    files = [folder / name for name in ("arm.urdf", "model.json", "simulate.py")]
-    write_text(files[0], urdf_text(what))
-    model.save(files[1])
-    write_text(files[2], _PROGRAM.format(step=_STEP, smoothing=smoothing))
-    try:
-        with contextlib.redirect_stdout(io.StringIO()), quiet("drake"):
-            program = runpy.run_path(str(files[2]))
-    except RuntimeError as error:
-        raise InputError(f"{files[2]}: does not run in Drake: {' '.join(str(error).split())}") from error
+    texts = {"arm.urdf": urdf_text(what), "simulate.py": _PROGRAM.format(step=_STEP, smoothing=smoothing)}
     names = [joint.name for joint in model.arm.joints]
-    tau = drake_torque(files[0], names, motion.q, motion.v, motion.vdot)
+    with tempfile.TemporaryDirectory() as place:  # what does not run is not written
+        draft = Path(place)
+        for name, text in texts.items():
+            (draft / name).write_text(text, encoding="utf-8")
+        (draft / "model.json").write_text(strict(model.to_dict()), encoding="utf-8")
+        try:
+            with contextlib.redirect_stdout(io.StringIO()), quiet("drake"):
+                program = runpy.run_path(str(draft / "simulate.py"))
+                tau = drake_torque(draft / "arm.urdf", names, motion.q, motion.v, motion.vdot)
+        except RuntimeError as error:
+            said_why = " ".join(str(error).replace(place, str(folder)).split())
+            raise InputError(f"{folder}: the program does not run in Drake: {said_why}") from error
     tau -= _forces(program, presliding_elements(model), motion.q, motion.v)
+    files = [folder / name for name in ("arm.urdf", "model.json", "simulate.py")]
+    write_text(files[0], texts["arm.urdf"])
+    model.save(files[1])
+    write_text(files[2], texts["simulate.py"])
     whole = whole_torque(model, motion)
     expected = _smoothed(model, what, motion, smoothing)
     missing = [line for line in what.missing if line.startswith(("terms that", "no bodies"))]

@@ -74,7 +74,8 @@ def _described(model: ReconstructedModel, target: str, path: Path, motion: Motio
             consumer = ""
             notes.append(str(error))
         except (RuntimeError, ValueError) as error:  # how Drake and MuJoCo refuse a file
-            raise ModelError(f"{consumer} does not read the {target} of this model: {error}") from error
+            why = str(error).replace(f"{folder}/", "")
+            raise ModelError(f"{consumer} does not read the {target} of this model: {why}") from error
         else:
             difference = np.abs(tau - what.torque(motion.q, motion.v, motion.vdot, features)).max(axis=0)
             unsaid = np.abs(tau - whole).max(axis=0)

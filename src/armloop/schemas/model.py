@@ -259,6 +259,13 @@ def _agree(model: ModelData) -> None:
     for k, mass in enumerate(arm.mass):
         if mass < 0:
             raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
+    names = [joint.name for joint in arm.joints]
+    for k, name in enumerate(names):
+        if not name.strip() or name in names[:k]:
+            fault = "is used twice" if name.strip() else "is empty"
+            raise ModelError(
+                f"arm.joints[{k + 1}].name is {name!r:.60}, which {fault}; give each joint a name of its own"
+            )
     for joint in arm.joints:
         low = float("-inf") if joint.lower is UNSET else joint.lower
         high = float("inf") if joint.upper is UNSET else joint.upper

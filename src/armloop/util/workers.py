@@ -13,7 +13,7 @@ import re
 import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import wraps
 from multiprocessing import get_context
@@ -33,6 +33,11 @@ PATIENCE = 10.0
 _CONNECTED = 3.0
 #: Chunks handed to each worker of a cluster ahead of what has been taken back, so that answers do not pile up.
 _AHEAD = 4
+#: Most processes of a team by default, for each keeps what it has computed; seconds between two looks at how far it is.
+_TEAM, _LOOK = 4, 0.5
+
+#: Whether this process is one of a pool's.
+_forked = False
 
 
 class Workers(Protocol):
@@ -91,6 +96,8 @@ class Pool(ProcessPoolExecutor):
 
 
 def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+    global _forked
+    _forked = True
     # Ctrl-C reaches every process of a terminal; the parent answers it, and ends these.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -107,6 +114,56 @@ def _die_with(parent: int) -> None:
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)
     if os.getppid() != parent:  # it has ended before it could be said
         os._exit(1)
+
+
+class Team:
+    """Forked processes that keep what they have computed: of every list each does the same share.
+
+    Args:
+        held: what every process has; inherited, so it need not be picklable.
+        jobs: how many; all cores by default, up to :data:`_TEAM`; within another pool's process this one alone.
+    """
+
+    def __init__(self, held: Any, jobs: int | None = None) -> None:
+        self.jobs = 1 if _forked else jobs or min(len(os.sched_getaffinity(0)), _TEAM)
+        self._held = held
+        if self.jobs > 1:
+            fork = get_context("fork")
+            self._done = fork.Value("i", 0)
+            self._pool = Pool(
+                self.jobs, _join, (held, fork.Value("i", 0), self._done, fork.Barrier(self.jobs))
+            )
+
+    def __enter__(self) -> Team:
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        if self.jobs > 1:
+            self._pool.__exit__(*raised)
+
+    def map(
+        self, function: Callable[[Any, Any, int], Answer], task: Any, count: int, tell: Callable[[int], None]
+    ) -> list[Answer]:
+        """``function(held, task, k)`` for k below ``count``; exceptions of the function come through.
+
+        Args:
+            task: what they have in common; picklable, as the answers are.
+            tell: called now and then with how many are done.
+        """
+        if self.jobs == 1:
+            answers = []
+            for k in range(count):
+                tell(k)
+                answers.append(function(self._held, task, k))
+            return answers
+        self._done.value = 0
+        shares = [self._pool.submit(_share, function, task, count, self.jobs) for _ in range(self.jobs)]
+        while wait(shares, _LOOK, FIRST_EXCEPTION).not_done and not any(
+            s.done() and s.exception() for s in shares
+        ):
+            tell(self._done.value)
+        given = dict(share.result() for share in shares)
+        return [given[k % self.jobs][k // self.jobs] for k in range(count)]
 
 
 class Processes:
@@ -223,6 +280,29 @@ def _inherited(function: Callable[[Any], Any], chunks: Sequence[Any]) -> Iterato
         yield key
     finally:
         del _INHERITED[key]
+
+
+#: Of a process in a team: its number, what it holds, how many are done, and where all wait for each other.
+_membership: tuple[int, Any, Any, Any]
+
+
+def _join(held: Any, members: Any, done: Any, barrier: Any) -> None:
+    global _membership
+    with members.get_lock():
+        number = members.value
+        members.value += 1
+    _membership = number, held, done, barrier
+
+
+def _share(function: Callable[[Any, Any, int], Any], task: Any, count: int, of: int) -> tuple[int, list[Any]]:
+    number, held, done, barrier = _membership
+    barrier.wait()  # until each has one: else a quick process would take a second, and do its own share twice
+    answers = []
+    for k in range(number, count, of):
+        answers.append(function(held, task, k))
+        with done.get_lock():
+            done.value += 1
+    return number, answers
 
 
 def _call(key: int, index: int) -> Any:

@@ -97,8 +97,13 @@ def watch(
         InputError: models or store cannot be used, or no scheduler answers.
     """
     options = options or Options()
-    known, folder = find_models(models), Store(store)
-    with _workers(options) as workers, folder.locked(options.scheduler is not None):
+    known = find_models(models)
+    with contextlib.ExitStack() as held:
+        workers = held.enter_context(
+            _workers(options)
+        )  # what is wrong with it is said before a store is made
+        folder = Store(store)
+        held.enter_context(folder.locked(options.scheduler is not None))
         counts, places = ingest(folder, known, files, workers, progress)
         stored = {log for log, _ in folder.known()}
         places = {log: path.resolve() for log, path in places.items() if log in stored}

@@ -50,6 +50,8 @@ class Store:
         mark = self.folder / "store.json"
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"{self.folder}: is a file; --store must name a folder")
+        if not self.folder.as_posix().isprintable():  # pyarrow takes paths that are UTF-8 alone
+            raise InputError(f"{self.folder}: the name is no text; --store must name a folder in plain UTF-8")
         if mark.exists():
             found = _read_json(mark).get("schema")
             if found != SCHEMA:

@@ -71,3 +71,67 @@ def test_the_time_covered_leaves_gaps_out():
     time = np.concatenate([np.arange(100) * 0.01, 50 + np.arange(100) * 0.01])
     assert covered_time(time, np.ones(200, bool)) == pytest.approx(1.98)
     assert covered_time(time, np.arange(200) % 5 == 0) == pytest.approx(1.9)
+
+
+def plainly(x, rows, starts, period, lags):
+    """The same area, pair by pair."""
+    z = np.where(rows, x - x[rows].mean(), 0.0)
+    run = np.searchsorted(starts, np.arange(len(x)), side="right")
+    rho = []
+    for lag in range(lags + 1):
+        pairs = [
+            (i, i + lag) for i in range(len(x) - lag) if run[i] == run[i + lag] and rows[i] and rows[i + lag]
+        ]
+        rho.append((lag, len(pairs), sum(z[i] * z[j] for i, j in pairs)))
+    known = [(lag, total / n) for lag, n, total in rho if n > max(1.0, 0.05 * rho[0][1])]
+    area, (before, last) = 0.0, known[0]
+    for lag, value in known[1:]:
+        area += (max(value, 0.0) + max(last, 0.0)) / 2 * (lag - before) * period
+        before, last = lag, value
+        if value <= 0:
+            break
+    return max(2 * area / known[0][1], period)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("lengths", [[150], [90, 60, 7], [40, 110]])
+def test_the_area_is_that_of_every_pair_within_its_run(seed, lengths):
+    N = sum(lengths)
+    rng = np.random.default_rng(seed)
+    x, rows = noise(N, 0.08, seed=seed) + 5.0, rng.uniform(size=N) < 0.8
+    starts = np.cumsum([0, *lengths[:-1]])
+    for used in (np.ones(N, bool), rows):
+        expected = plainly(x, used, starts, 0.01, max(lengths) // 2)
+        assert correlation_time(x, used, motion(lengths), 0.01) == pytest.approx(expected, rel=1e-9)
+
+
+def test_short_and_empty_data_are_worth_their_samples():
+    assert correlation_time(np.zeros(5), np.zeros(5, bool), motion([5]), 0.01) == 0.01
+    assert correlation_time(np.zeros(5), np.ones(5, bool), motion([5]), 0.01) == 0.01
+    assert correlation_time(np.array([1.0, -1.0]), np.ones(2, bool), motion([2]), 0.01) == 0.01
+    # a torque that rises all the time: up to half of the run
+    ramp = np.linspace(-1.0, 1.0, 201)
+    expected = plainly(ramp, np.ones(201, bool), [0], 0.01, 100)
+    assert correlation_time(ramp, np.ones(201, bool), motion([201]), 0.01) == pytest.approx(expected)
+
+
+def test_a_long_run_is_transformed_piece_by_piece():
+    # two pieces, each constant: nothing is known of pairs across the cut, and both halves agree
+    x = np.where(np.arange(1 << 16) < 1 << 15, 1.0, -1.0)
+    found = correlation_time(x, np.ones(len(x), bool), motion([len(x)]), 0.01)
+    assert found == pytest.approx(2 * 4096 * 0.01, rel=1e-6)
+
+
+def test_blocks_are_joined_evenly_when_there_are_too_many():
+    numbers = independent_blocks(motion([10] * 2500), 0.1)
+    assert len(np.unique(numbers)) == 834 == numbers[-1] + 1
+    assert np.unique(numbers, return_counts=True)[1].max() == 30
+    thousand = independent_blocks(motion([10] * 1000), 0.1)
+    assert len(np.unique(thousand)) == 1000
+
+
+def test_no_sample_covers_no_time():
+    time = np.arange(10.0)
+    assert covered_time(time, np.zeros(10, bool)) == 0.0
+    assert covered_time(time, np.arange(10) == 3) == 0.0
+    assert covered_time(np.array([0.0, 1, 2, 2, 12, 23]), np.ones(6, bool)) == pytest.approx(12.0)

@@ -86,3 +86,57 @@ def test_degrees_of_freedom_count_the_blocks_that_matter():
     few = np.where(np.arange(40) < 5, 1.0, 1e-6)[:, None, None]
     uneven = Equations(few, np.zeros((40, 1)), np.ones((40, 1)), np.zeros(1, int), np.ones(1))
     assert uneven.degrees_of_freedom()[0] == pytest.approx(4, rel=0.01)
+
+
+def test_a_step_from_anywhere_ends_at_least_squares():
+    _, sums = equations(*two_steps())
+    away = np.array([0.3, -0.2, 0.5])
+    score = sums.score + np.einsum("bkm,m->bk", sums.jacobian, away)
+    moved = Equations(sums.jacobian, score, sums.count, sums.stage, sums.variance)
+    np.testing.assert_allclose(moved.step(), away, rtol=1e-6)
+
+
+def test_what_all_samples_have_in_common_is_no_error():
+    # a constraint that holds the solution off leaves scores that grow with the samples of each block
+    _, sums = equations(*two_steps())
+    pushed = sums.score + sums.count * np.array([0.3, -0.1, 0.2])
+    held = Equations(sums.jacobian, pushed, sums.count, sums.stage, sums.variance)
+    np.testing.assert_allclose(held.covariance(), sums.covariance(), rtol=1e-9)
+
+
+def test_the_textbooks_covariance_takes_every_sample_as_independent_and_what_is_inherited_as_exact():
+    block, first, X, Z, y = two_steps()
+    theta, sums = equations(block, first, X, Z, y)
+    left = y[first] - X[first] @ theta[:2], y[~first] - X[~first] @ theta[:2] - Z[~first] @ theta[2:]
+    expected = np.zeros((3, 3))
+    for columns, part, place in ((X[first], left[0], slice(0, 2)), (Z[~first], left[1], slice(2, 3))):
+        # the mean square is the variance about the mean in `equations`; what is left of samples less coefficients
+        spread = np.var(part) * len(part) / (len(part) - columns.shape[1])
+        expected[place, place] = spread * np.linalg.inv(columns.T @ columns)
+    np.testing.assert_allclose(sums.independent_covariance(), expected, rtol=1e-6, atol=1e-12)
+
+
+def test_degrees_of_freedom_are_satterthwaites():
+    _, sums = equations(*two_steps(blocks=6))
+    inverse = np.linalg.inv(sums.jacobian.sum(axis=0))
+    same = sums.stage[:, None] == sums.stage
+    # the variance that each block's scores would give each coefficient, were errors independent
+    parts = np.array(
+        [np.diag(inverse @ (np.where(same, J, 0) * sums.variance) @ inverse.T) for J in sums.jacobian]
+    )
+    expected = parts.sum(axis=0) ** 2 / (parts**2).sum(axis=0) - 1
+    np.testing.assert_allclose(sums.degrees_of_freedom(), expected, rtol=1e-6)
+    alone = Equations(np.ones((1, 1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.zeros(1, int), np.ones(1))
+    assert alone.degrees_of_freedom()[0] == 1.0
+
+
+def test_a_column_of_zeros_hurts_no_other():
+    _, sums = equations(*two_steps())
+    wide = np.zeros((sums.blocks, 4, 4))
+    wide[:, :3, :3] = sums.jacobian
+    padded = [np.pad(x, ((0, 0), (0, 1))) for x in (sums.score, sums.count)]
+    more = Equations(wide, *padded, np.append(sums.stage, 1), np.append(sums.variance, 1.0))
+    assert more.scale[3] == 1.0
+    np.testing.assert_allclose(more.scale[:3], 1 / np.sqrt(np.diag(sums.jacobian.sum(axis=0))))
+    np.testing.assert_allclose(more.covariance()[:3, :3], sums.covariance(), rtol=1e-6)
+    assert more.step()[3] == 0.0

@@ -107,7 +107,7 @@ def test_it_goes_on_where_it_was_ended(
     assert main([*call, "--jobs", "2"]) == 0  # from the beginning, in two processes: the same to the bit
     assert json.loads(capsys.readouterr().out) == resumed and len(made) == 4
     assert main([*call, "--jobs", "0"]) == 2
-    assert "--jobs 0: give a number of processes" in capsys.readouterr().err
+    assert "--jobs: '0' is no number of processes; give 1 to 1024" in capsys.readouterr().err
 
 
 def test_a_fit_that_was_kept_serves_its_own_data_and_settings_alone(

@@ -119,6 +119,10 @@ class FoundLaw(Effect):
         ranges = [parameters.get(key) for key in RANGE]
         if any(not isinstance(x, list) or len(x) != len(ranges[0] or []) for x in ranges):
             return f"needs {', '.join(RANGE)}, one number a joint"
+        for end in ("q", "v"):
+            low, high = (parameters[f"{end}_{side}"] for side in ("low", "high"))
+            if any(first > last for first, last in zip(low, high, strict=True)):
+                return f"has a {end}_low above its {end}_high"
         joints = [j for factors, _ in terms for f in factors for j in (f.joint, *(j for j, _ in f.wave))]
         if max(joints, default=0) >= len(ranges[0] or []):
             return "has a term of a joint that its range does not know"
@@ -211,6 +215,8 @@ def _factors(name: str) -> tuple[_Factor, ...]:
             )
         function, inner, plain, power = match.groups()
         size = int(power or 1)
+        if size == 0:
+            raise ModelError(f"unknown term {name!r:.80}: a power is at least 1")
         if plain:
             factors.append(_Factor(plain[0], int(plain[1:]) - 1, power=size))
         elif function == "sign":
