@@ -24,7 +24,7 @@ def test_files_tables_and_a_better_loop(tmp_path):
     assert {key: written[key] for key in answer} == answer
     assert {"bode.png", "step.png"} <= {path.name for path in tmp_path.iterdir()}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 2 and "peak |S|" in page and "step off linear" in page
+    assert page.count('<svg class="wide"') == 2 and "peak |S|" in page and "step off linear" in page
     assert "http" not in page.split("<main", 1)[0].replace("http-equiv", "")
     assert answer["present"]["gains"]["kp"] == [80.0] * 3
     assert answer["present"]["stable"] and answer["proposed"]["stable"]

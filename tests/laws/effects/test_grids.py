@@ -9,9 +9,10 @@ import pytest
 from effect_arm import an_arm
 
 from armloop.data.motion import Motion
-from armloop.laws.effects import EFFECTS, Context, Estimate, effect
+from armloop.laws.effects import EFFECTS, Context, Estimate, effect, hypotheses
 from armloop.laws.effects.found import RANGE, found_law
-from armloop.robot.arm import load_arm
+from armloop.robot.arm import Arm, load_arm
+from armloop.robot.kinematics import nominal_parameters
 
 #: Numbers a run decides about: by these the simplest of equals is named. A payload's inertia follows its mass and centre
 #: but for one number; presliding friction brings the change of its level.
@@ -47,6 +48,7 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
     assert those("needs_model") == of_model
     order = sorted(those("sensor"), key=lambda name: EFFECTS[name].fault_order)
     assert order == ["encoder_offset", "torque_gain", "torque_offset", "time_delay"]
+    assert len({EFFECTS[name].fault_order for name in order}) == 4
     # what a reconstruction finds with the velocity, and with the direction alone
     steps = {
         e.step
@@ -166,3 +168,87 @@ def test_the_unit_of_a_law_found_is_that_of_its_torque_by_its_function(
     assert [found[key].unit for key in RANGE] == ["rad or m", "rad or m", "rad or m/s", "rad or m/s"]
     turning = replace(arm, joints=(arm.joints[0],) * n)
     assert found_law(turning, 1, {}, low, high)[RANGE[2]].unit == "rad/s"
+
+
+#: A drift is over for a controller, and what grows with the load is the model's to say.
+RUBBING = {n for n, kind in EFFECTS.items() if kind.rubs} - {"friction_drift", "load_dependent_friction"}
+
+
+@pytest.mark.parametrize("name", sorted(RUBBING))
+def test_a_joint_at_rest_is_supplied_no_friction_and_either_way_as_much(name: str) -> None:
+    n = an_arm().n
+    own = {p.name: 0.4 if p.default is None else p.default for p in EFFECTS[name].parameters}
+    law = effect(name, 2).pointwise(an_arm(), own, None)
+
+    def at(v: float) -> float:
+        return float(law(np.full(n, 0.3), v * np.eye(n)[1], np.zeros(n))[1])
+
+    assert at(0.0) == 0.0
+    odd = 1.0 if name in ("friction_asymmetry", "viscous_asymmetry") else -1.0
+    for v in (1e-3, 0.5):
+        assert at(v) != 0.0 and at(-v) == pytest.approx(odd * at(v))
+
+
+@pytest.mark.parametrize("link", [0, 2])
+def test_a_push_is_its_columns_times_its_force(link: int) -> None:
+    rng = np.random.default_rng(0)
+    given = context(1.0)
+    given.motion.q[:] = rng.uniform(-2, 2, given.motion.q.shape)
+    push, force = effect("external_contact", None), [5.0, -3.0, 8.0]
+    told = {"start": 0.0, "end": 1.0, "force": force} | ({"link": float(link)} if link else {})
+    torque = push.torque(given, told)
+    np.testing.assert_allclose(push.columns(given, float(link)) @ force, torque, atol=1e-12)
+    assert torque[:, 0].any() and torque[:, 2].any() == (link == 0)
+
+
+def test_every_place_is_asked_once() -> None:
+    asked = [h.place for h in hypotheses(an_arm())]
+    n = an_arm().n
+    for name, kind in EFFECTS.items():
+        joints = range(1, n + 1)
+        places: list[tuple[int | None, int | None]] = [(None, None)]
+        if kind.joint_wise:
+            places = [(j, None) for j in joints]
+        if kind.pair_wise:
+            places = [(j, k) for j in joints for k in joints if j < k]
+        expected = [(name, *place) for place in places] if kind.searched else []
+        assert [place for place in asked if place[0] == name] == expected
+
+
+def test_a_loads_centre_is_within_reach_of_the_flange() -> None:
+    arm = an_arm()
+    chain = np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum()
+
+    def farthest(own: Arm) -> float:
+        def possible(distance: float) -> bool:
+            told = {
+                "mass": Estimate(1.0, 0.0, "kg"),
+                "com": Estimate([0.0, -0.6 * distance, 0.8 * distance], [0.0] * 3, "m"),
+            }
+            return effect("payload", None).plausible(own, told)
+
+        return max(x for x in np.arange(0.005, 5.0, 0.01) if possible(x))
+
+    stub, long = arm.com.copy(), arm.com.copy()
+    stub[-1], long[-1] = 0.0, [0.0, 0.0, 1.2]
+    frames = arm.X_PF.copy()
+    frames[:, :3, 3] *= 0.1 / chain
+    assert farthest(replace(arm, com=stub)) == pytest.approx(0.5 * chain, abs=0.011)
+    assert farthest(replace(arm, com=long)) == pytest.approx(3.0, abs=0.011)
+    assert farthest(replace(arm, com=stub, X_PF=frames)) == pytest.approx(0.15, abs=0.011)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tilts_torque_is_its_columns_times_what_the_angles_make_of_gravity(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    given = context(0.2)
+    given.motion.q[:] = rng.uniform(-2, 2, given.motion.q.shape)
+    # gravity along all three axes: a base that hangs on a wall
+    arm = replace(an_arm(), gravity=np.array([3.0, -5.0, -8.0]))
+    given = replace(given, arm=arm, inertial=nominal_parameters(arm))
+    tilt, angles = effect("gravity_tilt", None), rng.uniform(-0.5, 0.5, 2)
+    beta, J = tilt.embed(angles)
+    torque = tilt.torque(given, {"roll": float(angles[0]), "pitch": float(angles[1])})
+    np.testing.assert_allclose(tilt.columns(given, 0.0) @ beta, torque, atol=1e-9)
+    slopes = [(tilt.embed(angles + h)[0] - tilt.embed(angles - h)[0]) / 2e-6 for h in 1e-6 * np.eye(2)]
+    np.testing.assert_allclose(J.T, slopes, atol=1e-8)
