@@ -61,6 +61,7 @@ class Evidence:
             tell apart, only some.
         blocks: (N,) block of each sample.
         asked: effects that may be asked about.
+        unknown: (N, n) samples of which a joint's torque says nothing, not even that friction may hold it.
     """
 
     model: ReconstructedModel
@@ -71,6 +72,7 @@ class Evidence:
     blocks: NDArray[np.intp]
     context: Context
     asked: tuple[Effect, ...] = ()
+    unknown: NDArray[np.bool_] | None = None
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
 
