@@ -212,7 +212,8 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: np.zeros((4, 1)))
     monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [])
     every: Any = SimpleNamespace(rows=np.ones((4, 1), dtype=bool))
-    monkeypatch.setattr(accounts, "without", lambda whole, contacts: every)
+    beside: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: beside if contacts else every)
     event: Any = SimpleNamespace(share=0.9)
     found = accounts.best_account(every, [event], True, lambda text: None)
     assert (found.unlisted == "everywhere") == kept and not found.contacts  # type: ignore[comparison-overlap]
