@@ -1,6 +1,7 @@
 """The tuning of a scenario, start to end, on a short reference."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -40,5 +41,11 @@ def test_files_tables_and_a_better_loop(tmp_path):
         assert np.interp(0, [-1, 1], phase[[last, last + 1]]) == pytest.approx(
             margin.phase_margin - 180, abs=3
         )
+    # gains of zero close no loop: nothing is drawn of it, and no logarithm of zero is taken
+    none = dataclasses.replace(tuning.present, loops=0 * tuning.present.loops)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        alone = bode_figure(dataclasses.replace(tuning, present=none))
+    assert [len(axes.lines) for axes in alone.axes] == [len(axes.lines) - 1 for axes in bode.axes]
     for table in (gains_table, margins_table, verified_table):
         assert len(table(tuning).rows) == 6
