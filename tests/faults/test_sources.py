@@ -107,6 +107,23 @@ def test_a_source_that_cannot_be_read(name: str, place: Path, capsys: pytest.Cap
     assert not (place / "out.csv").exists() and (not before or contents(place) == before)
 
 
+def test_a_name_that_is_no_text(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = "run\udcff"
+    for suffix in ("csv", "parquet"):
+        (place / f"{name}.{suffix}").write_bytes((place / "other.csv").read_bytes())
+    commands: list[list[str]] = [
+        ["evaluate", "model.json", f"{name}.csv"],
+        ["cluster", f"{name}.parquet"],
+        ["convert", f"{name}.parquet", "--out", "out.csv"],
+    ]
+    for words in commands:
+        assert main(words) == 2
+        one_line(capsys.readouterr().err, "the name is no UTF-8; rename the file")
+    # one of many logs stops nothing
+    assert main(["watch", "--models", "model.json", "--logs", f"{name}.csv", "run.csv", "--store", "s"]) == 0
+    assert "1 set aside" in capsys.readouterr().out
+
+
 def test_features_of_no_known_form_are_let_be(place: Path) -> None:
     set_of({"fps": 100, "features": [1]})(place)
     assert main(["convert", "bad", *SAID.split(), "--out", "out.csv"]) == 0

@@ -84,6 +84,7 @@ def _trace(file: Path, out: Path) -> None:
     """In a process of its own: run the file's quick tests, and write which executed what."""
     import coverage
 
+    sys.path.insert(0, str(ROOT / "src"))
     tracer = coverage.Coverage(
         data_file=None, config_file=False, source=[str(ROOT / PACKAGE)], messages=False
     )

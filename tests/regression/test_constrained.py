@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from armloop.regression.constrained import TooCostly, constrained_least_squares
 
@@ -67,3 +68,69 @@ def test_a_solution_that_violates_a_constraint_in_the_end_is_none(monkeypatch: p
     start = np.array([-3.0, 2.0])
     with pytest.raises(ArithmeticError, match="1 are still violated"):
         constrained_least_squares(np.eye(2), start, start, lambda theta: np.ones((int(theta.sum() < 0), 2)))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_bounds_on_single_coefficients_are_those_of_bounded_least_squares(seed):
+    rng = np.random.default_rng(seed)
+    scale = np.array([1.0, 1e3, 1e-3, 10.0, 1.0, 0.1])
+    X = (rng.normal(size=(40, 6)) + rng.normal(size=(40, 1))) * scale
+    y = X @ (rng.normal(size=6) / scale) + rng.normal(size=40)
+    G, b = X.T @ X, X.T @ y
+    # the first three from below, the fourth from above; a bound once asked for may be idle in the end
+    signs = np.array([1.0, 1.0, 1.0, -1.0, 0.0, 0.0])
+
+    def cuts(theta):
+        return np.array([signs[k] * np.eye(6)[k] for k in range(4) if signs[k] * theta[k] < 0]).reshape(-1, 6)
+
+    theta, rows = constrained_least_squares(G, b, np.linalg.solve(G, b), cuts)
+    low, high = np.where(signs > 0, 0.0, -np.inf), np.where(signs < 0, 0.0, np.inf)
+    expected = lsq_linear(X / scale, y, (low, high), tol=1e-14).x
+    np.testing.assert_allclose(theta * scale, expected, atol=1e-6)
+    # met to the last digit
+    assert (signs * theta >= 0).all()
+    assert rows >= np.count_nonzero(theta == 0)
+
+
+def test_every_constraint_that_was_ever_cut_is_kept_and_counted_once():
+    start, asked = np.array([-1.0, -2.0, 3.0]), []
+
+    def cuts(theta):
+        asked.append(theta)
+        # the second is only asked for when the first is met, together with the first once more
+        rows = ([[1.0, 0, 0]], [[1.0, 0, 0], [0, 1.0, 0]], [])[len(asked) - 1]
+        return np.array(rows).reshape(-1, 3)
+
+    theta, rows = constrained_least_squares(np.eye(3), start, start, cuts)
+    np.testing.assert_allclose(theta, [0.0, 0.0, 3.0], atol=1e-9)
+    assert rows == 2 and len(asked) == 3
+    np.testing.assert_array_equal(asked[0], start)
+    np.testing.assert_allclose(asked[1], [0.0, -2.0, 3.0], atol=1e-9)
+
+
+def test_a_constraint_that_moves_with_every_round_is_none_that_holds():
+    rounds = []
+
+    def cuts(theta):
+        rounds.append(theta)
+        return np.array([[1.0, -1.0]]) if len(rounds) < 21 else np.array([[1.0, -1.0 - 1e-3]])
+
+    # θ1 ≥ θ2 is met at (2, 2); what the last look asks for is violated by 0.002 of 4
+    start = np.array([1.0, 3.0])
+    with pytest.raises(
+        ArithmeticError, match=r"after 20 rounds of new constraints 1 are still violated, by 0\.0005"
+    ):
+        constrained_least_squares(np.eye(2), start, start, cuts)
+    assert len(rounds) == 21
+
+
+def test_the_cost_is_counted_from_where_it_starts():
+    # a start that is not the optimum: it costs 1 already
+    G, b, start = np.eye(1), np.array([-1.0]), np.array([-2.0])
+
+    def cuts(theta):
+        return np.ones((int(theta[0] < 0), 1))
+
+    assert constrained_least_squares(G, b, start, cuts, 0.01)[0] == 0.0
+    with pytest.raises(TooCostly, match="cost 1"):
+        constrained_least_squares(G, b, b, cuts, 0.99)

@@ -119,5 +119,7 @@ def test_columns_of_round_off_have_no_scale_and_no_coefficient():
     np.testing.assert_array_equal(unit_scale(G), [0.5, 0.0, 2.0, 0.0])
     assert unit_scale(np.diag([1.0, 1e-18]))[1] == pytest.approx(1e9)
     assert not unit_scale(np.zeros((2, 2))).any()
+    # columns of any unit
+    np.testing.assert_allclose(unit_scale(1e-24 * np.eye(2)), 1e12)
     beta, _, _ = solve(Moments(G, np.array([4.0, 1e-21, 0.5, 0.0]), 10.0, 5.0), [Linear()], [4])
     np.testing.assert_allclose(beta, [1.0, 0.0, 2.0, 0.0], rtol=1e-7)

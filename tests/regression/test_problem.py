@@ -196,7 +196,8 @@ def test_halves_are_complementary_and_drawn_ones_deviate_as_sums_of_half_the_sam
 def test_a_doubtful_column_goes_only_if_the_criterion_is_better_without_it():
     rng = np.random.default_rng(7)
     X = rng.normal(size=(300, 5))
-    y = X[:, 0] + 0.8 * X[:, 2] + rng.normal(size=300)
+    noise = rng.normal(size=300)
+    y = X[:, 0] + 0.8 * X[:, 2] + noise
     sparse, moments = Sparse(gamma=0.5, correlation=3.0), Moments.of(X, y)
     kept = sparse.prune(moments, np.arange(5), np.array([1, 2, 3]))
     cost = np.log(100.0) + np.log(3.0)
@@ -212,6 +213,15 @@ def test_a_doubtful_column_goes_only_if_the_criterion_is_better_without_it():
         support = shorter if criterion(shorter) < criterion(support) else support
     assert kept.tolist() == support
     assert 2 in support and 1 not in support
+    # a single doubtful column has no rivals: it costs but what it costs
+    for size in (0.0, 0.18, 0.21, 0.25, 1.0):
+        z = X[:, 0] + size * X[:, 4] / np.linalg.norm(X[:, 4]) * np.sqrt(300) + noise
+        left = [
+            np.sum((z - X[:, c] @ np.linalg.lstsq(X[:, c], z, rcond=None)[0]) ** 2) for c in ([0], [0, 4])
+        ]
+        stays = 100 * np.log(left[0] / left[1]) >= np.log(100.0)
+        alone = sparse.prune(Moments.of(X, z), np.array([0, 4]), np.array([4]))
+        assert alone.tolist() == ([0, 4] if stays else [0])
 
 
 def test_what_is_below_round_off_of_a_larger_signal_is_worth_no_term():

@@ -1,5 +1,6 @@
 """Figures show every joint and every controller, and thin lines without losing their extremes."""
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,6 +17,7 @@ from armloop.diagnosis import Diagnosis, close
 from armloop.reports import plots
 from armloop.reports.html import svg
 from armloop.reports.plots import style
+from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import thin, with_gaps
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
 from armloop.util.files import write_figure
@@ -177,6 +179,32 @@ def test_a_picture_is_opaque_and_a_figure_in_a_page_is_not(tmp_path: Path) -> No
     write_figure(tmp_path / "a.png", figure)
     assert (imread(tmp_path / "a.png")[..., 3] == 1).all()
     assert "#ffffff" not in svg(figure)
+
+
+def test_a_narrow_page_has_the_panels_one_below_the_other(loop: SimpleNamespace) -> None:
+    figure = plots.residual_shape_figure(loop.diagnosis)
+    page = svg(figure)
+    assert page.count('<svg class="wide"') == page.count('<svg class="narrow"') == 1
+    boxes = [axes.get_position() for axes in figure.axes]
+    assert figure.get_figwidth() == 4.0
+    assert all(above.y0 > below.y1 for above, below in itertools.pairwise(boxes))
+    assert all(axes.get_xlabel() for axes in figure.axes)
+    assert all(axes.get_ylabel() or "[" in axes.get_title(loc="left") for axes in figure.axes)
+
+
+def test_joints_in_columns_stay_together_on_a_narrow_page(loop: SimpleNamespace) -> None:
+    figure = plots.tracking_figure(loop.tracking)
+    follow, error = figure.axes[: len(figure.axes) // 2], figure.axes[len(figure.axes) // 2 :]
+    assert stack(figure)
+    tops = [axes.get_position().y1 for pair in zip(follow, error, strict=True) for axes in pair]
+    assert tops == sorted(tops, reverse=True)
+
+
+def test_long_names_before_a_panel_leave_a_figure_as_it_is() -> None:
+    rungs = [
+        {"rung": "presliding by load", "before": 0.1, "after": 0.1, "refused": 0.2, "joints": []},
+    ]
+    assert 'class="narrow"' not in svg(plots.ladder_figure(rungs))
 
 
 def test_thinning_keeps_spikes_and_gaps() -> None:

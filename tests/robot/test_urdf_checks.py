@@ -1,6 +1,8 @@
 """A URDF that Drake reads becomes an arm, grippers and branches on request; one that cannot be is refused in one line."""
 
 import os
+import re
+import warnings
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -205,3 +207,28 @@ def test_options_that_name_nothing_are_refused(
     assert main(["excite", str(path), "--out", str(tmp_path / "ref.csv"), *options]) == 2
     error = capsys.readouterr().err
     assert expected in error and error.count("\n") == 1
+
+
+def test_links_without_mass_and_joints_of_no_arm_raise_no_voice_of_drake(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    massless = re.sub(r'<mass value="[^"]*"', '<mass value="0"', GOOD)
+    with pytest.warns(InputWarning, match="<mass> is zero with an <inertia>"):
+        arm = load_arm(write(tmp_path / "a.urdf", massless))
+    assert not arm.mass.any() and not arm.inertia.any()
+    with pytest.raises(ArmError, match="only revolute, continuous, prismatic"):
+        load_arm(write(tmp_path / "a.urdf", GOOD.replace('"continuous"', '"floating"')))
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("izz", [0.07 + 1e-7, 0.0702, 0.5])
+def test_an_inertia_that_misses_the_triangle_inequality_is_taken_to_the_nearest_of_a_body(
+    tmp_path: Path, izz: float
+) -> None:
+    arms = []
+    for each in (0.07, izz):  # 0.03 and 0.04 are the other two principal moments
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)
+            arms.append(load_arm(write(tmp_path / "a.urdf", link("base"), PARTS[1], link("l1", izz=each))))
+    np.testing.assert_allclose(arms[1].inertia, arms[0].inertia, atol=1e-9)
+    np.testing.assert_array_equal(arms[1].mass, arms[0].mass)

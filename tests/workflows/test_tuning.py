@@ -1,6 +1,7 @@
 """The tuning of a scenario, start to end, on a short reference."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def test_files_tables_and_a_better_loop(tmp_path):
     assert {key: written[key] for key in answer} == answer
     assert {"bode.png", "step.png"} <= {path.name for path in tmp_path.iterdir()}
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert page.count("<svg") == 2 and "peak |S|" in page and "step off linear" in page
+    assert page.count('<svg class="wide"') == 2 and "peak |S|" in page and "step off linear" in page
     assert "http" not in page.split("<main", 1)[0].replace("http-equiv", "")
     assert answer["present"]["gains"]["kp"] == [80.0] * 3
     assert answer["present"]["stable"] and answer["proposed"]["stable"]
@@ -40,5 +41,11 @@ def test_files_tables_and_a_better_loop(tmp_path):
         assert np.interp(0, [-1, 1], phase[[last, last + 1]]) == pytest.approx(
             margin.phase_margin - 180, abs=3
         )
+    # gains of zero close no loop: nothing is drawn of it, and no logarithm of zero is taken
+    none = dataclasses.replace(tuning.present, loops=0 * tuning.present.loops)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        alone = bode_figure(dataclasses.replace(tuning, present=none))
+    assert [len(axes.lines) for axes in alone.axes] == [len(axes.lines) - 1 for axes in bode.axes]
     for table in (gains_table, margins_table, verified_table):
         assert len(table(tuning).rows) == 6

@@ -120,7 +120,8 @@ def run(options: argparse.Namespace) -> None:
         random=options.random,
     )
     settings.timing(arm.n)  # faults of the options before anything is computed
-    ranges = read_ranges(options, arm, options.arm if options.arm in urdf_names() else "urdf")
+    whole = options.arm in urdf_names() and not options.lock and options.tip is None
+    ranges = read_ranges(options, arm, options.arm if whole else "urdf")
     tell = progress(options)
     result = excite(arm, ranges, settings, model.predict if model else None, tell)
     ratio = None

@@ -8,9 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from armloop.data.log import MotionLog, read_log, same_measurement
+from armloop.data.log import GAINS, MotionLog, read_log, same_measurement
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm
@@ -78,8 +76,10 @@ def drive_gains(text: str | None) -> list[float] | None:
         gains = [float(part) for part in text.split(",")]
     except ValueError as error:
         raise InputError(f"--drive-gains {text!r}: give one number per joint, separated by commas") from error
-    if not all(np.isfinite(g) and g > 0 for g in gains):
-        raise InputError(f"--drive-gains {text!r}: every gain must be a positive number of N·m/A")
+    if not all(GAINS[0] <= g <= GAINS[1] for g in gains):
+        raise InputError(
+            f"--drive-gains {text!r:.60}: every gain must be a positive number of N·m/A, {GAINS[0]:g} to {GAINS[1]:g}"
+        )
     return gains
 
 

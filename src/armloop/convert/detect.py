@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armloop.convert.recording import Recording
+from armloop.data.tables import check_name
 from armloop.util.errors import LogError
 
 KNOWN = (
@@ -21,6 +22,8 @@ def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | No
     suffix = path.suffix.lower()
     if not (path.is_file() or path.is_dir()):
         raise LogError(f"{path}: is a device or a pipe; give {KNOWN}")
+    if suffix == ".parquet":
+        check_name(path)
     try:
         if suffix in (".db3", ".mcap", ".bag") or (path.is_dir() and (path / "metadata.yaml").is_file()):
             from armloop.convert.rosbag import read_rosbag

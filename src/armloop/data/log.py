@@ -26,6 +26,8 @@ TAU_UNITS = ("N*m", "A")
 GAP_PERIODS = 10.0
 """A pause longer than this many median sample periods starts a new run."""
 FEWEST_SAMPLES = 20
+#: N*m/A (N/A): from below that of a watch to above that of a crane.
+GAINS = (1e-6, 1e6)
 """Fewer rows than this are no motion: filters and derivatives need more."""
 
 _JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
@@ -337,8 +339,10 @@ def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float
     if len(gains) != n:
         raise LogError(f"{path}: {len(gains)} drive gains for {n} joints; give one per joint, in N*m/A")
     for j, gain in enumerate(gains, start=1):
-        if not (np.isfinite(gain) and gain > 0):
-            raise LogError(f"{path}: drive gain {j} is {gain:g}; it must be a positive number of N*m/A")
+        if not GAINS[0] <= gain <= GAINS[1]:
+            raise LogError(
+                f"{path}: drive gain {j} is {gain:g}; it must be a positive number of N*m/A, {GAINS[0]:g} to {GAINS[1]:g}"
+            )
     return gains
 
 

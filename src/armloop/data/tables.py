@@ -116,6 +116,15 @@ def place(path: Path, row: int) -> str:
 def _check_suffix(path: Path) -> None:
     if path.suffix not in (CSV, PARQUET):
         raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
+    check_name(path)
+
+
+def check_name(path: Path) -> None:
+    """Raise ``LogError`` for a name that is no UTF-8: pyarrow opens no such file."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        raise LogError(f"{path}: the name is no UTF-8; rename the file") from error
 
 
 def _parquet_header(path: Path) -> list[str]:

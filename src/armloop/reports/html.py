@@ -17,6 +17,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from armloop import __version__
+from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import GRID, INK, MUTED, SURFACE
 from armloop.reports.tables import Table
 
@@ -131,12 +132,23 @@ def tied(text: str) -> str:
 
 
 def svg(figure: Figure | str) -> str:
-    """A figure as an ``<svg>`` element that takes its frame colours from the page; one drawn already as it is."""
+    """A figure as ``<svg>`` elements that take their frame colours from the page; one drawn already as it is.
+
+    A figure of several panels comes twice, as drawn and with its panels one below the other: the page shows the one
+    that suits its width. The figure itself is left stacked.
+    """
     if isinstance(figure, str):
         return figure
+    wide = _drawn(figure, "wide")
+    return wide + _drawn(figure, "narrow") if stack(figure) else wide
+
+
+def _drawn(figure: Figure, variant: str) -> str:
+    """One ``<svg>`` of the class ``variant``."""
     text = io.StringIO()
-    # a fixed salt makes equal figures equal text; without a date the file does not change from run to run
-    with matplotlib.rc_context({"svg.hashsalt": "armloop", "svg.fonttype": "path"}):
+    # A fixed salt makes equal figures equal text; without a date the file does not change from run to run. Each variant
+    # has identifiers of its own, for what is hidden must not be referred to.
+    with matplotlib.rc_context({"svg.hashsalt": f"armloop {variant}", "svg.fonttype": "path"}):
         # without its background: the page has its own, light or dark
         figure.savefig(text, format="svg", dpi=_DPI, metadata={"Date": None}, transparent=True)
     body = text.getvalue()
@@ -152,7 +164,7 @@ def svg(figure: Figure | str) -> str:
     # the page decides the width; the view box keeps the proportions
     body = re.sub(r' (?:width|height)="[\d.]+pt"', "", body, count=2)
     width = f"--width:{_REM_PER_INCH * figure.get_figwidth():.1f}rem"
-    return body.replace("<svg ", f'<svg style="{width}" role="img" ', 1)
+    return body.replace("<svg ", f'<svg class="{variant}" style="{width}" role="img" ', 1)
 
 
 def _shorter(match: re.Match[str]) -> str:

@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.robot.urdf import base_links, read_urdf, serial_chain
+from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, serial_chain
 from armloop.util.arrays import Array
 from armloop.util.errors import ArmError
+from armloop.util.quiet import quiet
 from armloop.util.resources import urdf_names, urdf_path
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
@@ -235,6 +236,8 @@ def mechanics_only(root: ElementTree.Element) -> str:
         for child in list(copy):
             if child.tag in {"visual", "collision"}:
                 copy.remove(child)
+        if copy.tag == "link":
+            as_of_a_body(copy)
         slim.append(copy)
     return ElementTree.tostring(slim, encoding="unicode")
 
@@ -247,8 +250,9 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
 
     plant = MultibodyPlant(time_step=0.0)
     try:
-        parser = Parser(plant)
-        (instance,) = parser.AddModelsFromString(mechanics_only(root), "urdf")
+        # What it warns of (links without mass, joints it does not know) is checked here or in `urdf`.
+        with quiet("drake"):
+            (instance,) = Parser(plant).AddModelsFromString(mechanics_only(root), "urdf")
         base = _base_link(root, path)
         # A root link called "world" is Drake's world itself: nothing is left to weld.
         if base != "world":

@@ -27,6 +27,7 @@ _LARGEST = {"lower": 1e6, "upper": 1e6}
 _LARGEST_ELSE = 1e12
 # Principal moments may miss the triangle inequality by so much of the largest before it is said: rounding in CAD.
 _TRIANGLE = 0.01
+_TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def read_urdf(path: Path) -> Element:
@@ -197,13 +198,42 @@ def _check_inertial(link: Element, path: Path) -> None:
         raise ArmError(
             f"{where}: <inertia> is not positive definite: a principal moment is {least:.4g} kg·m²; no body has it"
         )
-    if mass > 0 and most == 0:
+    if mass == 0 and most > 0:
+        warn(
+            f"{where}: <mass> is zero with an <inertia>, which no body has; the link is taken for one without either"
+        )
+    elif mass > 0 and most == 0:
         warn(f"{where}: <inertia> is zero with a mass of {mass:g} kg; it is taken for a point")
     elif least + middle < most * (1 - _TRIANGLE):
         warn(
             f"{where}: <inertia> has principal moments {least:.4g}, {middle:.4g}, {most:.4g} kg·m²; of a body, two add "
-            "up to at least the third"
+            "up to at least the third, which is taken to be their sum"
         )
+
+
+def as_of_a_body(link: Element) -> None:
+    """Change a checked link's <inertial> to the nearest that a body has, in place; most have one.
+
+    Without mass there is no inertia, and no principal moment is above the sum of the others: Drake would put a ball of
+    water in the place of what misses this by the rounding of its digits alone.
+    """
+    inertial = link.find("inertial")
+    if inertial is None:
+        return
+    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    assert mass is not None and tensor is not None
+    if float(mass.get("value", "0")) == 0:
+        link.remove(inertial)
+        return
+    xx, xy, xz, yy, yz, zz = (float(tensor.get(key, "0")) for key in _TENSOR)
+    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if moments[0] >= 0 and moments[2] <= moments[0] + moments[1]:
+        return
+    moments = np.maximum(moments, 0.0)
+    moments[2] = min(moments[2], (moments[0] + moments[1]) * (1 - 1e-9))
+    body = (axes * moments) @ axes.T
+    for key, value in zip(_TENSOR, body[np.triu_indices(3)], strict=True):
+        tensor.set(key, repr(float(value)))
 
 
 def _check_joint(joint: Element, links: list[str], path: Path) -> None:

@@ -31,6 +31,8 @@ class _Guard:
         self.inputs: set[tuple[int, int]] = set()
         self.locks: list[int] = []
         self.made: list[Path] = []
+        #: What each output file was asked for by.
+        self.taken: dict[Path, str] = {}
 
 
 _guard: _Guard | None = None
@@ -151,11 +153,15 @@ def take_file(path: str | Path | None, option: str) -> None:
     """Check the place of an output file before any work is done; None is no output.
 
     Raises:
-        InputError: as :func:`target`, or its folder cannot be written to.
+        InputError: as :func:`target`, its folder cannot be written to, or another output goes there.
     """
     if path is None:
         return
     real = target(path, option)
+    if _guard is not None and _guard.taken.setdefault(real, option) != option:
+        raise InputError(
+            f"{path}: is given to {_guard.taken[real]} and to {option}; give each a name of its own"
+        )
     existing = real.parent
     try:
         while _status(existing) is None:

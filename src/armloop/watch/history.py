@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import Units, unit_edges
+from armloop.util.errors import InputError
 from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix
 
 
@@ -32,7 +34,8 @@ class Head:
         """Read the head and the columns of one file of a store."""
         import pyarrow.parquet
 
-        about = json.loads(pyarrow.parquet.read_schema(path).metadata[b"armloop"])
+        with _readable(path):
+            about = json.loads(pyarrow.parquet.read_schema(path).metadata[b"armloop"])
         head = Head(about["when"], about["name"], digests(path)[0], about["programme"], path)
         return head, tuple(Column.of(key) for key in about["columns"])
 
@@ -61,7 +64,10 @@ class History:
         pieces: list[tuple[int, int, int]] = []
         number = _numbers(heads)
         for index, head in enumerate(heads):
-            table = pyarrow.parquet.read_table(head.path, columns=names, use_threads=False, partitioning=None)
+            with _readable(head.path):
+                table = pyarrow.parquet.read_table(
+                    head.path, columns=names, use_threads=False, partitioning=None
+                )
             seconds, start = table["seconds"].to_numpy(), table["start"].to_numpy()
             values = {name: matrix(table[name]) for name in (*PER_JOINT, "moment", "size")}
             since = table["since_start"].to_numpy()
@@ -111,12 +117,29 @@ class History:
         for k, unit in enumerate(index):
             path = self.logs[self.units.log[unit]].path
             _, first, last = self.pieces[unit].tolist()
-            table = pyarrow.parquet.read_table(path, columns=["gram"], use_threads=False, partitioning=None)
+            with _readable(path):
+                table = pyarrow.parquet.read_table(
+                    path, columns=["gram"], use_threads=False, partitioning=None
+                )
             packed = matrix(table["gram"])[first:last].sum(axis=0)
             gram[k][upper] = packed
             gram[k].T[upper] = packed
         units = np.asarray(index, dtype=np.intp)
         return Normal(gram, self.units.moment[units], self.units.energy[units].sum(axis=1))
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Raise ``InputError`` in place of what pyarrow says of a file that is broken."""
+    import pyarrow
+
+    try:
+        yield
+    except (pyarrow.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+        why = " ".join(str(error).split())
+        raise InputError(
+            f"{path}: the sums cannot be read ({why:.150}); move the file away, and its log is read anew"
+        ) from error
 
 
 def _numbers(heads: Sequence[Head]) -> dict[str, int]:

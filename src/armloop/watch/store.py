@@ -232,7 +232,7 @@ def matrix(column: Any) -> Array:
 def _read_json(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); move it away, and it is made anew") from error
     if not isinstance(value, dict):
         raise InputError(f"{path}: holds no JSON object; move it away, and it is made anew")

@@ -1,6 +1,7 @@
 """Proposed gains have what was asked for, and the linear loop is what the simulated arm does."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -55,6 +56,16 @@ def test_a_models_posture_is_the_arms():
     theirs = posture_model(plant.arm, plant.config.friction, Q0["three_axis"])
     for a, b in zip(ours, theirs, strict=True):
         assert_allclose(a, b, atol=1e-6)
+
+
+def test_a_loop_that_is_not_stable_ends_where_numbers_do():
+    plant = load_plant("three_axis")
+    linear = posture_model(plant.arm, plant.config.friction, Q0["three_axis"])
+    gains = PidGains([1e12] * 3, [0.0] * 3, [0.0] * 3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, motion = linear_step(SampledArm.of(linear, 1e-3), gains, np.full(3, 0.01), 0.4)
+    assert np.isfinite(motion[:3]).all() and np.isnan(motion[-1]).all() and not np.isinf(motion).any()
 
 
 @pytest.mark.parametrize("name", Q0)

@@ -69,3 +69,94 @@ def test_what_cannot_be_worth_it_is_not_judged() -> None:
     own = projected(X, y, rows)
     assert own.trial(columns, worth=0.05) is None
     assert own.trial(np.zeros_like(columns)) is None
+
+
+def by_hand(X: np.ndarray, Z: np.ndarray, y: np.ndarray, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    """Residual of every row without and with further columns, fitted on the other folds."""
+    left, right = np.empty(len(y)), np.empty(len(y))
+    for k in range(FOLDS):
+        mine = rows.fold == k
+        for out, A in ((left, X), (right, np.hstack([X, Z]))):
+            out[mine] = y[mine] - A[mine] @ np.linalg.lstsq(A[~mine], y[~mine], rcond=None)[0]
+    return left, right
+
+
+@pytest.mark.parametrize("law", [0.3, 0.05])
+def test_what_is_told_of_a_law_is_told_of_the_rows_that_judge(law: float) -> None:
+    X, y, columns, rows = problem(3, law)
+    # the second joint feels little of it; the ends of blocks do not judge
+    columns[:, 1] *= 0.2
+    inside = rows.sample % 50 > 5
+    rows = Rows(rows.sample, rows.joint, rows.weight, rows.fold, rows.block, inside)
+    trial = projected(X, y, rows).trial(columns)
+    assert trial is not None
+    left, right = by_hand(X, columns[rows.sample, rows.joint], y, rows)
+    a, b = left[inside] ** 2, right[inside] ** 2
+    gained = [(a - b)[rows.joint[inside] == j].sum() for j in (0, 1)]
+    most = int(np.argmax(gained))
+    here = rows.joint[inside] == most
+    assert trial.removed == pytest.approx(sum(gained), rel=1e-3, abs=1e-3)
+    assert trial.share == pytest.approx(gained[most] / a[here].sum(), rel=1e-3, abs=1e-6)
+    blocks = rows.block[inside][here]
+    sums = [(a[here][blocks == k].sum(), b[here][blocks == k].sum()) for k in np.unique(blocks)]
+    parts = np.array([(x - z) / (x + z) for x, z in sums])
+    assert trial.blocks == len(parts) == 40
+    assert trial.score == pytest.approx(parts.sum() / (np.sqrt(40) * parts.std(ddof=1)), rel=1e-2, abs=1e-3)
+    fold = rows.fold[inside]
+    gains = [(a - b)[fold == k].sum() > 0 for k in range(FOLDS)]
+    assert trial.everywhere == (np.mean(gains) >= 0.8)
+
+
+def test_its_covariance_is_the_sandwich_over_blocks_of_what_is_new_in_it() -> None:
+    X, y, columns, rows = problem(1, 0.3)
+    trial = projected(X, y, rows).trial(columns)
+    assert trial is not None
+    Z = columns[rows.sample, rows.joint]
+    new = Z - X @ np.linalg.lstsq(X, Z, rcond=None)[0]
+    left = y - np.hstack([X, Z]) @ np.linalg.lstsq(np.hstack([X, Z]), y, rcond=None)[0]
+    scores = np.array([(new[rows.block == k] * left[rows.block == k, None]).sum(axis=0) for k in range(40)])
+    bread = np.linalg.inv(new.T @ new)
+    np.testing.assert_allclose(trial.covariance, bread @ scores.T @ scores @ bread, rtol=1e-3)
+
+
+def test_a_law_of_one_joint_is_judged_on_its_rows_and_weights_count() -> None:
+    X, y, columns, rows = problem(2, 0.3)
+    columns[:, 1] = 0.0
+    weight = np.where(rows.joint == 0, 2.0, 0.5)
+    weighted = Rows(rows.sample, rows.joint, weight, rows.fold, rows.block, rows.inside)
+    trial = projected(X * weight[:, None], y * weight, weighted).trial(columns)
+    assert trial is not None
+    Z = columns[rows.sample, rows.joint] * weight[:, None]
+    both = np.hstack([X * weight[:, None], Z])
+    together = np.linalg.lstsq(both, y * weight, rcond=None)[0]
+    np.testing.assert_allclose(trial.coefficients, together[6:], rtol=1e-3)
+    assert trial.blocks == 40
+
+
+def test_a_fold_that_alone_gains_makes_no_law_of_all() -> None:
+    X, y, columns, rows = problem(5)
+    Z = columns[rows.sample, rows.joint]
+    for folds, everywhere in (((0, 1, 2, 3, 4), True), ((0, 1, 2, 3), True), ((0, 1), False)):
+        there = np.isin(rows.fold, folds)
+        trial = projected(X, y + np.where(there, 1.0, -1.0) * Z[:, 0], rows).trial(columns)
+        assert trial is not None and trial.everywhere == everywhere
+
+
+def test_a_prior_draws_the_models_own_coefficients() -> None:
+    X, y, columns, rows = problem(0, 0.3)
+    precision, centre = np.diag([3000.0, 0.0, 500.0, 0, 0, 0]), np.array([2.0, 0, -1.0, 0, 0, 0])
+    trial = Projected(X, y, rows, (precision, precision @ centre), X).trial(columns)
+    assert trial is not None
+    both = np.hstack([X, columns[rows.sample, rows.joint]])
+    G, b = both.T @ both, both.T @ y
+    G[:6, :6] += precision
+    b[:6] += precision @ centre
+    np.testing.assert_allclose(trial.coefficients, np.linalg.solve(G, b)[6:], rtol=1e-3)
+
+
+def test_stretches_of_rows_share_joint_and_fold() -> None:
+    joint, fold = np.array([0, 0, 0, 1, 1, 1, 1]), np.array([0, 0, 1, 1, 0, 0, 2])
+    zeros = np.zeros(7, dtype=int)
+    rows = Rows(zeros, joint, np.ones(7), fold, zeros, np.ones(7, dtype=bool))
+    expected = [(0, 0, 0, 2), (0, 1, 2, 3), (1, 1, 3, 4), (1, 0, 4, 6), (1, 2, 6, 7)]
+    assert [(j, f, s.start, s.stop) for j, f, s in rows.pieces()] == expected

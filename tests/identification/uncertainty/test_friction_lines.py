@@ -44,3 +44,55 @@ def test_the_line_follows_a_law_that_is_none() -> None:
     assert found["viscous"]["value"] == pytest.approx(0.5 * (low + high), rel=0.02)
     assert found["coulomb"]["value"] < 0.3
     assert line([], np.zeros((0, 0))) == {}
+
+
+def test_the_line_is_that_of_speeds_at_which_the_direction_is_all_there() -> None:
+    def speeds(*parameters: float) -> list[float]:
+        law = [FrictionTerm("smooth_sign", 0.3, p) for p in parameters] or [FrictionTerm("sign", 0.3)]
+        return line([*law, FrictionTerm("viscous", 1.0)], np.zeros((len(law) + 1,) * 2))["speeds"]
+
+    v = np.abs(fourier_motion(20.0, 50.0, 1).v[:, 0])
+    low, high = np.quantile(v[v > 0.05], [0.1, 0.95])
+    assert speeds() == pytest.approx([low, high]) == speeds(1e-4)
+    # three times the parameter of the slowest to fade in, and half of the range at most
+    faded = 0.3 * high
+    assert speeds(faded / 3, 1e-3) == pytest.approx([faded, high])
+    assert speeds(1e-3, high) == pytest.approx([high / 2, high])
+
+
+def test_the_stribeck_falls_own_velocity_has_its_part_in_the_error() -> None:
+    law = [FrictionTerm("sign", 0.5), FrictionTerm("stribeck", 0.3, 0.4), FrictionTerm("viscous", 1.0)]
+    model = replace(true_model(), friction=FrictionLaw((tuple(law), (), ())))
+    motion = fourier_motion(20.0, 50.0, 1)
+    samples = Samples(motion, np.zeros_like(motion.q), np.ones(motion.q.shape, dtype=bool), 0.02)
+    rows = np.abs(motion.v[:, 0]) > 0.05
+    names = [law[0].name(1), law[1].name(1), "v_s", law[2].name(1)]
+    own = np.diag([0.0, 0.0, 0.05**2, 0.0])
+    found = friction_line(model, 0, names, own, 12.34, samples, rows)
+
+    def moved(by: float) -> dict:
+        terms = (law[0], replace(law[1], parameter=0.4 + by), law[2])
+        other = replace(model, friction=FrictionLaw((terms, (), ())))
+        return friction_line(other, 0, names, own, 12.34, samples, rows)
+
+    for key in ("coulomb", "viscous"):
+        slope = (moved(1e-4)[key]["value"] - moved(-1e-4)[key]["value"]) / 2e-4
+        assert found[key]["std_error"] == pytest.approx(0.05 * abs(slope), rel=1e-3)
+        assert found[key]["degrees_of_freedom"] == 12.3
+    nothing = friction_line(model, 0, names, own, 9.0, samples, np.zeros_like(rows))
+    assert nothing == {}
+
+
+def test_what_grows_with_the_load_and_what_is_constant_is_no_part_of_it() -> None:
+    plain = line([FrictionTerm("sign", 0.5), FrictionTerm("viscous", 1.0)], np.zeros((2, 2)))
+    more = [
+        FrictionTerm("sign", 0.5),
+        FrictionTerm("viscous", 1.0),
+        FrictionTerm("load_sign", 0.2),
+        FrictionTerm("offset", 9.0),
+    ]
+    found = line(more, np.zeros((4, 4)))
+    assert found["coulomb"]["value"] == pytest.approx(plain["coulomb"]["value"])
+    assert found["viscous"]["value"] == pytest.approx(plain["viscous"]["value"])
+    slid = line([FrictionTerm("hysteresis", 0.5, 0.01), FrictionTerm("viscous", 1.0)], np.zeros((2, 2)))
+    assert slid["coulomb"]["value"] == pytest.approx(0.5) and slid["viscous"]["value"] == pytest.approx(1.0)

@@ -46,13 +46,17 @@ class _Hold:
 
 
 def linear_step(sampled: SampledArm, gains: PidGains, step: Array, duration: float) -> tuple[Array, Array]:
-    """Return time (N,) and the motion (N, n) of the linear loop after a step (n,) of all references at once."""
+    """Return time (N,) and the motion (N, n) of the linear loop after a step (n,) of all references at once.
+
+    The motion is NaN from where a loop that is not stable has left what numbers can say.
+    """
     A, B = sampled.closed(gains)
     n, steps = len(gains.kp), round(duration / sampled.period) + 1
     C = np.hstack([np.eye(n), np.zeros((n, 2 * n))])
     inputs = np.outer(np.arange(steps) > 0, step)
-    time, y, _ = dlsim((A, B, C, np.zeros((n, n)), sampled.period), inputs)
-    return np.asarray(time), np.asarray(y)
+    with np.errstate(over="ignore", invalid="ignore"):
+        time, y, _ = dlsim((A, B, C, np.zeros((n, n)), sampled.period), inputs)
+    return np.asarray(time), np.where(np.isfinite(y), y, np.nan)
 
 
 def simulated_step(

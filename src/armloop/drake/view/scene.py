@@ -90,7 +90,10 @@ def _add_arm(
         ElementTree.SubElement(material, "color", rgba=rgba)
     links = {link.get("name", "") for link in root.findall("link")}
     children = {child.get("link", "") for child in root.findall("joint/child")}
-    (instance,) = Parser(plant).AddModelsFromString(ElementTree.tostring(root, encoding="unicode"), "urdf")
+    with quiet("drake"):  # what there is to warn of was said when the arm was loaded
+        (instance,) = Parser(plant).AddModelsFromString(
+            ElementTree.tostring(root, encoding="unicode"), "urdf"
+        )
     (base,) = links - children
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance), X_WB)
     return instance

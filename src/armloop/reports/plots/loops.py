@@ -32,6 +32,8 @@ def bode_figure(tuning: Tuning) -> Figure:
         magnitude, phase = grid[0, j], grid[1, j]
         for label, color, loop in _both(tuning):
             L, hertz = loop.loops[:, j], loop.w / (2 * np.pi)
+            if not np.any(L):  # gains of zero close no loop: there is nothing to draw on logarithmic axes
+                continue
             magnitude.loglog(hertz, np.abs(L), color=color, linewidth=1.4, label=label)
             phase.semilogx(hertz, _phase(L), color=color, linewidth=1.4, label=label)
             grid[2, j].loglog(hertz, np.abs(1 / (1 + L)), color=color, linewidth=1.4, label=label)

@@ -126,6 +126,28 @@ def legend(target: Axes | Figure, columns: int = 4) -> None:
         text.set_color(INK)
 
 
+def legend_above(made: Figure, width: float) -> float:
+    """Lay a figure's legends out anew within ``width`` inches; returns the room they take above the axes, inches."""
+    top = 0.1
+    for shown in list(made.legends):
+        artists, labels = list(shown.legend_handles), [text.get_text() for text in shown.get_texts()]
+        shown.remove()
+        letters = max(map(len, labels), default=1)
+        columns = min(max(1, int((width - 0.3) / (0.08 * letters + 0.5))), max(len(labels), 1))
+        made.legend(
+            [artist for artist in artists if artist is not None],
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(0.02, 1.0),
+            ncols=columns,
+            frameon=False,
+            fontsize=9.5,
+            labelcolor=INK,
+        )
+        top += 0.21 * -(-len(labels) // columns)
+    return top
+
+
 def thin(x: Array, y: Array, points: int = MOST_POINTS) -> tuple[Array, Array]:
     """Reduce a line (N,) to about ``points``, keeping the least and the largest value of every piece.
 

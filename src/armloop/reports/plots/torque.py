@@ -49,6 +49,6 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
         below.margins(x=0.01)
         what, of = "torque" if joint.kind == "revolute" else "force", unit(joint.torque_unit)
         polish(axes, "", f"{what} [{of}]", f"Joint {j + 1}")
-        polish(below, "time [s]" if j == n - 1 else "", f"residual [{of}]")
+        polish(below, "time [s]" if j == n - 1 else "", f"left [{of}]")
     legend(made, 5)
     return made

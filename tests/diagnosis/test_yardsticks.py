@@ -1,0 +1,264 @@
+"""What counts as evidence, and when one fit beats another: each rule at its edge."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion, Samples
+from armloop.diagnosis import evidence as evidences
+from armloop.diagnosis.evidence import Evidence, Stacked
+from armloop.diagnosis.fit import Fit, Shape, block_covariance
+from armloop.diagnosis.judgement import (
+    enough,
+    gain,
+    is_behind,
+    is_worth,
+    lead,
+    lead_of,
+    simplest_of_equals,
+    times_enough,
+)
+
+
+def samples(
+    q: np.ndarray, moving: np.ndarray, starts: tuple[int, ...] = (0,), period: float = 0.01
+) -> Samples:
+    time = np.arange(len(q)) * period
+    v = np.gradient(q, period, axis=0)
+    return Samples(
+        Motion(time, q, v, np.gradient(v, period, axis=0), np.array(starts)), 0 * q, moving, period
+    )
+
+
+def a_model(**history: Any) -> Any:
+    return SimpleNamespace(history=history, arm=SimpleNamespace(n=2))
+
+
+def test_a_joint_that_gets_nowhere_has_not_slid_however_it_shakes() -> None:
+    q = np.zeros((100, 2))
+    q[20:40, 0], q[60:80, 0] = np.linspace(0, 0.021, 20), np.linspace(0, 0.019, 20)
+    q[:, 1] = np.linspace(0, 1, 100)
+    moving = np.zeros((100, 2), dtype=bool)
+    moving[20:40, 0] = moving[60:80, 0] = True
+    moving[:, 1] = True
+    # two parts in a thousand of half the range, 10 rad
+    sliding = evidences._sliding(samples(q, moving), a_model(range=[[10.0, 10.0], [1, 1], [1, 1], [0, 0]]))
+    assert np.flatnonzero(sliding[:, 0]).tolist() == list(range(20, 40))
+    assert sliding[:, 1].all()
+    # of a range that is unknown: two mrad
+    assert evidences._sliding(samples(q, moving), a_model())[60:80, 0].all()
+    assert not evidences._sliding(samples(0.1 * q, moving), a_model())[60:80, 0].any()
+    # each run's stretch on its own: what lies between two runs is no way
+    q[:, 0] = np.where(np.arange(100) < 30, 0.0, 1.0)
+    moving[20:40, 0] = True
+    sliding = evidences._sliding(samples(q, moving, (0, 30)), a_model())
+    assert not sliding[:, 0].any()
+    assert moving[20:40, 0].all()
+
+
+def test_what_lies_far_outside_the_trained_range_is_not_judged() -> None:
+    q, v, vdot = np.array([[1.0, 0.0]]), np.array([[0.0, -2.0]]), np.array([[0.5, 3.0]])
+    motion = Motion(np.zeros(1), q, v, vdot, np.array([0]))
+
+    def far(half: float, speed: float, acceleration: float, centre: float) -> list[bool]:
+        ranges = [[x, x] for x in (half, speed, acceleration, centre)]
+        return evidences.far_outside(motion, ranges)[0].tolist()
+
+    assert far(1.0, 2.0, 3.0, 0.0) == [False, False]
+    assert far(0.8, 2.0, 3.0, 0.0) == [True, False]
+    assert far(0.84, 2.0, 3.0, 0.0) == [False, False]
+    assert far(1.0, 1.6, 3.0, 0.0) == [False, True]
+    assert far(1.0, 2.0, 2.4, 0.0) == [False, True]
+    assert far(0.5, 2.0, 3.0, 0.5) == [False, False]
+    assert far(0.1, 2.0, 3.0, 0.5) == [True, True]
+    assert evidences.far_outside(motion, None).tolist() == [[False, False]]
+
+
+def test_a_joint_creeps_below_a_hundredth_of_its_trained_speed() -> None:
+    assert evidences.creep(a_model(range=[[1, 1], [2.0, 3.0], [1, 1], [0, 0]])).tolist() == [0.02, 0.03]
+    assert evidences.creep(a_model()).tolist() == [1e-3, 1e-3]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "length"), [(60.0, 1.5), (12.0, 1.5), (10.0, 1.25), (8.0, 1.0), (3.0, 1.0)]
+)
+def test_a_short_run_is_cut_into_shorter_blocks(seconds: float, length: float) -> None:
+    N = round(seconds / 2 * 100) + 1
+    time = np.concatenate([np.arange(N), np.arange(N) + 10 * N]) * 0.01
+    motion = Motion(time, *np.zeros((3, 2 * N, 1)), np.array([0, N]))
+    assert evidences._block_seconds(motion) == pytest.approx(length)
+
+
+def an_evidence() -> Evidence:
+    """Two joints and six samples, of which joint 2 counts in two and neither in the last."""
+    motion = Motion(np.arange(6.0), *np.zeros((3, 6, 2)), np.array([0]))
+    rows = np.array([[1, 0], [1, 1], [1, 0], [1, 0], [0, 1], [0, 0]], dtype=bool)
+    given = Samples(motion, np.arange(12.0).reshape(6, 2), rows, 1.0)
+    return Evidence(
+        cast(Any, None),
+        given,
+        np.array([2.0, 0.5]),
+        np.ones(2),
+        rows,
+        np.array([0, 0, 1, 1, 2, 2]),
+        cast(Any, None),
+    )
+
+
+def test_rows_are_weighed_by_what_the_model_leaves_of_each_joint() -> None:
+    given = an_evidence()
+    assert given.kept.tolist() == [0, 1, 2, 3, 4]
+    assert given.row_samples.tolist() == [0, 1, 1, 2, 3, 4]
+    assert given.fold.tolist() == [0, 0, 1, 1, 0, 0]
+    residual = np.arange(12.0).reshape(6, 2)
+    columns = 100 + np.arange(10.0).reshape(5, 2, 1)
+    stacked = given.stack(residual, [columns, 2 * columns])
+    assert stacked.joint.tolist() == [0, 0, 1, 0, 0, 1]
+    np.testing.assert_allclose(stacked.y, np.array([0, 2, 3, 4, 6, 9]) / np.array([2, 2, 0.5, 2, 2, 0.5]))
+    x = np.array([100, 102, 103, 104, 106, 109]) / np.array([2, 2, 0.5, 2, 2, 0.5])
+    np.testing.assert_allclose(stacked.X, np.column_stack([x, 2 * x]))
+    assert stacked.block.tolist() == [0, 0, 0, 1, 1, 2] and stacked.fold.tolist() == [0, 0, 0, 1, 1, 0]
+    first, second = stacked.moments()
+    assert (first.count, second.count) == (4.0, 2.0)
+    assert second.yy == pytest.approx(4 + 9)
+    assert given.stack(residual, []).X.shape == (6, 0)
+
+
+def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
+    rng = np.random.default_rng(0)
+    tau = rng.normal(size=(400, 2)) * [3.0, 0.2]
+    q = np.cumsum(rng.normal(size=(400, 2)), axis=0) * 0.01
+    motion = Motion(np.arange(400) * 0.05, q, q, q, np.array([0]))
+    given = Samples(motion, tau, np.ones((400, 2), dtype=bool), 0.05)
+    own = 0.01 * np.sqrt(np.mean(tau**2, axis=0))
+
+    def of(**baseline: Any) -> Evidence:
+        context = SimpleNamespace(period=0.05)
+        model: Any = SimpleNamespace(
+            baseline=baseline, history={}, context=lambda motion, effects: context, arm=None
+        )
+        return Evidence.of(model, given, [])
+
+    np.testing.assert_allclose(of().scale, own, rtol=1e-6)
+    np.testing.assert_allclose(of(rmse=[0.4, None]).scale, [0.4, own[1]], rtol=1e-6)
+    # a baseline of round-off is none: at least a thousandth of a hundredth of the torque… of its own
+    np.testing.assert_allclose(of(rmse=[1e-12, 0.4]).scale, [1e-3 * own[0], 0.4], rtol=1e-6)
+    assert of(rmse=[0.4, 0.2]).variation.tolist() == [1.0, 1.0]
+    np.testing.assert_allclose(of(rmse=[0.4, 0.2], worst=[0.8, 0.1]).variation, [4.0, 1.0])
+
+
+def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wrong: float = 99.0) -> Any:
+    """A fit that leaves this on rows held out, and something wrong on the rows that it was fitted to."""
+    held_out, block = np.asarray(held_out, dtype=float), np.asarray(block)
+    joint = np.zeros(len(block), dtype=np.intp) if joint is None else np.asarray(joint)
+    stacked = Stacked(np.zeros((len(block), 0)), held_out, block, block % 2, joint, int(joint.max()) + 1)
+    outside = np.full((2, len(block)), wrong)
+    outside[block % 2, np.arange(len(block))] = held_out
+    effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
+    return Fit(cast(Any, effects), (), (), outside, stacked).score
+
+
+def test_only_what_was_held_out_judges() -> None:
+    fit = left([1.0, 2.0, 3.0, 4.0], [0, 0, 1, 4], [0, 1, 1, 0], complexity=3)
+    assert fit.block_errors.tolist() == [5.0, 9.0, 16.0]
+    assert fit.block_rows.tolist() == [2.0, 1.0, 1.0]
+    assert (fit.complexity, fit.error) == (3, 30.0)
+    assert fit.rows.tolist() == [2, 2] and fit.energy.tolist() == [17.0, 13.0]
+    # joint 1 shows in two of its blocks, joint 2 in two of its own
+    assert fit.seen.tolist() == [2, 2]
+    better = left([1.0, 1.0, 1.0, 1.0], [0, 0, 1, 4], [0, 1, 1, 0])
+    assert gain(fit, better) == 26.0 and gain(better, fit) == -26.0
+    evidence: Any = SimpleNamespace(variation=np.array([2.0, 4.0]))
+    assert enough(evidence, fit).tolist() == [4.0, 8.0]
+    assert times_enough(evidence, fit, better) == pytest.approx(15 / 4 + 11 / 8)
+    assert Shape.fixed(3.0) == Shape(3.0, (3.0, 3.0))
+
+
+def test_a_lead_is_the_differences_sum_in_standard_errors_over_blocks() -> None:
+    worse, better = np.array([5.0, 7.0, 6.0, 9.0]), np.array([4.0, 4.0, 5.0, 5.0])
+    rows = np.array([3.0, 3.0, 3.0, 2.0])
+    difference, part = worse - better, (worse - better) / (worse + better + rows)
+    expected = [d.sum() / (2 * d.std(ddof=1)) for d in (difference, part)]
+    assert lead_of(worse, better, rows) == pytest.approx(max(expected))
+    assert lead_of(better, worse, rows) == pytest.approx(max(-e for e in expected))
+
+
+def test_the_likelihood_of_two_joints_adds_up_block_by_block() -> None:
+    # errors are so unlike over blocks that only the likelihood tells
+    block, joint = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 1, 0, 0, 0, 1])
+    worse, better = left([9.0, 1, 0, 0, 0, 5], block, joint), left([0.0, 1, 1, 0, 1, 0], block, joint)
+    # joint 1 is seen in three blocks, joint 2 in two; rows 4 and 2
+    likelier = 0.5 * (3 * np.log((81 + 4) / (2 + 4)) + 2 * np.log((26 + 2) / (1 + 2)))
+    assert lead(worse, better) == pytest.approx(np.sqrt(2 * likelier))
+    assert lead(better, worse) > -np.sqrt(2 * likelier)
+
+
+BLOCK = np.repeat(np.arange(20), 10)
+
+
+def spread(size: float, seed: int = 0) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(size=200)
+    return noise * size / np.sqrt(np.mean(noise**2))
+
+
+def test_a_gain_must_be_significant_and_more_than_the_model_itself_is_wrong_by() -> None:
+    evidence: Any = SimpleNamespace(variation=np.array([3.0]))
+    before = left(spread(2.1), BLOCK)
+    assert is_worth(evidence, before, left(spread(1.0), BLOCK))
+    # 2.1² - 1.2² is 2.97 baselines
+    assert not is_worth(evidence, before, left(spread(1.2), BLOCK))
+    assert not is_worth(evidence, left(spread(1.0), BLOCK), before)
+    # by one row alone, out of two blocks, it is chance
+    once = spread(1.0)[:20]
+    once[0] = 9.0
+    chance: Any = SimpleNamespace(variation=np.array([0.01]))
+    assert not is_worth(chance, left(once, BLOCK[:20]), left(spread(1.0)[:20], BLOCK[:20]))
+
+
+def test_the_simplest_of_equals_removes_most_of_what_the_best_does() -> None:
+    now = left(spread(5.0), BLOCK)
+    best = left(spread(1.0), BLOCK, complexity=4)
+    alike = left(spread(1.1), BLOCK, complexity=2)
+    behind = left(spread(1.6), BLOCK, complexity=1)
+    assert not is_behind(now, alike, best) and is_behind(now, behind, best)
+    assert simplest_of_equals(now, [behind, best, alike]) == 2
+    assert simplest_of_equals(now, [behind, best]) == 1
+    twin = left(spread(1.05), BLOCK, complexity=2)
+    assert simplest_of_equals(now, [alike, best, twin]) == 2
+    # within chance of the best, yet little of what it removes: none
+    now = left(spread(1.2), BLOCK)
+    little = left(spread(1.14), BLOCK)
+    assert is_behind(now, little, left(spread(1.0), BLOCK))
+    assert not is_behind(now, left(spread(1.04), BLOCK), left(spread(1.0), BLOCK))
+
+
+def test_each_joint_alone_must_be_as_good_as_the_best() -> None:
+    block, joint = np.tile(BLOCK, 2), np.repeat([0, 1], 200)
+
+    def both(first: float, second: float) -> Any:
+        return left(np.concatenate([spread(first), spread(second, 1)]), block, joint)
+
+    now, best = both(9.0, 9.0), both(1.0, 1.0)
+    assert not is_behind(now, both(1.15, 1.15), best)
+    assert is_behind(now, both(1.0, 1.4), best)
+    # of what the best removes by far, three parts in a thousand are nothing
+    now = both(40.0, 40.0)
+    assert not is_behind(now, both(2.3, 2.3), best) and is_behind(now, both(2.6, 1.0), best)
+
+
+def test_the_covariance_is_the_sandwich_with_blocks_as_units() -> None:
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(60, 3)) * [1.0, 100.0, 0.01]
+    block = np.repeat([3, 1, 7, 8], 15)
+    e = rng.normal(size=60)
+    bread = np.linalg.inv(X.T @ X)
+    scores = [X[block == b].T @ e[block == b] for b in (1, 3, 7, 8)]
+    expected = bread @ sum(np.outer(s, s) for s in scores) @ bread * 4 / 3
+    np.testing.assert_allclose(block_covariance(X, e, block), expected, rtol=1e-5)
+    one = block_covariance(X[:15], e[:15], block[:15])
+    bread = np.linalg.inv(X[:15].T @ X[:15])
+    np.testing.assert_allclose(one, bread @ np.outer(X[:15].T @ e[:15], X[:15].T @ e[:15]) @ bread, rtol=1e-5)

@@ -1,0 +1,59 @@
+"""What a model leaves on held-out data, joint by joint, as plain means over the samples that count."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from armloop.identification.reconstruction.tally import Tally
+
+
+def tally(counts: list[list[int]], errors: list[list[float]]) -> Tally:
+    """Blocks (B,) of joints (n,) with so many moving samples and such mean squared errors; a torque of RMS 2."""
+    c, e = np.array(counts, dtype=float), np.array(errors)
+    blocks = np.stack([c * e, c], axis=1)
+    moving = np.array([(c * e).sum(axis=0), 4.0 * c.sum(axis=0), c.sum(axis=0)])
+    rest = np.array([[9.0] * c.shape[1], [36.0] * c.shape[1], [1.0] * c.shape[1]])
+    return Tally({0: np.array([rest, moving])}, blocks, int(c.sum()) + 1)
+
+
+def test_rest_and_motion_are_scored_apart_and_together() -> None:
+    score = tally([[30, 20], [10, 0]], [[1.0, 4.0], [5.0, 0.0]]).score()
+    assert score.moving["rmse"] == pytest.approx([np.sqrt(80 / 40), 2.0])
+    assert score.moving["nrmse"] == pytest.approx([np.sqrt(2.0) / 2, 1.0])
+    assert score.standstill["rmse"] == [3.0, 3.0] and score.standstill["nrmse"] == [0.5, 0.5]
+    assert score.overall["rmse"] == pytest.approx([np.sqrt(89 / 41), np.sqrt(89 / 21)])
+    assert score.rms == pytest.approx([2.0, 2.0]) and score.samples == 61
+
+
+def test_tallies_add_over_chunks_and_conditions() -> None:
+    one, two = tally([[30]], [[1.0]]), tally([[10]], [[5.0]])
+    both = one + Tally({0: two.sums[0], 3: 2 * two.sums[0]}, two.blocks, two.samples)
+    np.testing.assert_array_equal(both.sums[0], one.sums[0] + two.sums[0])
+    np.testing.assert_array_equal(both.sums[3], 2 * two.sums[0])
+    assert both.samples == 31 + 11 and both.blocks.shape == (2, 2, 1)
+    # neither of what was added has changed
+    assert one.sums[0][1, 2, 0] == 30.0 and list(one.sums) == [0]
+
+
+def test_the_baseline_is_that_of_the_worst_condition() -> None:
+    one, two = tally([[30, 0]], [[1.0, 0.0]]), tally([[10, 0]], [[5.0, 0.0]])
+    found = (one + Tally({1: two.sums[0]}, two.blocks, two.samples)).baseline()
+    assert found["rmse"] == [pytest.approx(np.sqrt(5.0)), None]
+    assert found["rms"] == [pytest.approx(2.0), None]
+    assert found["nrmse"] == [pytest.approx(np.sqrt(5.0) / 2), None]
+    assert found["samples"] == 42 and found["worst"] == [None, None]
+
+
+def test_one_block_in_ten_exceeds_the_worst_of_those_with_samples_enough() -> None:
+    errors = [[float(k + 1)] for k in range(11)]
+    worst = tally([[20]] * 11, errors).worst()
+    assert worst == [pytest.approx(np.sqrt(10.0))]
+    assert tally([[20]] * 9, errors[:9]).worst() == [None]
+    assert tally([[20]] * 10, errors[:10]).worst() == [pytest.approx(np.sqrt(9.1))]
+    assert tally([[19]] + [[20]] * 9, errors[:10]).worst() == [None]
+
+
+def test_blocks_are_relative_to_the_torque_of_the_joints_that_move_in_them() -> None:
+    found = tally([[20, 20], [40, 19], [0, 5]], [[2.0, 6.0], [3.0, 99.0], [0.0, 1.0]]).relative_blocks()
+    np.testing.assert_allclose(found, [(2.0 + 6.0) / 4 / 2, 3.0 / 4, np.nan])

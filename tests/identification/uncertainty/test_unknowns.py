@@ -1,0 +1,261 @@
+"""A model's unknowns times their columns are its torque, whatever it is made of, and a step moves both alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_parts import ARMS, energies, model_of, scara_terms
+
+from armloop.data.motion import Motion, Samples
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.uncertainty.solving import moved, solve, solve_given_terms
+from armloop.identification.uncertainty.standard_errors import (
+    Assembled,
+    Fitted,
+    covariances,
+    gauss_newton_steps,
+)
+from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, problems
+from armloop.laws.friction import FrictionTerm
+from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
+
+FRICTION = (
+    FrictionTerm("sign", 0.7),
+    FrictionTerm("stribeck", -0.2, 0.4),
+    FrictionTerm("viscous", 2.0),
+)
+LOADED = (*FRICTION, FrictionTerm("load_sign", 0.05), FrictionTerm("offset", -0.3))
+
+
+def rigid(rotors: bool) -> ReconstructedModel:
+    arm = ARMS["three_axis"]
+    base = BaseParameters.of_arm(arm, rotors=rotors)
+    nominal = np.concatenate([nominal_parameters(arm), np.full(arm.n if rotors else 0, 0.05)])
+    own = base.from_full(nominal)
+    return model_of(arm, RigidBody(base.to_full(own, nominal), tuple(base.names), own), friction=LOADED)
+
+
+def terms() -> ReconstructedModel:
+    """Sparse terms of three steps, the constant in the first alone."""
+    arm = ARMS["scara"]
+    first, *others = scara_terms(arm)
+    some = [
+        replace(c, index=c.index[k], coefficients=c.coefficients[k])
+        for c in others
+        for k in [c.index.any(axis=1)]
+    ]
+    return model_of(arm, first, *some, friction=FRICTION)
+
+
+def models() -> dict[str, ReconstructedModel]:
+    scara = ARMS["scara"]
+    return {
+        "terms": terms(),
+        "bodies": rigid(False),
+        "bodies and rotors": rigid(True),
+        "energies": model_of(scara, energies(scara), friction=LOADED),
+    }
+
+
+def samples(model: ReconstructedModel, N: int = 400, noise: float = 0.0, seed: int = 0) -> Samples:
+    rng = np.random.default_rng(seed)
+    q, v, vdot = rng.uniform(-2, 2, (3, N, model.arm.n))
+    motion = Motion(np.arange(N) * 0.01, q, v, vdot, np.array([0]))
+    tau = model.predict(motion) + noise * rng.normal(size=q.shape)
+    return Samples(motion, tau, np.ones(q.shape, dtype=bool), 0.01)
+
+
+MODELS = models()
+
+
+@pytest.fixture(params=MODELS)
+def model(request: pytest.FixtureRequest) -> ReconstructedModel:
+    return MODELS[request.param]
+
+
+def steps(model: ReconstructedModel, size: float) -> list[tuple[list[Any], np.ndarray]]:
+    rng = np.random.default_rng(5)
+    return [
+        (
+            p.unknowns,
+            size * rng.normal(size=len(p.unknowns)) * [u.kind == "friction" or 1.0 for u in p.unknowns],
+        )
+        for p in problems(model)
+    ]
+
+
+def test_values_times_columns_are_the_torque(model: ReconstructedModel) -> None:
+    data = samples(model)
+    tau = np.zeros_like(data.tau)
+    for problem in problems(model):
+        values = np.array([u.value if u.linear else 0.0 for u in problem.unknowns])
+        for design in problem.designs(data):
+            tau[:, design.joint] += design.X @ values[design.where]
+        assert problem.weighted == (len(problem.designs(data)) > 1)
+    np.testing.assert_allclose(tau, data.tau, atol=1e-8)
+
+
+def test_a_small_step_moves_the_torque_by_its_columns(model: ReconstructedModel) -> None:
+    # friction that grows with the load apart: its column is taken at the estimate
+    law = tuple(term for term in model.friction.terms[0] if not term.by_load)
+    model = replace(model, friction=replace(model.friction, terms=(law,) * model.arm.n))
+    data, change = samples(model), steps(model, 1e-6)
+    expected = np.zeros_like(data.tau)
+    for problem, (_, step) in zip(problems(model), change, strict=True):
+        for design in problem.designs(data):
+            expected[:, design.joint] += design.X @ step[design.where]
+    found = moved(model, change).predict(data.motion) - data.tau
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+    assert np.abs(expected).max() > 1e-6
+
+
+def test_every_unknown_is_named_once_with_its_joint_and_step(model: ReconstructedModel) -> None:
+    for problem in problems(model):
+        keys = [(u.kind, u.joint, u.name) for u in problem.unknowns]
+        assert len(set(keys)) == len(keys)
+        for joint in {u.joint for u in problem.unknowns if u.kind == "friction"}:
+            own = [u for u in problem.unknowns if u.kind == "friction" and u.joint == joint]
+            law = model.friction.terms[joint]
+            assert [u.step for u in own] == [t.step for t in law for _ in range(1 + (t.kind == "stribeck"))]
+            assert [(u.value, u.name) for u in own if not u.linear] == [(0.4, STRIBECK_VELOCITY)]
+
+
+def test_a_stribeck_velocity_moves_by_half_at_most() -> None:
+    model = MODELS["terms"]
+    for by, becomes in ((-0.1, 0.3), (-0.3, 0.2), (0.5, 0.6), (0.1, 0.5)):
+        change = [
+            (p.unknowns, np.array([by if u.name == STRIBECK_VELOCITY else 0.0 for u in p.unknowns]))
+            for p in problems(model)
+        ]
+        for law in moved(model, change).friction.terms:
+            assert law[1].parameter == pytest.approx(becomes)
+
+
+@pytest.mark.parametrize("kind", ["terms", "bodies", "energies"])
+def test_gauss_newton_comes_back_to_what_made_the_torques(kind: str) -> None:
+    model = MODELS[kind]
+    data = samples(model)
+    every = [Fitted((1, 2, 3), np.ones(data.tau.shape, dtype=bool))]
+    away = moved(model, steps(model, 0.01))
+    assert np.abs(away.predict(data.motion) - data.tau).max() > 0.01
+    back, errors = solve_given_terms(away, data, every, 8)
+    np.testing.assert_allclose(back.predict(data.motion), data.tau, atol=1e-5)
+    assert all(np.isfinite(part.covariance).all() for part in errors)
+    (unknowns, step), *_ = gauss_newton_steps(model, data, every)
+    assert len(unknowns) == len(step) and np.abs(step).max() < 1e-5
+
+
+def test_the_best_of_the_iterates_is_kept() -> None:
+    model = MODELS["terms"]
+    data = samples(model, noise=0.01)
+    every = [Fitted((1, 2, 3), np.ones(data.tau.shape, dtype=bool))]
+
+    def assembled(one: ReconstructedModel) -> Assembled:
+        return Assembled.of(one, data, every)
+
+    start = assembled(moved(model, steps(model, 0.05))).misfit()
+    found, better = solve(moved(model, steps(model, 0.05)), assembled)
+    assert better and assembled(found).misfit() < 1e-2 * start
+    again, better = solve(found, assembled)
+    assert assembled(again).misfit() <= assembled(found).misfit()
+
+    # iterates that only get worse leave the model as it was
+    class Worse:
+        misfits = iter([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 9.0, 9.0, 9.0])
+
+        def __init__(self, one: ReconstructedModel) -> None:
+            self._misfit = next(self.misfits)
+
+        def misfit(self) -> float:
+            return self._misfit
+
+        def steps(self) -> Any:
+            return steps(model, 1e-3)
+
+    kept, better = solve(model, Worse)  # type: ignore[arg-type]
+    assert kept is model and not better
+
+
+def test_sums_of_equations_add_over_samples_and_say_how_the_model_fits() -> None:
+    model = MODELS["terms"]
+    data = samples(model, noise=0.1)
+    rows = np.random.default_rng(1).uniform(size=data.tau.shape) < 0.7
+    whole = Assembled.of(model, data, [Fitted((1, 2, 3), rows)])
+    left = (data.tau - model.predict(data.motion)) * rows
+    np.testing.assert_allclose(whole.squares, (left**2).sum(axis=0))
+    np.testing.assert_allclose(whole.power, (data.tau**2 * rows).sum(axis=0))
+    assert whole.misfit() == pytest.approx(((left**2).sum(axis=0) / (data.tau**2 * rows).sum(axis=0)).sum())
+    halves = [
+        Assembled.of(model, data, [Fitted((1, 2, 3), rows & part[:, None])])
+        for part in (np.arange(400) < 100, np.arange(400) >= 100)
+    ]
+    both = halves[0] + halves[1]
+    for one, other in zip([*both.jacobian, *both.score], [*whole.jacobian, *whole.score], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    assert both.misfit() == pytest.approx(whole.misfit())
+    for k, design in enumerate(p.designs(data)[0] for p in problems(model)):
+        X = design.X * rows[:, [k]]
+        np.testing.assert_allclose(whole.jacobian[k], X.T @ X, atol=1e-9)
+        np.testing.assert_allclose(whole.score[k], X.T @ left[:, k], atol=1e-9)
+    nothing = Assembled.of(model, data, [Fitted((1, 2, 3), np.zeros_like(rows))])
+    assert nothing.misfit() == 0.0 and nothing.jacobian[0].shape == whole.jacobian[0].shape
+
+
+@pytest.mark.parametrize("kind", ["terms", "bodies"])
+def test_white_noise_gives_the_errors_of_least_squares(kind: str) -> None:
+    model = MODELS[kind]
+    sigma = 0.05
+    data = samples(model, 4000, sigma)
+    every = [Fitted((1, 2, 3), np.ones(data.tau.shape, dtype=bool))]
+    parts, seconds, correlation = covariances(model, data, every)
+    assert correlation == pytest.approx(0.01, rel=0.2) and seconds == pytest.approx(0.1, rel=0.2)
+    for problem, part in zip(problems(model), parts, strict=True):
+        p = len(problem.unknowns)
+        G = np.zeros((p, p))
+        for design in problem.designs(data):
+            G[np.ix_(design.where, design.where)] += design.X.T @ design.X
+        exact = sigma * np.sqrt(np.diag(np.linalg.inv(G + 1e-10 * np.diag(np.diag(G)))))
+        np.testing.assert_allclose(part.std_error, exact, rtol=0.25)
+
+
+def test_what_a_later_step_finds_is_not_in_the_residual_of_an_earlier_one() -> None:
+    model = MODELS["terms"]
+    data = samples(model)
+    slow = np.abs(data.motion.v).max(axis=1) < 1.0
+    rows = np.repeat(slow[:, None], model.arm.n, axis=1)
+    stages = [Fitted((1,), rows), Fitted((2, 3), ~rows)]
+    parts, _, _ = covariances(model, data, stages)
+    for j, (problem, part) in enumerate(zip(problems(model), parts, strict=True)):
+        early = np.array([u.step == 1 for u in problem.unknowns])
+        assert early.any() and not early.all()
+        J = part.equations.jacobian.sum(axis=0)
+        X = problem.designs(data)[0].X
+        np.testing.assert_allclose(
+            J[np.ix_(early, early)], X[rows[:, j]][:, early].T @ X[rows[:, j]][:, early]
+        )
+        np.testing.assert_allclose(J[~early], X[~rows[:, j]][:, ~early].T @ X[~rows[:, j]])
+        assert not J[np.ix_(early, ~early)].any()
+        values = np.array([u.value if u.linear else 0.0 for u in problem.unknowns])
+        left = data.tau[rows[:, j], j] - X[rows[:, j]][:, early] @ values[early]
+        np.testing.assert_allclose(
+            part.equations.score.sum(axis=0)[early], X[rows[:, j]][:, early].T @ left, atol=1e-8
+        )
+        np.testing.assert_allclose(part.equations.score.sum(axis=0)[~early], 0.0, atol=1e-8)
+        assert part.equations.count.sum(axis=0)[early][0] == rows[:, j].sum()
+        assert part.equations.count.sum(axis=0)[~early][0] == (~rows[:, j]).sum()
+
+
+def test_a_friction_law_of_one_joint_is_its_own() -> None:
+    model = MODELS["bodies"]
+    laws = (LOADED, (), LOADED[:1])
+    one = replace(model, friction=replace(model.friction, terms=laws))
+    (problem,) = problems(one)
+    shared = sum(u.kind == "shared" for u in problem.unknowns)
+    designs = problem.designs(samples(one))
+    assert [len(d.where) - shared for d in designs] == [6, 0, 1]
+    assert designs[2].where[-1] == len(problem.unknowns) - 1 == shared + 6
