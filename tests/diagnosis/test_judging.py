@@ -25,7 +25,7 @@ def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = Non
     """A fit that leaves this, of one joint or those given (0-based), with blocks as given."""
     rows = len(held_out)
     joint = np.zeros(rows, dtype=np.intp) if joint is None else joint
-    stacked = Stacked(np.zeros((rows, 0)), held_out, block, block % 2, joint, int(joint.max()) + 1)
+    stacked = Stacked(np.zeros((rows, 0)), held_out, block, block % 2, joint, int(joint.max()) + 1, joint)
     return Fit((), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
 
 
@@ -212,7 +212,8 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: np.zeros((4, 1)))
     monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [])
     every: Any = SimpleNamespace(rows=np.ones((4, 1), dtype=bool))
-    monkeypatch.setattr(accounts, "without", lambda whole, contacts: every)
+    beside: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: beside if contacts else every)
     event: Any = SimpleNamespace(share=0.9)
     found = accounts.best_account(every, [event], True, lambda text: None)
     assert (found.unlisted == "everywhere") == kept and not found.contacts  # type: ignore[comparison-overlap]

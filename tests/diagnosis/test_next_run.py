@@ -224,7 +224,7 @@ def test_the_command_writes_the_reference_within_stated_limits(folder, capsys) -
     ("words", "says"),
     [
         (["--next-run", "next.txt"], "--next-run next.txt: a reference ends in .csv or .parquet"),
-        (["--velocity", "1,1"], "ranges and durations are those of --next-run"),
+        (["--velocity", "1,1"], "ranges, reserve and duration are those of --next-run"),
         (["--next-run", "next.csv", "--velocity", "1,99"], "its URDF allows"),
         (["--next-run", "next.csv", "--lower", "1"], "give 2 numbers"),
     ],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
@@ -15,9 +15,8 @@ from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects.found import RANGE
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
 EXPLAINS = 0.8
@@ -28,7 +27,7 @@ class Account:
     """What happened in a run.
 
     Attributes:
-        whole: the run.
+        whole: the run; joints rest as long as their rest is recorded, where that is late.
         contacts: events, kept out of the search.
         evidence: the run without them.
         outcome: effects found.
@@ -48,6 +47,12 @@ class Account:
         """Search a run in which these contacts are taken for granted."""
         evidence = without(whole, contacts)
         outcome = search(evidence, progress, panel)
+        late = _delay(outcome)
+        if late:
+            progress("what was recorded late of joints at rest is left out, and the search made anew")
+            whole = _resting_late(whole, late)
+            evidence = without(whole, contacts)
+            outcome = search(evidence, progress, panel)
         unlisted, outcome = find_law(evidence, outcome, progress)
         return Account(whole, contacts, evidence, outcome, unlisted)
 
@@ -91,6 +96,32 @@ class Account:
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), 1e-300)
 
 
+def slid_then(motion: Motion, moving: Mask, seconds: float) -> Mask:
+    """(N, n) samples whose torque, recorded so many seconds late, is that of a joint that slid.
+
+    A joint's torque while it rests is not determined by its motion; a delay brings it into the samples that follow.
+    """
+    slid = np.zeros_like(moving)
+    for run in motion.runs():
+        time = motion.time[run]
+        for j, mine in enumerate(moving[run].T):
+            slid[run, j] = np.interp(time - seconds, time, mine.astype(float)) >= 1.0
+    return slid
+
+
+def _resting_late(evidence: Evidence, seconds: float) -> Evidence:
+    """The run in which a joint rests for as long as its rest is recorded, too, and its torque there says nothing."""
+    samples = evidence.samples
+    slid = samples.moving & slid_then(samples.motion, samples.moving, seconds)
+    return replace(evidence, samples=replace(samples, moving=slid), rows=evidence.rows & slid, unknown=~slid)
+
+
+def _delay(outcome: Outcome) -> float:
+    """Seconds by which the torque is recorded late, zero if it is not."""
+    late = [a.parameters["seconds"].value for a in outcome.added() if a.effect.name == "time_delay"]
+    return float(np.sum(late)) if late else 0.0
+
+
 def best_account(
     whole: Evidence,
     contacts: list[Contact],
@@ -106,11 +137,12 @@ def best_account(
         panel: who tries the hypotheses; in this process by default.
     """
     account = plain = Account.of(whole, contacts, progress, panel)
+    whole = account.whole
     # What effects and law leave shows events that they covered, and takes back those that they explain.
     residual = account.remaining()
     again = find_contacts(whole, residual)
     looked = replace(account, contacts=again)
-    if (without(whole, again).rows == account.evidence.rows).all():
+    if (without(whole, again).rows == without(whole, contacts).rows).all():
         account = looked  # in the same samples, without what the effects do there
     else:
         account = Account.of(whole, again, progress, panel)

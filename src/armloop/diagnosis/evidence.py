@@ -30,6 +30,8 @@ FOLDS = 2
 _TRAVEL = 2e-3
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
+#: Places of a joint (low, middle, high), and speeds (back, slow, forth), that make the cells of its motion.
+CELLS = 3
 
 #: Columns of a run are kept up to so many bytes.
 _KEPT = 1 << 28
@@ -59,6 +61,7 @@ class Evidence:
             tell apart, only some.
         blocks: (N,) block of each sample.
         asked: effects that may be asked about.
+        unknown: (N, n) samples of which a joint's torque says nothing, not even that friction may hold it.
     """
 
     model: ReconstructedModel
@@ -69,6 +72,7 @@ class Evidence:
     blocks: NDArray[np.intp]
     context: Context
     asked: tuple[Effect, ...] = ()
+    unknown: NDArray[np.bool_] | None = None
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
 
@@ -114,6 +118,20 @@ class Evidence:
             context = model.context(self.samples.motion, [*(a.effect for a in known)])
             predicted = predicted - sum(added.torque(context) for added in known)
         return self.samples.tau - smooth(self.samples, predicted)
+
+    @cached_property
+    def _cells(self) -> NDArray[np.intp]:
+        """(N, n) cell of a joint's motion that each sample lies in: like places and speeds, as many samples in each."""
+        motion, n = self.samples.motion, self.rows.shape[1]
+        cells = np.zeros(self.rows.shape, dtype=np.intp)
+        for j in range(n):
+            mine = self.rows[:, j]
+            cells[:, j] = j
+            for x in (motion.q[:, j], motion.v[:, j]) if mine.any() else ():
+                edges = np.quantile(x[mine], np.arange(1, CELLS) / CELLS)
+                cells[:, j] = cells[:, j] * CELLS + np.searchsorted(edges, x)
+            cells[:, j] = cells[:, j] * n + j
+        return cells
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
@@ -169,6 +187,7 @@ class Evidence:
             self.fold[samples],
             joints,
             residual.shape[1],
+            self._cells[samples, joints],
         )
 
 
@@ -215,7 +234,9 @@ def _block_seconds(motion: Motion) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Stacked:
-    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based, of ``joints``) of each row."""
+    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based, of ``joints``) of each row, and ``cell`` of
+    the motion that it lies in.
+    """
 
     X: Array
     y: Array
@@ -223,6 +244,7 @@ class Stacked:
     fold: NDArray[np.intp]
     joint: NDArray[np.intp]
     joints: int
+    cell: NDArray[np.intp]
 
     def moments(self) -> list[Moments]:
         """Moments of each fold."""

@@ -1,4 +1,4 @@
-"""Fitting effects to a residual: constrained least squares, cross-fitted errors, block-robust covariance."""
+"""Fitting effects to a residual: constrained least squares, cross-fitted errors, cluster-robust covariance."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
-from armloop.regression.embedded import solve, unit_scale
+from armloop.regression.clustered import clustered_covariance
+from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]
 
 _REFINEMENTS = 3
-_RIDGE = 1e-8
 
 
 class Shape(NamedTuple):
@@ -75,11 +75,11 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         judged, beta, _, _, _ = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
-    covariance = block_covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block)
+    spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block, stacked.cell)
     parameters, start = [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
-        parameters.append(effect.estimates(evidence.model.arm, free, covariance[block, block], value))
+        parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
         start += len(free)
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), np.array(outside), stacked)
 
@@ -133,20 +133,18 @@ def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
     return float(np.clip(value, min(tried), max(tried))) if len(tried) > 1 else value
 
 
-def block_covariance(X: Array, left: Array, block: NDArray[np.intp]) -> Array:
-    """Sandwich covariance (p, p) with blocks as the independent units (Liang and Zeger 1986).
+def covariance(X: Array, left: Array, block: NDArray[np.intp], cell: NDArray[np.intp]) -> Array:
+    """Covariance (p, p) of coefficients from two kinds of error, each with clusters of its own.
+
+    Noise, and what happened once, is correlated in time and independent from block to block. What a model and the laws
+    themselves do not get quite right comes back with the motion however long the run: it is correlated in every cell of
+    it. Blocks alone take the second for noise that averages out. (Clustering in two ways after Cameron, Gelbach and Miller,
+    "Robust inference with multiway clustering", J. Business & Economic Statistics 29, 2011; what both would count, error
+    within a block and a cell, is not taken off again.)
 
     Args:
         X: (R, p) columns.
         left: (R,) what they leave.
-        block: (R,) block of each row.
+        block, cell: (R,) block and cell of motion of each row.
     """
-    G = X.T @ X
-    scores = X * left[:, None]
-    blocks, index = np.unique(block, return_inverse=True)
-    sums = np.zeros((len(blocks), X.shape[1]))
-    for k, score in enumerate(scores.T):
-        sums[:, k] = np.bincount(index, weights=score, minlength=len(blocks))
-    scale = unit_scale(G)
-    bread = np.outer(scale, scale) * np.linalg.inv(G * np.outer(scale, scale) + _RIDGE * np.eye(len(G)))
-    return np.asarray(bread @ (sums.T @ sums) @ bread) * len(blocks) / max(len(blocks) - 1, 1)
+    return clustered_covariance(X, left, block) + clustered_covariance(X, left, cell)

@@ -58,6 +58,8 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
     size = np.abs(residual) - unsure
     size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - _STICTION * unsure), size), 0.0)
+    if evidence.unknown is not None:
+        size = np.where(evidence.unknown, 0.0, size)
     sign = np.sign(np.where(rest, bare, residual))
     return sign * size / deviations(evidence, residual), rest
 

@@ -121,9 +121,10 @@ class Hypotheses:
         numbers = (self._number[effect.place] for effect in known.fit.effects)
         task = np.packbits(known.evidence.rows).tobytes(), tuple(zip(numbers, known.fit.shapes, strict=True))
         self._bench.task, self._bench.known = task, known
-        listed = self._bench.listed
+        listed, labels = self._bench.listed, ", ".join(effect.label() for effect in known.fit.effects)
+        beside = f"beside {labels}: " if labels else ""
         every = self._team.map(
-            _tried, task, len(listed), lambda k: tell(f"{k} of {len(listed)} hypotheses tried")
+            _tried, task, len(listed), lambda k: tell(f"{beside}{k} of {len(listed)} hypotheses tried")
         )
         return [
             Tried(effect, *trial) for effect, trial in zip(listed, every, strict=True) if trial is not None

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
-from armloop.diagnosis.fit import Fit, block_covariance
+from armloop.diagnosis.fit import Fit, covariance
 from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.features.angle_sums import AngleSums
@@ -242,6 +242,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
         return _Law([], y)
     beta = whole.solve(stable)
-    covariance = block_covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.block[mine])
+    block, cell = after.stacked.block[mine], after.stacked.cell[mine]
+    spread = covariance(X[:, stable], y - X[:, stable] @ beta, block, cell)
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, np.sqrt(np.diag(covariance)))
+    return _Law(terms, error, np.sqrt(np.diag(spread)))

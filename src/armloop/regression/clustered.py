@@ -1,0 +1,46 @@
+"""Cluster-robust covariance of a least-squares fit by the delete-one-cluster jackknife.
+
+CV3 of MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for cluster-robust inference",
+J. Applied Econometrics 38, 2023: the sandwich of Liang and Zeger (1986), corrected for the leverage of every cluster.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.regression.embedded import unit_scale
+from armloop.util.arrays import Array
+
+_RIDGE = 1e-8
+
+
+def clustered_covariance(X: Array, left: Array, cluster: NDArray[np.intp]) -> Array:
+    """Covariance (p, p) of fitted coefficients, errors within a cluster being anything, clusters independent.
+
+    Args:
+        X: (R, p) columns.
+        left: (R,) what they leave.
+        cluster: (R,) number of each row's cluster.
+    """
+    p = X.shape[1]
+    number, count = np.unique(cluster, return_inverse=True, return_counts=True)[1:]
+    B = len(count)
+
+    def sums(values: Array) -> Array:
+        return np.asarray(np.bincount(number, weights=values, minlength=B))
+
+    scale = unit_scale(X.T @ X)
+    Z = X * scale
+    score = np.empty((B, p))
+    gram = np.empty((B, p, p))
+    for a in range(p):
+        score[:, a] = sums(Z[:, a] * left)
+        for b in range(a + 1):
+            gram[:, a, b] = gram[:, b, a] = sums(Z[:, a] * Z[:, b])
+    # Where a constraint has moved the solution the scores do not add up to zero: what all rows have in common is no error.
+    score -= np.outer(count / len(cluster), score.sum(axis=0))
+    without = gram.sum(axis=0) - gram + _RIDGE * np.eye(p)
+    moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
+    moved -= moved.mean(axis=0)
+    return np.asarray(moved.T @ moved * ((B - 1) / B) * np.outer(scale, scale))
