@@ -30,7 +30,7 @@ def verdicts(folder: Path) -> dict[str, dict[str, Any]]:
     found = {}
     for path in sorted(folder.glob("run_*.csv")):
         try:
-            found[f"{folder.name}_{path.stem}"] = diagnose(model, [read_log(path)]).to_dict()
+            found[f"{folder.name}_{path.stem}"] = diagnose(model, [read_log(path)], jobs=1).to_dict()
         except InputError as error:
             found[f"{folder.name}_{path.stem}"] = {"verdict": f"refused: {error}", "effects": []}
     return found

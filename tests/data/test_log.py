@@ -354,3 +354,18 @@ def test_a_log_shows_itself_in_a_line():
     q = np.sin(time)[:, None] * [1.0, 2.0]
     log = MotionLog(time, q, np.cos(time)[:, None] * [1.0, 2.0], np.ones_like(q))
     assert repr(log) == "<armloop.MotionLog log: 2 joints, 100 samples in 2 runs, 5.49 s, tau in N*m>"
+
+
+def test_a_parquet_file_of_currents_says_so(tmp_path: Path) -> None:
+    """Amperes are not taken for torques because somebody forgot the option; a CSV cannot say it."""
+    time = np.linspace(0.0, 2.0, 201)
+    q, v = np.sin(time)[:, None], np.cos(time)[:, None]
+    log = MotionLog(time, q, v, 3.0 * q, None, "run", tau_unit="A")
+    path = tmp_path / "run.parquet"
+    write_log(path, log)
+    with pytest.raises(LogError, match=r"run\.parquet: tau holds motor currents \(A\).*give --tau-unit A"):
+        read_log(path)
+    assert read_log(path, tau_unit="A").tau_unit == "A"
+    assert read_log(path, tau_unit="A", drive_gains=[2.0]).tau == pytest.approx(6.0 * q)
+    write_log(path, read_log(path, tau_unit="A", drive_gains=[2.0]))
+    assert read_log(path).tau_unit == "N*m"

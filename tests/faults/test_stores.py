@@ -6,6 +6,8 @@ import pytest
 from faults.conftest import one_line
 
 from armloop.cli import main
+from armloop.util.errors import InputError
+from armloop.watch.store import Store
 
 WATCH = "watch --models model.json --store s --logs"
 # which files hold what instead, and what is said; nothing where they are made anew
@@ -34,3 +36,11 @@ def test_a_file_of_the_store_is_spoilt(name: str, place: Path, capsys: pytest.Ca
         one_line(capsys.readouterr().err, said)
     else:
         assert status == 0
+
+
+@pytest.mark.parametrize("told", ['{"alarms": 3}', "{}", '{"alarms": [3]}'])
+def test_what_was_told_is_spoilt(told: str, tmp_path: Path) -> None:
+    store = Store(tmp_path / "s")
+    (tmp_path / "s" / "announced.json").write_text(told)
+    with pytest.raises(InputError, match=r"announced\.json: holds no list of alarms; move it away"):
+        store.announced()

@@ -67,6 +67,7 @@ def run(options: argparse.Namespace) -> None:
 
     from armloop.commands.shared import CURRENTS_ONLY, drive_gains, out_file, print_json, stated_arm
     from armloop.convert import Answers, convert, read_map
+    from armloop.data.log import said_of_log
     from armloop.data.tables import write_columns
     from armloop.util.errors import InputError
 
@@ -85,7 +86,7 @@ def run(options: argparse.Namespace) -> None:
     mapping = read_map(options.map) if options.map else None
     answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)
     found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
-    write_columns(out, found.columns())
+    write_columns(out, found.columns(), said_of_log(found.log))
     if options.json:
         print_json(_answer(found, out))
         return

@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armloop.data.plausibility import Finding, Recorded, doubts, faults
-from armloop.data.tables import place, read_columns, read_header, write_columns
+from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 
 TAU_UNITS = ("N*m", "A")
+#: Under which a Parquet file says what its tau holds, where that is no torque.
+_UNIT = "tau_unit"
 GAP_PERIODS = 10.0
 """A pause longer than this many median sample periods starts a new run."""
 FEWEST_SAMPLES = 20
@@ -238,6 +240,11 @@ def read_log(
     if tau_unit not in TAU_UNITS:
         raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
     n, _ = check_header(path, joints)
+    if tau_unit != "A" and said_of(path, _UNIT) == "A":
+        raise LogError(
+            f"{path}: tau holds motor currents (A), as the file itself says; give --tau-unit A, and --drive-gains to make "
+            "torques of them"
+        )
     gains = None if drive_gains is None else _check_gains(path, drive_gains, n)
 
     header = read_header(path)
@@ -270,7 +277,12 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
         if values is not None and not (kind == "v" and log.v_derived):
             columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
-    write_columns(Path(path), columns)
+    write_columns(Path(path), columns, said_of_log(log))
+
+
+def said_of_log(log: MotionLog) -> dict[str, str]:
+    """Return what a Parquet file of the log has to say beside its columns: that tau is a current, where it is one."""
+    return {_UNIT: log.tau_unit} if log.tau_unit == "A" else {}
 
 
 def check_log(path: Path, log: MotionLog, first: int = 0) -> None:

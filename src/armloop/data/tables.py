@@ -82,8 +82,12 @@ def read_columns(
     return table
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:
+def write_columns(
+    path: Path, columns: Mapping[str, NDArray[np.float64]], about: Mapping[str, str] | None = None
+) -> None:
     """Write named columns as CSV or Parquet, whole or not at all; every digit survives.
+
+    about : what a Parquet file keeps beside them, read by :func:`said_of`; a CSV has no place for it
 
     Raises `LogError` for an unknown suffix and `InputError` when the place cannot be written to.
     """
@@ -93,6 +97,7 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> Non
 
     _check_suffix(path)
     table = pyarrow.table({name: np.ascontiguousarray(cells) for name, cells in columns.items()})
+    table = table.replace_schema_metadata(dict(about)) if about else table
     with replacing(path) as draft:
         if path.suffix == PARQUET:
             pyarrow.parquet.write_table(table, draft, row_group_size=ROW_GROUP)
@@ -101,6 +106,16 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> Non
             with draft.open("wb") as sink:
                 sink.write((",".join(columns) + "\n").encode())
                 pyarrow.csv.write_csv(table, sink, pyarrow.csv.WriteOptions(include_header=False))
+
+
+def said_of(path: Path, key: str) -> str | None:
+    """Return what a Parquet file whose header has been read says of itself; None where it says nothing, as a CSV does."""
+    if path.suffix == CSV:
+        return None
+    import pyarrow.parquet
+
+    value = (pyarrow.parquet.read_schema(path).metadata or {}).get(key.encode())
+    return None if value is None else value.decode(errors="replace")
 
 
 def place(path: Path, row: int) -> str:

@@ -175,7 +175,10 @@ class Store:
     def announced(self) -> set[str]:
         """Identifiers of the alarms that were told."""
         path = self.folder / "announced.json"
-        return set(_read_json(path)["alarms"]) if path.exists() else set()
+        told = _read_json(path).get("alarms") if path.exists() else []
+        if not isinstance(told, list) or not all(isinstance(name, str) for name in told):
+            raise InputError(f"{path}: holds no list of alarms; move it away, and they are told again")
+        return set(told)
 
     def announce(self, names: Sequence[str]) -> None:
         """Remember that alarms were told, after they were: a call killed before tells them again."""
