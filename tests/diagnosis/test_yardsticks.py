@@ -11,7 +11,7 @@ import pytest
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import evidence as evidences
 from armloop.diagnosis.evidence import Evidence, Stacked
-from armloop.diagnosis.fit import Fit, Shape, block_covariance
+from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.judgement import (
     enough,
     gain,
@@ -155,7 +155,9 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     """A fit that leaves this on rows held out, and something wrong on the rows that it was fitted to."""
     held_out, block = np.asarray(held_out, dtype=float), np.asarray(block)
     joint = np.zeros(len(block), dtype=np.intp) if joint is None else np.asarray(joint)
-    stacked = Stacked(np.zeros((len(block), 0)), held_out, block, block % 2, joint, int(joint.max()) + 1)
+    stacked = Stacked(
+        np.zeros((len(block), 0)), held_out, block, block % 2, joint, int(joint.max()) + 1, joint
+    )
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
@@ -248,17 +250,3 @@ def test_each_joint_alone_must_be_as_good_as_the_best() -> None:
     # of what the best removes by far, three parts in a thousand are nothing
     now = both(40.0, 40.0)
     assert not is_behind(now, both(2.3, 2.3), best) and is_behind(now, both(2.6, 1.0), best)
-
-
-def test_the_covariance_is_the_sandwich_with_blocks_as_units() -> None:
-    rng = np.random.default_rng(0)
-    X = rng.normal(size=(60, 3)) * [1.0, 100.0, 0.01]
-    block = np.repeat([3, 1, 7, 8], 15)
-    e = rng.normal(size=60)
-    bread = np.linalg.inv(X.T @ X)
-    scores = [X[block == b].T @ e[block == b] for b in (1, 3, 7, 8)]
-    expected = bread @ sum(np.outer(s, s) for s in scores) @ bread * 4 / 3
-    np.testing.assert_allclose(block_covariance(X, e, block), expected, rtol=1e-5)
-    one = block_covariance(X[:15], e[:15], block[:15])
-    bread = np.linalg.inv(X[:15].T @ X[:15])
-    np.testing.assert_allclose(one, bread @ np.outer(X[:15].T @ e[:15], X[:15].T @ e[:15]) @ bread, rtol=1e-5)

@@ -19,8 +19,10 @@ def test_it_is_the_jackknife_over_clusters() -> None:
     assert clustered_covariance(X, y - X @ beta, cluster) == pytest.approx(moved.T @ moved * 6 / 7, rel=1e-5)
 
 
-def test_no_columns_have_no_covariance() -> None:
-    assert clustered_covariance(np.zeros((5, 0)), np.ones(5), np.arange(5)).shape == (0, 0)
+@pytest.mark.parametrize(("rows", "columns"), [(5, 0), (0, 0), (0, 2)])
+def test_nothing_has_no_covariance(rows: int, columns: int) -> None:
+    found = clustered_covariance(np.zeros((rows, columns)), np.ones(rows), np.arange(rows))
+    assert found.shape == (columns, columns) and not found.any()
 
 
 @pytest.mark.parametrize("misfit", [0.0, 2.0])

@@ -183,8 +183,11 @@ def test_a_picture_is_opaque_and_a_figure_in_a_page_is_not(tmp_path: Path) -> No
 
 def test_a_narrow_page_has_the_panels_one_below_the_other(loop: SimpleNamespace) -> None:
     figure = plots.residual_shape_figure(loop.diagnosis)
+    before = figure.get_figwidth()
     page = svg(figure)
     assert page.count('<svg class="wide"') == page.count('<svg class="narrow"') == 1
+    assert figure.get_figwidth() == before and svg(figure) == page  # the figure itself stays as it is
+    assert stack(figure)
     boxes = [axes.get_position() for axes in figure.axes]
     assert figure.get_figwidth() == 4.0
     assert all(above.y0 > below.y1 for above, below in itertools.pairwise(boxes))

@@ -24,6 +24,8 @@ def clustered_covariance(X: Array, left: Array, cluster: NDArray[np.intp]) -> Ar
         cluster: (R,) number of each row's cluster.
     """
     p = X.shape[1]
+    if not X.size:
+        return np.zeros((p, p))
     number, count = np.unique(cluster, return_inverse=True, return_counts=True)[1:]
     B = len(count)
 

@@ -7,6 +7,7 @@ rasterised. Nothing is loaded from anywhere.
 from __future__ import annotations
 
 import io
+import pickle
 import re
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -140,7 +141,9 @@ def svg(figure: Figure | str) -> str:
     if isinstance(figure, str):
         return figure
     wide = _drawn(figure, "wide")
-    return wide + _drawn(figure, "narrow") if stack(figure) else wide
+    # A copy of our own making: the figure stays as it is for whoever shows or draws it again.
+    narrow: Figure = pickle.loads(pickle.dumps(figure))
+    return wide + _drawn(narrow, "narrow") if stack(narrow) else wide
 
 
 def _drawn(figure: Figure, variant: str) -> str:

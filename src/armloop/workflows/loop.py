@@ -25,7 +25,7 @@ from armloop.laws.effects import EFFECTS
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm
 from armloop.util.files import write_figure, write_json, write_text
-from armloop.util.progress import Progress, silent
+from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Pool
 from armloop.workflows.measured import MEASURED_FILES, run_measured
 from armloop.workflows.tracking import tracking_answer
@@ -97,7 +97,15 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     plant = scenario.plant
     seconds: dict[str, float] = {}
     with _Clock(seconds, "collect", progress, "1/7 measure: collecting three logs on the simulated arm"):
-        logs = collect(plant.arm, plant.config, load_plan("paper"), seed, processes=2)
+        tell = paced(progress)
+        logs = collect(
+            plant.arm,
+            plant.config,
+            load_plan("paper"),
+            seed,
+            lambda name, share: tell(f"recorded {round(100 * share)} of 100 %"),
+            processes=2,
+        )
         for name, log in logs.items():
             write_log(folder / "logs" / f"{name}.csv", log)
     with Pool(2) as workers:  # two cores, no more
@@ -106,7 +114,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         ):
             sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
             one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
-            reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise")
+            reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise", progress)
             model = reconstruction.model
             model.save(folder / "model.json")
             samples = preprocess(list(logs.values()), model.conditioning)
@@ -207,9 +215,9 @@ def _measured(folder: Path) -> tuple[str, dict[str, Any]]:
     return measured_words(found), measured_section(found).to_dict()
 
 
-def _reconstruct(logs: list[MotionLog], arm: Arm, method: str) -> Reconstruction:
+def _reconstruct(logs: list[MotionLog], arm: Arm, method: str, progress: Progress = silent) -> Reconstruction:
     # The paper's own library: its three steps, and what each of them is worth to a controller, are what is shown.
-    return reconstruct(logs, arm, method, "double-feature-set")
+    return reconstruct(logs, arm, method, "double-feature-set", progress=progress)
 
 
 def _diagnose(folder: Path, progress: Progress) -> Diagnosis:

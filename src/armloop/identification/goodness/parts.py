@@ -16,6 +16,7 @@ from armloop.data.blocks import block_sums
 from armloop.identification.goodness.regression import left_out
 from armloop.identification.goodness.split import correlation_time, split
 from armloop.identification.goodness.witness import JointRows, Witness
+from armloop.util.progress import Progress, silent
 
 #: A joint with fewer rows is not judged; how long a residual's memory may be, s.
 _FEWEST, _LONGEST = 200, 20.0
@@ -67,9 +68,13 @@ class Parts:
         return {**vars(self)}
 
 
-def parts_of(witness: Witness) -> list[Parts]:
+def parts_of(witness: Witness, progress: Progress = silent) -> list[Parts]:
     """Parts of every joint's torque energy on the rows that judge."""
-    return [_of_joint(j + 1, rows) for j, rows in enumerate(witness.joints)]
+    found = []
+    for j, rows in enumerate(witness.joints):
+        progress(f"what a flexible regression still finds: joint {j + 1} of {len(witness.joints)}")
+        found.append(_of_joint(j + 1, rows))
+    return found
 
 
 def _of_joint(joint: int, rows: JointRows) -> Parts:

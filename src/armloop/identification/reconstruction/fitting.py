@@ -85,7 +85,7 @@ class Fitting:
     def _climbed(self) -> FrictionSelection:
         extra = self._design.laws.count
         priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
-        return select_friction(self._arm, self._training, self._design, self._options, priors)
+        return select_friction(self._arm, self._training, self._design, self._options, priors, self._progress)
 
     def _window_solution(self, design: Design, ladder: FrictionSelection) -> Solution:
         """The coefficients of a design and of a ladder's friction, on the window."""

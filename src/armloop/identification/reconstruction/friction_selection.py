@@ -31,6 +31,7 @@ from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
+from armloop.util.progress import Progress, paced, silent
 
 #: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
@@ -174,7 +175,12 @@ def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Ext
 
 
 def select_friction(
-    arm: Arm, data: Training, design: Design, options: Options, priors: dict[str, Prior]
+    arm: Arm,
+    data: Training,
+    design: Design,
+    options: Options,
+    priors: dict[str, Prior],
+    progress: Progress = silent,
 ) -> FrictionSelection:
     """Choose the prior of the shared coefficients by its evidence, then every joint's friction on held-out folds.
 
@@ -190,7 +196,10 @@ def select_friction(
     ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
     places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
     state = _State(pooled, places, priors)
-    comparisons = [state.take(level, rung.name, one_by_one=data.plenty) for level, rung in enumerate(ladder)]
+    comparisons, tell = [], paced(progress)
+    for level, rung in enumerate(ladder):
+        tell(f"friction: extension {level + 1} of {len(ladder)}")
+        comparisons.append(state.take(level, rung.name, one_by_one=data.plenty))
     if data.plenty:
         comparisons.append(state.eliminate_backward())
     notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]

@@ -13,12 +13,15 @@ from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.tally import Part
 from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
+from armloop.util.progress import Progress, paced, silent
 
 #: Of streamed logs, so many chunks stand for all.
 _CHUNKS = 16
 
 
-def held_out_parts(model: ReconstructedModel, data: Data, part: Part = "all") -> list[Parts]:
+def held_out_parts(
+    model: ReconstructedModel, data: Data, part: Part = "all", progress: Progress = silent
+) -> list[Parts]:
     """Parts of each joint's torque that a model explains, could explain, and cannot, on the held-out blocks.
 
     Args:
@@ -28,7 +31,8 @@ def held_out_parts(model: ReconstructedModel, data: Data, part: Part = "all") ->
     data = data.sampled(_CHUNKS)
     scales = Scales.of(data.reference.samples.motion)
     most = max(1, MOST // len(data.parts))
-    return parts_of(data.sum(partial(_witness, model=model, part=part, scales=scales, most=most)))
+    rows = data.sum(partial(_witness, model=model, part=part, scales=scales, most=most))
+    return parts_of(rows, paced(progress))
 
 
 def _witness(chunk: Chunk, model: ReconstructedModel, part: Part, scales: Scales, most: int) -> Witness:

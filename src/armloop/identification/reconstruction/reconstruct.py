@@ -295,7 +295,7 @@ def _finished(
     parts = []
     if options.parts:
         progress("what a flexible regression still finds in what the model leaves")
-        parts = held_out_parts(model, data, part)
+        parts = held_out_parts(model, data, part, progress)
     worst = tried.worst(found.sorter, Options().block_seconds)
     model = replace(model, baseline={**tally.baseline(), "worst": worst, "joints": merged(parts)})
     if found.final is not None:

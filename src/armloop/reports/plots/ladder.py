@@ -9,7 +9,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, log_percent, panels, polish
+from armloop.reports.plots.style import (
+    BLUE,
+    GREY,
+    INK,
+    MUTED,
+    figure,
+    log_percent,
+    panels,
+    percent_tick,
+    polish,
+)
 from armloop.reports.words import percent
 
 _INCHES_PER_LETTER = 0.085
@@ -44,7 +54,7 @@ def ladder_figure(rungs: Sequence[Mapping[str, Any]]) -> Figure:
     polish(axes, "held-out nRMSE, mean of the joints", "", grid="x")
     axes.set_yticks(range(len(rungs)), names)
     axes.tick_params(axis="y", labelsize=10)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{100 * x:.3g} %"))
+    axes.xaxis.set_major_formatter(FuncFormatter(percent_tick))
     errors = [x for rung in rungs for x in (rung["before"], rung["after"], rung["refused"]) if x]
     low, high = min(errors, default=1e-3), max(errors, default=1.0)
     axes.xaxis.set_minor_formatter(log_percent(low, high))

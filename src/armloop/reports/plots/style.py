@@ -7,6 +7,7 @@ exchanges exactly these.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -181,12 +182,17 @@ def with_gaps(time: Array, values: Array) -> tuple[Array, Array]:
     return np.insert(time, gaps, time[gaps]), np.insert(values, gaps, np.nan)
 
 
+def percent_tick(x: float, _: object) -> str:
+    """A tick's label for a share of one."""
+    return f"{100 * x:.3g} %"
+
+
 def log_percent(low: float, high: float) -> FuncFormatter:
     """Minor labels of a logarithmic axis in percent, the fewer the larger its span: all, 2 and 5, none."""
-    labelled = range(2, 10) if high < 3 * low else (2, 5) if high < 30 * low else ()
+    labelled = tuple(range(2, 10)) if high < 3 * low else (2, 5) if high < 30 * low else ()
+    return FuncFormatter(partial(_leading_percent, labelled))
 
-    def text(x: float, _: object) -> str:
-        leading = round(x / 10 ** np.floor(np.log10(x))) if x > 0 else 0
-        return f"{100 * x:.3g} %" if leading in labelled else ""
 
-    return FuncFormatter(text)
+def _leading_percent(labelled: tuple[int, ...], x: float, _: object) -> str:
+    leading = round(x / 10 ** np.floor(np.log10(x))) if x > 0 else 0
+    return percent_tick(x, _) if leading in labelled else ""
