@@ -52,6 +52,13 @@ def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
     assert len(page) < 6e6
 
 
+@pytest.fixture
+def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages of which the words alone are looked at: their figures are made, and not written out."""
+    monkeypatch.setattr("armloop.reports.html._drawn", lambda figure, variant: "<svg></svg>")
+
+
+@pytest.mark.usefixtures("_undrawn")
 def test_without_a_replay_there_is_no_link(loop: SimpleNamespace) -> None:
     assert "replay.html" not in loop_report(loop, replay=None)
 
@@ -76,10 +83,12 @@ def test_the_loops_numbers_are_the_results(page: str, loop: SimpleNamespace) -> 
     assert "&lt;angle&gt;" in page
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_wrong_verdict_is_admitted(loop: SimpleNamespace) -> None:
     assert "the verdict was wrong" in loop_report(SimpleNamespace(**{**vars(loop), "right": False}))
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_loop_without_an_effect_found(loop: SimpleNamespace, clean: Diagnosis) -> None:
     text = loop_report(
         SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "reference": None})
