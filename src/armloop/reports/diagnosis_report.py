@@ -194,7 +194,7 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
         Card(
             with_error(estimate.value, estimate.std_error),
             _with_unit(key.replace("_", " ").capitalize(), unit(estimate.unit)),
-            "± standard error over blocks",
+            "± standard error",
         ),
         Card(
             f"{number(before)} → {number(after)}",
