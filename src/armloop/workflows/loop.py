@@ -224,7 +224,7 @@ def _diagnose(folder: Path, progress: Progress) -> Diagnosis:
     """Diagnose from the two files a user would have, the model and the log."""
     model: ReconstructedModel = load_model(folder / "model.json")
     log = read_log(folder / "logs" / "second_run.csv", joints=model.arm.n)
-    diagnosis = diagnose(model, [log], progress)
+    diagnosis = diagnose(model, [log], progress, jobs=1)  # the other core is at the measured logs
     write_json(folder / "diagnosis.json", diagnosis.to_dict())
     diagnosis.model.save(folder / "augmented.json")
     return diagnosis
