@@ -48,7 +48,7 @@ class Account:
         evidence = without(whole, contacts)
         outcome = search(evidence, progress, panel)
         late = _delay(outcome)
-        if late:
+        if late and whole.unknown is None:
             progress("what was recorded late of joints at rest is left out, and the search made anew")
             whole = _resting_late(whole, late)
             evidence = without(whole, contacts)
