@@ -38,7 +38,7 @@ ARGUMENTS = [
 #: Where maps and results are kept.
 KEPT = ROOT / "out" / "mutants"
 #: Seconds of the processor after which a test is left while its lines are traced.
-ENOUGH = 5.0
+ENOUGH = 3.0
 #: What such a test may take beyond.
 WHOLE = 15.0
 
