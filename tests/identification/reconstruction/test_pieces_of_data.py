@@ -112,7 +112,7 @@ def test_joints_must_move_and_have_torques() -> None:
     with pytest.raises(ExcitationError, match="tau2: zero throughout"):
         check_recorded(arm, given)
     given.moving[29, 2] = False
-    with pytest.raises(ExcitationError, match="q3: joint .* hardly moves"):
+    with pytest.raises(ExcitationError, match=r"q3: joint .* hardly moves"):
         check_excitation(arm, given)
     given.motion.q[50:, 0] = 0.99e-3
     with pytest.raises(ExcitationError, match=r"q1: joint .* hardly moves \(range 0.00099 rad\)"):
@@ -139,7 +139,7 @@ class TestLibraries:
         assert self.taken(made(0.2, 5), made(0.1, 9, passed=False)) == [0]
         assert self.taken(made(0.2, 5, passed=False), made(0.1, 9, passed=False)) == [1]
         assert self.taken(made(0.1, 5, tried=False), made(0.2, 9)) == [1]
-        with pytest.raises(InputError, match="0.1 5: too short; 0.2 9: too short"):
+        with pytest.raises(InputError, match=r"0\.1 5: too short; 0\.2 9: too short"):
             choose([made(0.1, 5, tried=False), made(0.2, 9, tried=False)])
         nothing: Any = None
         assert Contender(nothing, nrmse=(None,)).error == np.inf and self.contender(0.2, 1).error == 0.2
