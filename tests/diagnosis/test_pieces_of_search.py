@@ -355,3 +355,50 @@ class TestDesign:
         )
         assert found.lower[2] == low[2] and found.upper[2] == high[2] and found.velocity[2] == fastest[2]
         assert 0 < found.upper[1] - found.lower[1] < 1e-4 and 0 < found.velocity[1] < 1e-4
+
+    @pytest.mark.parametrize(
+        ("left", "known", "rounds", "made"),
+        [
+            ([(0.5, 0.1), (0.5, 0.2)], False, 2, 2),
+            ([(0.5, 0.1), (0.5, 0.05)], False, 2, 1),
+            ([(0.5, 0.1), (0.31, 0.1)], False, 2, 1),  # what is far enough already counts no more
+            ([(0.5, 0.1), (0.29, 0.2)], False, 2, 2),
+            ([(0.5, 0.31)], False, 1, 1),
+            ([(0.5, 0.1)], True, 1, 1),  # the rival comes no nearer elsewhere
+        ],
+    )
+    def test_a_motion_is_designed_anew_with_what_rivals_turn_out_to_be_able_to(
+        self, left: list[Any], known: bool, rounds: int, made: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        stages = iter(range(len(left)))
+        monkeypatch.setattr(Stage, "of_reference", staticmethod(lambda evidence, reference: next(stages)))
+        law: Any = SimpleNamespace()
+
+        def way(k: int, shape: float) -> Any:
+            rival = SimpleNamespace(effect=SimpleNamespace(place=("a", k, None)), shape=shape)
+            nearer = SimpleNamespace(
+                law=law, rival=SimpleNamespace(effect=rival.effect, shape=shape + (not known))
+            )
+            return SimpleNamespace(
+                law=law, rival=rival, left=lambda stage: left[stage][k], hardest=lambda stage: nearer
+            )
+
+        asked: list[int] = []
+
+        class Known(planning.Planner):
+            def __init__(self) -> None:
+                object.__setattr__(self, "progress", lambda text: None)
+                object.__setattr__(self, "evidence", None)
+
+            def _regression(self, ways: Any) -> Any:
+                asked.append(len(ways))
+                return None, []
+
+            def _optimised(self, regression: Any, criterion: Any) -> Any:
+                return len(asked)
+
+            def whole(self, design: Any) -> Any:
+                return design
+
+        design: Any = Known().alternatives([way(0, 0.0), way(1, 0.0)])
+        assert design == made and asked == [2, 3][:rounds]
