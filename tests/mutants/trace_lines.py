@@ -98,6 +98,10 @@ class _Contexts:
         signal.setitimer(signal.ITIMER_PROF, ENOUGH)
         try:
             return (yield)
+        except Exception:
+            if self._test in self.left:  # a binding may make something else of being told to leave
+                pytest.skip("enough")
+            raise
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
 
