@@ -150,6 +150,15 @@ def test_a_reversal_is_dilated_by_half_a_period_of_the_corner():
         assert samples.moving[np.abs(samples.motion.time - reversal - 0.5) < 0.2].all()
 
 
+def test_a_reversal_between_two_samples_is_one():
+    """Without noise the dead zone is so narrow that a joint turning round is never seen inside it."""
+    samples = preprocess([sines(np.arange(0.0013, 10, 0.004), (0.25,))], TEN_HZ)
+    for reversal in (1.0, 3.0, 5.0, 7.0, 9.0):
+        near = np.abs(samples.motion.time - reversal) < 0.045
+        assert near.any() and not samples.moving[near].any()
+        assert samples.moving[np.abs(samples.motion.time - reversal - 0.5) < 0.2].all()
+
+
 def test_the_dead_zone_follows_the_noise():
     log = sines(np.arange(0, 10, 0.004), (0.25,))
     rng = np.random.default_rng(3)

@@ -194,6 +194,9 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     q, v, tau = np.split(low_pass(on_grid(np.hstack([log.q, log.v, log.tau]))), 3, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(v) <= dead_zone
+    turned = v[1:] * v[:-1] < 0  # between two samples, however fast
+    still[1:] |= turned
+    still[:-1] |= turned
     reach = at_least(how.smear / (how.cutoff_hz * period))
     smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
     return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
