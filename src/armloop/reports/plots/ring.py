@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,7 +58,8 @@ def ring_figure(stages: Sequence[Stage], headline: str, line: str) -> Figure:
     _track(page, places)
     for k, (stage, place) in enumerate(zip(stages, places, strict=True)):
         _card(made, page, k + 1, stage, (*place, _CARD_WIDTH))
-    middle, center = 0.5 * _HEIGHT, {"ha": "center", "va": "center"}
+    middle = 0.5 * _HEIGHT
+    center: dict[str, Any] = {"ha": "center", "va": "center"}
     page.text(0.5 * _WIDTH, middle + 0.2, headline, color=INK, fontsize=17, fontweight="bold", **center)
     page.text(0.5 * _WIDTH, middle - 0.27, line, color=MUTED, fontsize=11.5, **center)
     return made
