@@ -236,7 +236,9 @@ def test_a_fleets_effects_are_parted_into_blocks_on_a_narrow_page() -> None:
     data = (["a", "b"], places, evidence, np.array([20.0, 20.0]), evidence > 40)
     wide, narrow = heat_figure(*data), heat_figure(*data, NARROW)
     assert len(wide.axes) == 2 and narrow.get_figwidth() == NARROW
-    blocks = [axes for axes in narrow.axes if axes.get_yticklabels()[0].get_text() == "a"]
+    blocks = [
+        axes for axes in narrow.axes if [text.get_text() for text in axes.get_yticklabels()] == ["a", "b"]
+    ]
     assert [label.get_text() for axes in blocks for label in axes.get_xticklabels()] == places
     drawn = np.hstack([axes.images[0].get_array() for axes in blocks])
     np.testing.assert_allclose(drawn, np.clip(evidence / 20.0, 0, 1))
