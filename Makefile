@@ -6,7 +6,7 @@
 # make wheel   the wheel, installed with its dependencies into an empty environment, in out/wheel
 # make bench   the benchmarks' ratios
 # make blind   how often the verdict on an undeclared effect is right
-# make mutants how many changes of the numerics the quick tests see
+# make mutants how many changes of the numerics the tests see, quick and slow
 
 PYTHON ?= python3
 VENV := .venv

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -79,8 +80,13 @@ def floor(module: str, package: str) -> int:
     return INSIDE[package].index(parts[2]) + 1 if len(parts) > 2 and parts[2] in INSIDE[package] else 0
 
 
-def imports(module: str) -> Iterator[str]:
-    """Yield the dotted name of everything that a module imports, wherever in it the import stands."""
+@cache
+def imports(module: str) -> tuple[str, ...]:
+    """Return the dotted name of everything that a module imports, wherever in it the import stands."""
+    return tuple(_imports(module))
+
+
+def _imports(module: str) -> Iterator[str]:
     path = MODULES[module]
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -92,6 +98,7 @@ def imports(module: str) -> Iterator[str]:
             yield from (f"{source}.{name.name}" for name in node.names)
 
 
+@cache
 def own_imports(module: str) -> set[str]:
     """Return the modules of the package that a module imports."""
     found = set()

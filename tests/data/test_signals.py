@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, LowPass, derivative, preprocess, smooth, uniform_period
+from armloop.data.signals import Conditioning, derivative, preprocess, smooth, uniform_period
 from armloop.util.errors import LogError
 
 TEN_HZ = Conditioning(cutoff_hz=10.0)
@@ -151,6 +150,15 @@ def test_a_reversal_is_dilated_by_half_a_period_of_the_corner():
         assert samples.moving[np.abs(samples.motion.time - reversal - 0.5) < 0.2].all()
 
 
+def test_a_reversal_between_two_samples_is_one():
+    """Without noise the dead zone is so narrow that a joint turning round is never seen inside it."""
+    samples = preprocess([sines(np.arange(0.0013, 10, 0.004), (0.25,))], TEN_HZ)
+    for reversal in (1.0, 3.0, 5.0, 7.0, 9.0):
+        near = np.abs(samples.motion.time - reversal) < 0.045
+        assert near.any() and not samples.moving[near].any()
+        assert samples.moving[np.abs(samples.motion.time - reversal - 0.5) < 0.2].all()
+
+
 def test_the_dead_zone_follows_the_noise():
     log = sines(np.arange(0, 10, 0.004), (0.25,))
     rng = np.random.default_rng(3)
@@ -209,27 +217,3 @@ def test_a_prediction_is_smeared_like_the_measurement():
     sharp = np.sqrt(np.mean((samples.tau - predicted) ** 2))
     smeared = np.sqrt(np.mean((samples.tau - smooth(samples, predicted)) ** 2))
     assert smeared < 0.5 * sharp
-
-
-def test_a_corner_beyond_half_the_sample_rate_is_no_filter():
-    x = np.random.default_rng(0).normal(size=(50, 2))
-    np.testing.assert_array_equal(LowPass(60.0, 0.01)(x), x)
-    assert np.std(LowPass(5.0, 0.01)(x)) < 0.6 * np.std(x)
-
-
-@pytest.mark.parametrize("samples", [2, 30, 400])
-def test_the_low_pass_is_scipys_zero_phase_one(samples: int):
-    x = np.random.default_rng(1).normal(size=(samples, 2, 3))
-    padding = min(samples - 1, int(np.ceil(1.5 / (10.0 * 0.004))))
-    expected = sosfiltfilt(butter(4, 10.0, fs=250.0, output="sos"), x, axis=0, padlen=padding)
-    np.testing.assert_allclose(LowPass(10.0, 0.004)(x), expected, rtol=1e-12, atol=1e-12)
-
-
-def test_runs_of_any_length_are_filtered_one_by_one():
-    x = np.random.default_rng(2).normal(size=(230, 2))
-    low_pass = LowPass(10.0, 0.004)
-    runs = [slice(0, 60), slice(60, 100), slice(100, 160), slice(170, 230)]
-    expected = x.copy()
-    for run in runs:
-        expected[run] = low_pass(x[run])
-    np.testing.assert_allclose(low_pass.each(x, runs), expected, rtol=1e-12, atol=1e-12)

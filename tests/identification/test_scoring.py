@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from synthetic import three_axis
 
+from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import LowPass
 from armloop.identification.scoring import residual, score
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel

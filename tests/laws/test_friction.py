@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
-from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.laws.friction import FRICTION_LAWS, Direction, FrictionLaw, FrictionTerm, _entry
 from armloop.util.errors import ModelError
 
 FS, FC, FV, VS = 1.4, 0.9, 2.2, 0.12
@@ -57,6 +57,12 @@ def test_the_parameters_of_equation_34_are_read_back():
         (FrictionTerm("quadratic"), [-4, 0, 0.25]),
         (FrictionTerm("cubic"), [-8, 0, 0.125]),
         (FrictionTerm("stribeck", parameter=1.0), [np.exp(-4) - 1, 0, 1 - np.exp(-0.25)]),
+        (FrictionTerm("stribeck_peak", parameter=2.0), [-np.exp(-1), 0, np.exp(-0.0625)]),
+        (FrictionTerm("viscous_forward"), [0, 0, 0.5]),
+        (FrictionTerm("viscous_backward"), [-2, 0, 0]),
+        (FrictionTerm("both_ways"), [1, 0, 1]),
+        # samples are a second apart
+        (FrictionTerm("fading_sign", parameter=4.0), [-1, 0, np.exp(-0.5)]),
     ],
 )
 def test_columns(term, expected):
@@ -86,6 +92,39 @@ def test_a_run_that_begins_in_mid_motion_begins_stretched():
     # speeding up at 2.5 rad/s^2 it has turned 0.2 rad since it was at rest: from -1 by 0.2/0.15
     speeding = Motion(motion.time, motion.q, motion.v, np.full((3, 1), 2.5), motion.starts)
     np.testing.assert_allclose(term.column(speeding, 0)[0], 0.2 / 0.15 - 1)
+
+
+@pytest.mark.parametrize(
+    ("v", "vdot", "state"),
+    [
+        (1.0, -2.5, 1.0),  # slowing down: it has slid for long
+        (-1.0, 2.5, -1.0),
+        (-1.0, -2.5, 1 - 0.2 / 0.15),
+        (1.0, 0.0, 1.0),
+        (1.0, 0.5, 1.0),  # a radian since it was at rest: slid
+        (0.006, 0.5, -1 + 0.006**2 / 0.15),
+        (0.0049, -1.0, 0.0),  # at rest: relaxed
+        (0.0, 1.0, 0.0),
+    ],
+)
+def test_the_stretch_with_which_a_run_begins(v: float, vdot: float, state: float) -> None:
+    assert _entry(np.array([v]), np.array([vdot]), 0.15)[0] == pytest.approx(state, abs=1e-12)
+
+
+def test_by_load_without_a_direction_of_its_own() -> None:
+    motion = at_speeds([-2.0, 0.5])
+    fading = FrictionTerm("load_smooth_sign", parameter=0.5).column(motion, 0, np.array([[3.0], [-5.0]]))
+    np.testing.assert_allclose(fading, [3 * np.tanh(-4.0), 5 * np.tanh(1.0)])
+    assert FRICTION_LAWS["coulomb"] == FRICTION_LAWS["coulomb_fading"] == ("smooth_sign",)
+    assert FRICTION_LAWS["nonlinear_viscous"] == ("root", "quadratic", "cubic")
+
+
+def test_what_two_joints_share_acts_on_both() -> None:
+    along, total = Direction(0, 2, -0.5), [1.0, 1.0, 1.0]
+    assert along.of([4.0, 9.0, 2.0]) == 3.0 and Direction(1).of([4.0, 9.0, 2.0]) == 9.0
+    along.add(total, 2.0)
+    Direction(1).add(total, 5.0)
+    assert total == [3.0, 6.0, 0.0]
 
 
 def test_a_law_survives_its_dictionary_and_keeps_joints_apart():

@@ -1,10 +1,11 @@
-"""Mutation testing: change the numerics in one place at random, and see whether the quick tests of the room fail.
+"""Mutation testing: change the numerics in one place at random, and see whether the tests of the room fail.
 
     python tests/mutants/run.py --rooms regression laws --mutants 40 --seed 1
 
-A mutant is one comparison, operator, number, sign or choice put otherwise, in a copy of the package. It is tried on those
-of its room's quick tests that execute its statement, in a fork of a process that has numpy and Drake at hand; it is dead
-if one fails or takes five times as long as without it. Results are kept in ``out/mutants/`` by the content of the file that
+A mutant is one comparison, operator, number, sign or choice put otherwise, in a copy of the package. It is tried first on
+those of its room's quick tests that execute its statement, then on slow ones and those of rooms that guard it too, in a fork
+of a process that has numpy and Drake at hand; it is dead if one fails or takes three times as long as without it. What no
+test executes survives. Results are kept in ``out/mutants/`` by the content of the file that
 was changed and of the tests that decided, so that a run that was ended goes on where it was; what is done until then is
 a random sample too.
 """
@@ -26,6 +27,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -57,12 +59,13 @@ AT_HAND = (
     "pydrake.all control osqp pysindy pyarrow.csv pyarrow.parquet msgspec hypothesis yaml jinja2 coverage"
 )
 #: Times what its tests take that a mutant may take, and seconds that everything else may.
-PATIENCE, MARGIN = 5.0, 20.0
-#: Seconds after which a mutant that waits for something is dead.
-WAITING = 900.0
-#: Seconds of its room's tests, and of those elsewhere, that a mutant is tried on: the quickest that execute its statement.
-#: One that they do not see counts as survived, though a longer test may see it.
-NEAR, ELSEWHERE = 60.0, 30.0
+PATIENCE, MARGIN = 3.0, 15.0
+#: Seconds without any work after which a mutant that waits for something is dead.
+WAITING = 300.0
+#: Seconds of its room's quick tests that a mutant is tried on, and of those that are left, marked slow or not, and of the
+#: rooms that guard it: the quickest that execute its statement. One that they do not see counts as survived, though a
+#: longer test may see it.
+QUICK, SLOW = 20.0, 45.0
 
 
 @cache
@@ -70,18 +73,22 @@ def _of(folder: str) -> list[Traced]:
     return [test for file in sorted((ROOT / "tests" / folder).rglob("test_*.py")) for test in traced(file)]
 
 
-def own(room: str) -> list[Traced]:
-    """The quick tests of the room."""
-    return _of(room)
+def stages(mutant: Mutant, room: str) -> Iterator[tuple[str, list[Traced]]]:
+    """The tests that a mutant is tried on: the room's quick ones, then those that are left."""
+    own = concerned(mutant, _of(room))
+    quick = _within(QUICK, [test for test in own if not test.slow])
+    yield "quick", quick
+    others = [test for name in GUARDS.get(room, ()) for test in concerned(mutant, _of(name))]
+    yield "slow", _within(SLOW, [test for test in own + others if test not in quick])
 
 
-def others(room: str) -> list[Traced]:
-    """Those of rooms that guard it too."""
-    return [test for name in GUARDS.get(room, ()) for test in _of(name)]
+def _within(seconds: float, tests: list[Traced]) -> list[Traced]:
+    tests = sorted(tests, key=lambda test: test.seconds)
+    return tests[: bisect.bisect_right(list(itertools.accumulate(test.seconds for test in tests)), seconds)]
 
 
-def concerned(mutant: Mutant, tests: list[Traced], most: float) -> list[Traced]:
-    """The tests that execute the mutant's statement, those of the file named for its module first, then quickest first."""
+def concerned(mutant: Mutant, tests: list[Traced]) -> list[Traced]:
+    """The tests that execute the mutant's statement."""
     wanted: dict[str, set[int]] = defaultdict(set)
     if mutant.names is None:
         wanted[str(mutant.path)] = set(range(mutant.first, mutant.last + 1))
@@ -92,24 +99,25 @@ def concerned(mutant: Mutant, tests: list[Traced], most: float) -> list[Traced]:
                 if name.search(line):
                     wanted[str(file.relative_to(ROOT))].add(number)
         wanted[str(mutant.path)] -= set(range(mutant.first, mutant.last + 1))
-    found = [
+    return [
         test
         for test in tests
         if any(lines & test.lines.get(path, frozenset()) for path, lines in wanted.items())
     ]
-    found.sort(key=lambda test: test.seconds)
-    edge = bisect.bisect_right(list(itertools.accumulate(test.seconds for test in found)), most)
-    found = found[:edge]
+
+
+def in_order(mutant: Mutant, tests: list[Traced]) -> list[Traced]:
+    """Those of the file named for the mutant's module first, then the quickest file first."""
     # a file's tests share its fixtures
     takes: dict[str, float] = defaultdict(float)
-    for test in found:
+    for test in tests:
         takes[test.name.split("::")[0]] += test.seconds
 
     def order(test: Traced) -> tuple[bool, float, str, float]:
         file = test.name.split("::")[0]
         return mutant.path.stem not in Path(file).stem, takes[file], file, test.seconds
 
-    return sorted(found, key=order)
+    return sorted(tests, key=order)
 
 
 class _Only:
@@ -145,6 +153,12 @@ def _try(tests: list[Traced], source: Path, pipe: int) -> None:
     os._exit(pytest.main([*ARGUMENTS, *files], plugins=[_Only([test.name for test in tests], pipe)]))
 
 
+def _worked(process: int) -> int:
+    """Ticks of the processor's time that a process has had (Linux: proc_pid_stat(5))."""
+    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+    return int(fields[11]) + int(fields[12])
+
+
 def killer(tests: list[Traced], source: Path) -> str | None:
     """The first of the tests that fails with the package there, or what else ended them; None if all pass."""
     read, write = os.pipe()
@@ -156,9 +170,10 @@ def killer(tests: list[Traced], source: Path) -> str | None:
             os._exit(99)
     os.close(write)
     # the limit is on the processor's time, which others do not take; this one is for a test that waits
-    end = time.monotonic() + WAITING
-    status = 0
-    while not (done := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < end:
+    status, worked, since = 0, -1, time.monotonic()
+    while not (done := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < since + WAITING:
+        if (now := _worked(child)) != worked:
+            worked, since = now, time.monotonic()
         time.sleep(0.02)
     try:
         os.killpg(child, signal.SIGKILL)
@@ -208,11 +223,19 @@ class Results:
         folders = () if by else (room, *GUARDS.get(room, ()))
         return digest([path for name in folders for path in sorted((ROOT / "tests" / name).rglob("*.py"))])
 
-    def add(self, key: str, room: str, mutant: Mutant, by: str | None, seconds: float) -> dict[str, Any]:
+    def add(
+        self, key: str, room: str, mutant: Mutant, by: str | None, stage: str, seconds: float
+    ) -> dict[str, Any]:
         """Keep one more."""
         each = {
             **{"key": key, "room": room, "path": str(mutant.path), "line": mutant.line},
-            **{"old": mutant.old, "new": mutant.new, "killer": by, "seconds": round(seconds, 1)},
+            **{
+                "old": mutant.old,
+                "new": mutant.new,
+                "killer": by,
+                "stage": stage,
+                "seconds": round(seconds, 1),
+            },
             "tests": self.tests(by, room),
         }
         self.known[key] = each
@@ -243,7 +266,7 @@ def main() -> None:
     begin = time.monotonic()
     drawn = mutants(options.rooms, options.mutants, options.seed)
     KEPT.mkdir(parents=True, exist_ok=True)
-    results = Results(KEPT / "results.jsonl")
+    results = Results(KEPT / "trials.jsonl")
     # on one core there are no worker processes, whose lines would not be seen
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     for name in AT_HAND.split():
@@ -267,37 +290,42 @@ def main() -> None:
                 kept, tried = file.stat(), 0
                 file.write_text(mutant.mutated(text), encoding="utf-8")
                 try:
-                    for guards, most in ((own, NEAR), (others, ELSEWHERE)):
-                        if by is None and (chosen := concerned(mutant, guards(room), most)):
-                            tried += len(chosen)
-                            by = killer(chosen, source)
+                    for stage, chosen in stages(mutant, room):  # noqa: B007
+                        tried += len(chosen)
+                        if chosen and (by := killer(in_order(mutant, chosen), source)):
+                            break
                 finally:
                     file.write_text(text, encoding="utf-8")
                     os.utime(file, ns=(kept.st_atime_ns, kept.st_mtime_ns))
-                each = results.add(key, room, mutant, by, time.monotonic() - started)
+                each = results.add(key, room, mutant, by, stage, time.monotonic() - started)
                 print(_line(each), f"({each['seconds']:.1f} s, {tried} tests)", flush=True)
             answers.append(each)
-    report(answers)
+    report(answers, options.seed)
 
 
 def _line(each: dict[str, Any]) -> str:
-    fate = "dead" if each["killer"] else "SURVIVED"
-    return f"{fate:9}{each['path']}:{each['line']}  {each['old']!r} -> {each['new']!r}"
+    fate = "survived" if not each["killer"] else "timed out" if each["killer"] == "time" else each["stage"]
+    return f"{fate:11}{each['path']}:{each['line']}  {each['old']!r} -> {each['new']!r}"
 
 
-def report(answers: list[dict[str, Any]]) -> None:
+def report(answers: list[dict[str, Any]], seed: int) -> None:
     """The score, by room and of all, and who survived."""
-    print("\nroom, mutants, dead by the room's quick tests, by these or others' (95 % interval)")
+    print(
+        f"\n{len(answers)} mutants, seed {seed}; killed quick: by the room's quick tests; slow: by what is left"
+    )
+    print(
+        f"{'room':30}{'mutants':>8}{'quick':>8}{'slow':>8}{'timed out':>11}{'survived':>10}  score (95 % interval)"
+    )
     for room in (*ROOMS, ""):
         of = [each for each in answers if each["room"].startswith(room)]
         if of:
             dead = [each for each in of if each["killer"]]
-            near = sum(
-                each["killer"].startswith((f"tests/{each['room']}/", "time", "import")) for each in dead
-            )
+            quick = sum(each["stage"] == "quick" for each in dead)
+            late = sum(each["killer"] == "time" for each in dead)
             low, high = wilson(len(dead), len(of))
             print(
-                f"{room or 'all':30}{len(of):5}{near / len(of):8.0%}{len(dead) / len(of):8.0%} ({low:.0%} to {high:.0%})"
+                f"{room or 'all':30}{len(of):8}{quick:8}{len(dead) - quick:8}{late:11}{len(of) - len(dead):10}"
+                f"  {quick / len(of):.0%} quick, {len(dead) / len(of):.0%} ({low:.0%} to {high:.0%})"
             )
     print("\n".join(_line(each) for each in answers if not each["killer"]))
 

@@ -1,6 +1,7 @@
-"""Dynamic contexts of a coverage: which quick tests of a file execute which lines of the package, and how long each takes.
+"""Dynamic contexts of a coverage: which tests of a file execute which lines of the package, and how long each takes.
 
-What the import, or a fixture of more than one test executes is put down to every test of the file.
+What the import, or a fixture of more than one test executes is put down to every test of the file. A test is left after
+``ENOUGH`` seconds: it counts as slow, and what it executes later is not known.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import ctypes
 import functools
 import hashlib
 import json
+import multiprocessing
 import os
 import signal
 import sys
@@ -29,21 +31,27 @@ ARGUMENTS = [
     "-n",
     "0",
     "-m",
-    "not slow and not long",
+    "not long",
     "-p",
     "no:cacheprovider",
     f"--rootdir={ROOT}",
 ]
 #: Where maps and results are kept.
 KEPT = ROOT / "out" / "mutants"
+#: Seconds of the processor after which a test is left while its lines are traced.
+ENOUGH = 3.0
+#: What such a test may take beyond.
+WHOLE = 15.0
 
 
 @dataclass(frozen=True)
 class Traced:
-    """A test: how long it takes (s, while traced), and the lines it executes by the package's file."""
+    """A test: how long it takes (s, while traced; of one that was left, at most), whether it is slow, by its mark or
+    because it was left, and the lines it executes by the package's file."""
 
     name: str
     seconds: float
+    slow: bool
     lines: dict[str, frozenset[int]]
 
 
@@ -51,7 +59,17 @@ class _Contexts:
     """A plugin of pytest that tells the tracer whose lines follow."""
 
     def __init__(self, tracer: Any) -> None:
-        self.tracer, self.seconds, self._test = tracer, dict[str, float](), ""
+        self.tracer, self.seconds, self.slow, self._test = tracer, dict[str, float](), set[str](), ""
+        self.left = set[str]()
+        signal.signal(signal.SIGPROF, self._leave)
+
+    def _leave(self, *_: Any) -> None:
+        if multiprocessing.active_children():  # they would be left with locks that nobody opens
+            signal.setitimer(signal.ITIMER_PROF, 1.0)
+            return
+        self.slow.add(self._test)
+        self.left.add(self._test)
+        pytest.skip("enough")
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
@@ -68,8 +86,24 @@ class _Contexts:
         begin = time.process_time()
         result = yield
         self.seconds[item.nodeid] = time.process_time() - begin
+        if self._test in self.left:
+            self.seconds[self._test] += WHOLE
+        if item.get_closest_marker("slow"):
+            self.slow.add(item.nodeid)
         self.tracer.switch_context("")
         return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Iterator[None]:
+        signal.setitimer(signal.ITIMER_PROF, ENOUGH)
+        try:
+            return (yield)
+        except Exception:
+            if self._test in self.left:  # a binding may make something else of being told to leave
+                pytest.skip("enough")
+            raise
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
@@ -81,7 +115,7 @@ class _Contexts:
 
 
 def _trace(file: Path, out: Path) -> None:
-    """In a process of its own: run the file's quick tests, and write which executed what."""
+    """In a process of its own: run the file's tests, and write which executed what."""
     import coverage
 
     sys.path.insert(0, str(ROOT / "src"))
@@ -103,7 +137,9 @@ def _trace(file: Path, out: Path) -> None:
                 lines[context].setdefault(str(Path(path).relative_to(ROOT)), []).append(line)
     executed = {path for context, of in lines.items() if context for path in of}
     files = {path: _digest(ROOT / path) for path in sorted(executed)}
-    out.write_text(json.dumps({"seconds": plugin.seconds, "files": files, "lines": lines}))
+    out.write_text(
+        json.dumps({"seconds": plugin.seconds, "slow": sorted(plugin.slow), "files": files, "lines": lines})
+    )
 
 
 def _digest(path: Path) -> str:
@@ -137,7 +173,7 @@ def forked(function: Any, *arguments: Any) -> int:
 
 
 def traced(file: Path) -> list[Traced]:
-    """The quick tests of a file, from what is kept if neither they nor what they execute have changed since."""
+    """The tests of a file, from what is kept if neither they nor what they execute have changed since."""
     content = hashlib.sha256()
     helpers = [*(ROOT / "tests").glob("*.py"), *file.parent.glob("conftest.py"), file]
     for path in sorted(helpers):
@@ -149,13 +185,14 @@ def traced(file: Path) -> list[Traced]:
         for former in KEPT.glob(f"{name}-????????????????????????.*"):
             former.unlink()
         if forked(_trace, file, kept):
-            sys.exit(f"the quick tests of {file.relative_to(ROOT)} fail without any change")
+            sys.exit(f"the tests of {file.relative_to(ROOT)} fail without any change")
     answer = json.loads(kept.read_text())
     shared = answer["lines"].get("", {})
     return [
         Traced(
             name,
             seconds,
+            name in answer["slow"],
             {
                 path: frozenset(own.get(path, [])) | frozenset(shared.get(path, []))
                 for path in {*own, *shared}

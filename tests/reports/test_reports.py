@@ -58,11 +58,6 @@ def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("armloop.reports.html._drawn", lambda figure, variant: "<svg></svg>")
 
 
-@pytest.mark.usefixtures("_undrawn")
-def test_without_a_replay_there_is_no_link(loop: SimpleNamespace) -> None:
-    assert "replay.html" not in loop_report(loop, replay=None)
-
-
 def test_contents_lead_to_sections(page: str) -> None:
     parsed = Page(page)
     assert len(set(parsed.anchors)) == len(parsed.anchors) >= 8
@@ -84,16 +79,14 @@ def test_the_loops_numbers_are_the_results(page: str, loop: SimpleNamespace) -> 
 
 
 @pytest.mark.usefixtures("_undrawn")
-def test_a_wrong_verdict_is_admitted(loop: SimpleNamespace) -> None:
-    assert "the verdict was wrong" in loop_report(SimpleNamespace(**{**vars(loop), "right": False}))
-
-
-@pytest.mark.usefixtures("_undrawn")
-def test_a_loop_without_an_effect_found(loop: SimpleNamespace, clean: Diagnosis) -> None:
+def test_a_wrong_verdict_is_admitted_and_what_is_not_there_has_no_link(
+    loop: SimpleNamespace, clean: Diagnosis
+) -> None:
     text = loop_report(
-        SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "reference": None})
+        SimpleNamespace(**{**vars(loop), "diagnosis": clean, "right": False, "reference": None}), replay=None
     )
-    assert "no effect" in text and "One-shot SINDy" not in text
+    assert "the verdict was wrong" in text and "no effect" in text
+    assert "One-shot SINDy" not in text and "replay.html" not in text
 
 
 def test_the_picture_has_eight_small_figures(loop: SimpleNamespace) -> None:
@@ -108,6 +101,7 @@ def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
     assert not [a for a in Page(found + nothing).addresses if a.startswith("http")]
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_an_unlisted_law_is_shown(loop: SimpleNamespace, clean: Diagnosis) -> None:
     law = Unlisted(2, 3.2, 1.5, "0.48*cos(q2)^2*v2", 1.6)
     text = diagnosis_report(

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.filters import filter_reach
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -74,14 +76,6 @@ class Motion:
         """Return the samples of each run as a slice, in order."""
         ends = [*self.starts[1:], self.samples]
         return [slice(int(first), int(last)) for first, last in zip(self.starts, ends, strict=True)]
-
-
-def filter_reach(cutoff_hz: float) -> float:
-    """Seconds to either side over which a low-pass of this corner smears a step: half a period of it; 0 without one.
-
-    It is the correlation time of what has passed the filter, too.
-    """
-    return 0.5 / cutoff_hz if cutoff_hz > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

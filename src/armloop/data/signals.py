@@ -1,4 +1,5 @@
-"""Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter, one differentiation.
+"""Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter (:mod:`armloop.data.filters`), one
+differentiation.
 
 Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
 motion it belongs to stay together in time; runs are treated one by one, never across a gap.
@@ -8,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.filters import INDEPENDENT, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
-from armloop.data.motion import Motion, Samples, filter_reach
+from armloop.data.motion import Motion, Samples
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
@@ -63,65 +64,12 @@ class ShortRunError(LogError):
     """No run of a log is long enough for the filter."""
 
 
-@dataclass(frozen=True)
-class LowPass:
-    """Zero-phase Butterworth low-pass of order 4 on a uniform grid of ``period`` seconds."""
-
-    cutoff_hz: float
-    period: float
-
-    def __call__(self, x: Array) -> Array:
-        """Filter (N, ...) along the first axis; runs shorter than the padding get a shorter padding."""
-        if self.cutoff_hz <= 0 or self.cutoff_hz >= 0.5 / self.period or len(x) == 0:
-            return x
-        # Here, for scipy's signals take longer to import than a fault of the input to be told.
-        from scipy.signal import sosfilt
-
-        # As scipy's sosfiltfilt does it, to the bit, but for the initial state: that takes longer than a short run.
-        sos, state = _sections(self.cutoff_hz, self.period)
-        state = state.reshape(*state.shape, *[1] * (x.ndim - 1))
-        pad = min(len(x) - 1, at_least(1.5 / (self.cutoff_hz * self.period)))
-        before, after = 2 * x[:1] - x[pad:0:-1], 2 * x[-1:] - x[-2 : -(pad + 2) : -1]
-        y = np.concatenate([before, x, after])
-        for _ in range(2):
-            y = sosfilt(sos, y, axis=0, zi=state * y[:1])[0][::-1]
-        return np.asarray(y[pad : pad + len(x)])
-
-    def each(self, x: Array, runs: Sequence[slice]) -> Array:
-        """Filter runs of x (N, ...) one by one, those of equal length at a time; the rest of x stays as it is."""
-        if self.cutoff_hz <= 0:
-            return x
-        equal: dict[int, list[slice]] = {}
-        for run in runs:
-            equal.setdefault(run.stop - run.start, []).append(run)
-        filtered = np.array(x, dtype=float)
-        for some in equal.values():
-            together = self(np.stack([x[run] for run in some], axis=1))
-            for k, run in enumerate(some):
-                filtered[run] = together[:, k]
-        return filtered
-
-
-@lru_cache(maxsize=16)
-def _sections(cutoff_hz: float, period: float) -> tuple[Array, Array]:
-    """The filter's second-order sections (2, 6), and their state (2, 2) after a step that was always there."""
-    from scipy.signal import butter, sosfilt_zi
-
-    sos = np.asarray(butter(4, cutoff_hz, fs=1 / period, output="sos"))
-    return sos, np.asarray(sosfilt_zi(sos))
-
-
 def uniform_period(time: Array) -> float:
     """The mean sample period of a run of at least two samples, s.
 
     A median of the steps would carry their rounding, which counts where stamps are seconds since 1970.
     """
     return float(time[-1] - time[0]) / (len(time) - 1)
-
-
-def at_least(count: float) -> int:
-    """The whole number not below ``count``, but for rounding: periods come from stamps that were rounded."""
-    return int(np.ceil(count - 1e-6))
 
 
 def derivative(x: Array, period: float) -> Array:
@@ -214,9 +162,13 @@ def smooth(samples: Samples, x: Array) -> Array:
 
 
 def independent_rows(samples: Samples) -> NDArray[np.bool_]:
-    """(N,) every so many samples that four are left per period of the corner: more carry no more information."""
+    """(N,) every so many samples that :data:`INDEPENDENT` are left per period of the corner."""
     rows = np.zeros(samples.motion.samples, dtype=bool)
-    stride = 1 if samples.cutoff_hz <= 0 else max(1, int(0.25 / (samples.cutoff_hz * samples.period) + 1e-6))
+    stride = (
+        1
+        if samples.cutoff_hz <= 0
+        else max(1, int(1 / INDEPENDENT / (samples.cutoff_hz * samples.period) + 1e-6))
+    )
     for run in samples.motion.runs():
         rows[run.start : run.stop : stride] = True
     return rows
@@ -242,6 +194,9 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     q, v, tau = np.split(low_pass(on_grid(np.hstack([log.q, log.v, log.tau]))), 3, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(v) <= dead_zone
+    turned = v[1:] * v[:-1] < 0  # between two samples, however fast
+    still[1:] |= turned
+    still[:-1] |= turned
     reach = at_least(how.smear / (how.cutoff_hz * period))
     smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
     return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
+from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.laws.effects import Context, Effect
@@ -90,7 +91,7 @@ class Evidence:
         context = model.context(samples.motion, effects)
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
-            context = replace(context, period=max(context.period, 0.25 / samples.cutoff_hz))
+            context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
         rows = _sliding(samples, model) & independent_rows(samples)[:, None]
         rows &= ~far_outside(samples.motion, model.history.get("range"))
         return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))

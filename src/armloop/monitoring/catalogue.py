@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.model import ReconstructedModel
@@ -93,7 +94,7 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     size = np.array(model.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
     q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
     cutoff = model.conditioning.cutoff_hz
-    period = 0.25 / cutoff if cutoff > 0 else 0.01
+    period = 1 / INDEPENDENT / cutoff if cutoff > 0 else 0.01
     motion = Motion(period * np.arange(400.0), q + size[3], v, vdot, np.array([0]))
     known = replace(model.context(motion, kept), period=period)
     shapes = [(e, list(e.shapes(known))) for e in kept]
@@ -115,7 +116,7 @@ def catalogue(model: ReconstructedModel, samples: Samples, rows: NDArray[np.intp
     """The columns of a run's samples ``rows`` (K,), in the order of :func:`watched`."""
     motion, period = samples.motion, samples.period
     if samples.cutoff_hz > 0:
-        period = max(period, 0.25 / samples.cutoff_hz)
+        period = max(period, 1 / INDEPENDENT / samples.cutoff_hz)
     effects = watched(model)
     whole = model.context(motion, [e for e, _ in effects])
     assert whole.load is not None and whole.predicted is not None

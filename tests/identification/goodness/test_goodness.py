@@ -12,6 +12,7 @@ from armloop.data.log import MotionLog, write_log
 from armloop.data.pieces import log_sources
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.model import load_model
+from armloop.regression.sparse import Sparse
 
 PLAIN = Options(standard_errors=False)
 
@@ -66,7 +67,7 @@ def test_logs_that_are_streamed_are_judged_alike(tmp_path: Path) -> None:
             logs,
             three_axis(),
             library="double-feature-set",
-            options=Options(max_order=1, standard_errors=False),
+            options=Options(max_order=1, standard_errors=False, sparse=Sparse("thresholded")),
             in_memory=in_memory,
         )
         found.append([part.predictable_left for part in made.parts])

@@ -56,8 +56,8 @@ class AdaptiveFeedforward(LeafSystem):
     by the same ramp, as a constant, -(I(t_named) - I(t_change)), so that it need not unwind, and once more after the ramp,
     during which it went on learning. `trial` seconds after the
     ramp the mean absolute tracking error is compared with that of the `trial` seconds before the first name: where it
-    has become more than a tenth worse the effect is given back by the same ramp, and what was named there is not taken
-    again. Faults of sensors are not supplied.
+    has become more than a tenth worse the effect, and what was taken off for the integrator, is given back by the same
+    ramp, and what was named there is not taken again. Faults of sensors are not supplied.
 
     Input ports: `q_ref`, `v_ref`, `vdot_ref` (n,); `state` (2n,); `named`, abstract, of `ResidualMonitor`;
     `integral` (n,), the torque I that the controller's integrator holds, N*m (N), may be left open. Output ports:
@@ -122,6 +122,8 @@ class AdaptiveFeedforward(LeafSystem):
                     taken,
                     now=(),
                     before=effects,
+                    offset=None,
+                    offset_before=taken.offset,
                     since=time,
                     refused=refused,
                     given_back=taken.given_back + 1,

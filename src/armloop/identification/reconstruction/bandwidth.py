@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.filters import LowPass, filter_reach
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, LowPass, ShortRunError, preprocess, uniform_period
+from armloop.data.signals import Conditioning, ShortRunError, preprocess, uniform_period
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -180,7 +181,7 @@ def table_at(
             continue
         motion, period = samples.motion, uniform_period(log.time)
         elapsed = motion.time - log.time[0]
-        margin, length = 0.5 / lowest + period, float(log.time[-1] - log.time[0])
+        margin, length = filter_reach(lowest) + period, float(log.time[-1] - log.time[0])
         used = (elapsed > margin) & (elapsed < length - margin)
         if aside is not None:
             used &= ~within(motion.time, aside[k], margin)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.blocks import block_numbers
+from armloop.data.filters import at_least
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import at_least
 from armloop.identification.reconstruction.options import Options
 from armloop.util.arrays import Index, Mask
 

@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import smooth
@@ -324,11 +325,10 @@ class LagrangianLibrary(Library):
     def undetermined(self, arm: Arm, logs: Sequence[LogSource], cutoff_hz: float) -> str:
         """Why there are too many candidates for the logs.
 
-        Torque below a corner takes four values per period of it, each joint apart
-        (:func:`armloop.data.signals.independent_rows`). Fewer values than candidates determine none of them, and the search
-        among them takes longest.
+        Torque below a corner takes few values per period of it, each joint apart. Fewer values than candidates determine
+        none of them, and the search among them takes longest.
         """
         read = (source.read() for source in logs)
         seconds = sum(float(np.ptp(log.time[run])) for log in read for run in log.runs())
-        values, count = int(4 * cutoff_hz * seconds * arm.n), candidates(arm).count
+        values, count = int(INDEPENDENT * cutoff_hz * seconds * arm.n), candidates(arm).count
         return "" if count <= values else f"{count} candidates, but {values} independent values of torque"

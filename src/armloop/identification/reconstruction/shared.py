@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from armloop.data.filters import at_least
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import Conditioning, at_least
+from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.determined import combination, told_apart

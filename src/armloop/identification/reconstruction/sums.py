@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import LowPass
 from armloop.features.wave_moments import WaveProducts, WaveSums
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.found import Found

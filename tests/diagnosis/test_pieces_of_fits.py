@@ -1,0 +1,163 @@
+"""How trials are fitted, refitted and refused, and what a diagnosis changes: on numbers one can see through."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.diagnosis import compensation, fit, next_run, trials
+from armloop.diagnosis.compensation import FeedforwardChange
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.trials import Known
+
+
+class TestRefits:
+    @staticmethod
+    def known(errors: list[float], effects: list[Any], monkeypatch: pytest.MonkeyPatch) -> tuple[Known, int]:
+        """What is known if the fits, one after the other, leave such errors; and how many were made."""
+        made = iter(errors)
+        fits: list[Any] = []
+
+        def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
+            fits.append((evidence, residual))
+            score = SimpleNamespace(error=next(made))
+            return SimpleNamespace(score=score, effects=(), parameters=())
+
+        monkeypatch.setattr(trials, "fit", fitted)
+        evidence: Any = SimpleNamespace(residual=lambda added: len(fits))
+        evidence.knowing = lambda added: SimpleNamespace(of=len(fits))
+        return Known.of(evidence, effects, [None] * len(effects)), len(fits)  # type: ignore[list-item]
+
+    def test_effects_are_fitted_anew_with_what_they_change_of_each_other(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        known, fits = self.known([3.0, 2.0, 1.0], [None], monkeypatch)
+        assert known.error == 1.0 and fits == 3 and known.residual == 2
+        known, fits = self.known([3.0, 3.0], [None], monkeypatch)
+        assert known.error == 3.0 and fits == 2 and known.residual == 0
+        known, fits = self.known([3.0, 2.0, 2.5], [None], monkeypatch)
+        assert known.error == 2.0 and known.residual == 1
+        assert self.known([3.0], [], monkeypatch)[1] == 1
+
+
+class TestTrials:
+    @pytest.mark.parametrize(
+        ("of", "made"),
+        [
+            ({}, True),
+            ({"joint": None}, True),
+            ({"other_joint": 2}, False),  # the second joint rests
+            ({"joint": 2}, False),
+            ({"shapes": []}, False),
+            ({"shapes": [1.0, 2.0]}, True),
+            ({"plausible": False}, False),
+            ({"resolved": False}, False),
+        ],
+    )
+    def test_an_effect_must_show_be_plausible_and_resolved(
+        self, of: dict[str, Any], made: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        effect: Any = SimpleNamespace(
+            joint=of.get("joint", 1),
+            other_joint=of.get("other_joint"),
+            shapes=lambda context: of.get("shapes", [5.0]),
+            plausible=lambda arm, parameters: of.get("plausible", True),
+            resolved=lambda parameters, shapes: of.get("resolved", True),
+        )
+        asked: list[Any] = []
+
+        def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
+            asked.append((effects, shapes))
+            return SimpleNamespace(effects=effects, parameters=[{}] * len(effects))
+
+        monkeypatch.setattr(trials, "fit", fitted)
+        chosen = Shape(2.0, (1.0, 2.0))
+        monkeypatch.setattr(trials, "_best_shape", lambda known, effect, shapes: chosen)
+        rows = np.zeros((4, 2), dtype=bool)
+        rows[2, 0] = True
+        evidence: Any = SimpleNamespace(rows=rows, context=None, model=SimpleNamespace(arm=None))
+        other: Any = SimpleNamespace(plausible=lambda arm, parameters: True)
+        current: Any = SimpleNamespace(effects=(other,), shapes=(Shape.fixed(0.0),))
+        trial = Known(evidence, np.zeros((4, 2)), current).trial(effect)
+        assert (trial is not None) == made
+        if made:
+            shape = chosen if "shapes" in of else Shape.fixed(5.0)
+            assert asked == [([other, effect], [Shape.fixed(0.0), shape])]
+
+    def test_a_shape_is_chosen_on_all_blocks_and_without_each_fold(self) -> None:
+        t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+        shapes = [1.0, 2.0, 3.0]
+        fold = np.repeat([0, 1], 40)
+        # of two joints the second shows it: twice an angle in the first fold, half as much of thrice it in the other
+        y = np.where(fold == 0, np.sin(2 * t), 0.5 * np.sin(3 * t))
+        stacked = SimpleNamespace(joint=np.repeat([0, 1], 80))
+        first = np.sin(t)
+        current: Any = SimpleNamespace(
+            stacked=stacked,
+            held_out=np.concatenate([first, y]),
+            outside=np.tile(np.concatenate([first, y]), (2, 1)),
+        )
+        evidence: Any = SimpleNamespace(
+            smoothed=lambda effect, shape: np.sin(shape * t)[:, None],
+            rows=np.ones((80, 2), dtype=bool),
+            independent=slice(None),
+            scale=np.array([1.0, 0.1]),
+            fold=fold,
+        )
+        known = Known(evidence, np.zeros((80, 2)), current)
+        effect: Any = SimpleNamespace(joint=2, other_joint=None)
+        assert trials._best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
+        effect.joint = 1
+        assert trials._best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
+        # what is left without a fold chooses for it
+        current.outside[0] = np.concatenate([first, np.sin(t)])
+        effect.joint = 2
+        assert trials._best_shape(known, effect, shapes) == Shape(2.0, (1.0, 2.0))
+
+
+def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:
+    effect: Any = SimpleNamespace(shapes=lambda context: [1.0, 3.0, 2.0])
+    evidence: Any = SimpleNamespace(context=None)
+    assert [fit._bounded(effect, evidence, x) for x in (0.5, 1.5, 3.5)] == [1.0, 1.5, 3.0]
+    effect.shapes = lambda context: [1.0]
+    assert fit._bounded(effect, evidence, 7.0) == 7.0
+
+
+def test_standard_errors_fall_with_the_size_of_columns_and_their_correlation() -> None:
+    def stage(*columns: list[float]) -> Any:
+        X = np.array(columns).T
+        return SimpleNamespace(columns=lambda effect, shape: X[:, :2] if effect == "both" else X[:, 2:])
+
+    laws: Any = [SimpleNamespace(effect="both", shape=0.0), SimpleNamespace(effect="one", shape=0.0)]
+    run = stage([1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0])
+    # the first two grow by 2 and by 8; of the third a part of 0.6 is like the first
+    then = stage([2, 0, 0, 0], [0, 16, 0, 0], [0, 0, 5, 0])
+    assert next_run._sharper(run, then, laws) == [("both", pytest.approx(0.25)), ("one", pytest.approx(0.2))]
+    alike = stage([1, 0, 0, 0], [0, 2, 0, 0], [0.6, 0, 0.8, 0])
+    (_, both), (_, one) = next_run._sharper(run, alike, laws)
+    assert one == pytest.approx(1 / 0.8) and both == pytest.approx(np.sqrt(1 / 0.8))
+
+
+def test_what_feedforward_changes_along_a_run() -> None:
+    change = FeedforwardChange(np.arange(2), np.array([[3.0, -1.0], [-4.0, 1.0]]))
+    assert change.rms.tolist() == pytest.approx([np.sqrt(12.5), 1.0]) and change.largest.tolist() == [
+        4.0,
+        1.0,
+    ]
+    N = 5000
+    values = np.arange(float(N))[:, None]
+    motion = SimpleNamespace(samples=N, q=values, v=2 * values, vdot=3 * values)
+    samples: Any = SimpleNamespace(motion=motion, moving=values > 2500)
+    before: Any = SimpleNamespace(drive=lambda: lambda q, v, vdot, slip: q + 10 * v + 100 * vdot)
+    after: Any = SimpleNamespace(
+        drive=lambda: lambda q, v, vdot, slip: 2 * q + 10 * v + 100 * vdot + 1000 * slip
+    )
+    found = compensation.feedforward_change(before, after, samples)
+    assert len(found.rows) == 2000 and found.rows[[0, -1]].tolist() == [0, N - 1]
+    expected = np.where(found.rows > 2500, 2001.0, 1.0) * found.rows
+    np.testing.assert_allclose(found.torque[:, 0], expected)
+    motion.samples = 3
+    assert compensation.feedforward_change(before, after, samples).rows.tolist() == [0, 1, 2]

@@ -1,0 +1,133 @@
+"""When an effect that was named is supplied, blended, settled and given back: the law of adaptive feedforward by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector
+from synthetic import three_axis
+
+from armloop.drake.control.adaptive_feedforward import AdaptiveFeedforward
+from armloop.monitoring.blockwise import Known
+
+
+def torque(size: float, name: str = "load", sensor: bool = False) -> Any:
+    """An effect that is a torque on the first joint, and half of the reference's position on the second."""
+    law = lambda q, v, vdot: np.array([size, 0.5 * q[1], 0.0])  # noqa: E731
+    effect = SimpleNamespace(sensor=sensor, place=(name, None, None), needs_inertial=False)
+    return SimpleNamespace(effect=effect, pointwise=lambda arm, inertial: law)
+
+
+class Loop:
+    """The system with its inputs fixed, looked at every 0.05 s."""
+
+    def __init__(self, bound: float = 100.0, trial: float = 0.2) -> None:
+        model: Any = SimpleNamespace(arm=three_axis())
+        self.system = AdaptiveFeedforward(model, ramp=1.0, trial=trial, bound=bound)
+        self.context = self.system.CreateDefaultContext()
+        self.known, self.error, self.integral = Known(), 0.1, 0.0
+        self.step = 0
+
+    def to(self, time: float) -> np.ndarray:
+        """Looks until then; the torque there."""
+        while self.step < round(time / 0.05):
+            self.step += 1
+            self.context.SetTime(0.05 * self.step)
+            self._fix()
+            self.system._look(self.context, self.context.get_mutable_state())
+        self._fix()
+        output = BasicVector(3)
+        self.system._calc_tau_ff(self.context, output)
+        return output.CopyToVector()
+
+    def _fix(self) -> None:
+        for name, value in (
+            ("q_ref", [0.0, 4.0, 0.0]),
+            ("v_ref", np.zeros(3)),
+            ("vdot_ref", np.zeros(3)),
+            ("state", [-self.error, 4.0 + self.error, 0.0, 9.0, 9.0, 9.0]),
+            ("integral", [self.integral, 0.0, 0.0]),
+        ):
+            self.system.GetInputPort(name).FixValue(self.context, np.array(value))
+        self.system.GetInputPort("named").FixValue(self.context, Value(self.known))
+
+    @property
+    def given_back(self) -> float:
+        output = BasicVector(1)
+        self.system._calc_given_back(self.context, output)
+        return float(output.CopyToVector()[0])
+
+
+def test_nothing_before_the_first_name_then_a_ramp_with_what_the_integrator_learned_taken_off() -> None:
+    loop = Loop()
+    loop.integral = 0.2
+    assert_allclose(loop.to(0.6), 0.0)
+    loop.known, loop.integral = Known(1, (torque(2.0),), since=0.58), 0.7
+    assert_allclose(loop.to(0.65), 0.0)
+    # named at 0.65 s; the integrator is remembered every 0.25 s: before the change it held 0.2
+    assert_allclose(loop.to(1.15), 0.5 * np.array([2.0 - 0.5, 2.0, 0.0]))
+    assert_allclose(loop.to(1.6), 0.95 * np.array([2.0 - 0.5, 2.0, 0.0]))
+    # after the ramp what was learned during it is taken off by another
+    loop.integral = 0.9
+    assert_allclose(loop.to(1.65), [1.5, 2.0, 0.0])
+    assert_allclose(loop.to(1.65 + 0.1), [0.1 * (2.0 - 0.7) + 0.9 * 1.5, 2.0, 0.0])
+    assert_allclose(loop.to(2.8), [1.3, 2.0, 0.0])
+    assert loop.given_back == 0
+
+
+def test_it_stays_within_its_bound_and_goes_on_from_one_name_to_the_next() -> None:
+    loop = Loop(bound=1.5)
+    loop.known = Known(1, (torque(-2.0),), since=0.1)
+    loop.to(0.05)
+    assert_allclose(loop.to(0.55), [-1.0, 1.0, 0.0])
+    # another name waits until the first is supplied, and until it has settled
+    loop.known = Known(2, (torque(-1.0), torque(-0.25, "more")), since=0.6)
+    assert_allclose(loop.to(1.05), [-1.5, 1.5, 0.0])
+    loop.to(2.1)
+    assert loop.system._taken(loop.context).now == loop.known.effects
+    began = loop.system._taken(loop.context).since
+    tau = loop.to(3.2)
+    assert 1.05 < began <= 2.1
+    assert_allclose(tau, [-1.25, 1.5, 0.0])
+
+
+@pytest.mark.parametrize(("after", "back"), [(0.112, True), (0.108, False)])
+def test_it_is_given_back_where_tracking_becomes_a_tenth_worse(after: float, back: bool) -> None:
+    loop = Loop(trial=1.25)
+    loop.error, loop.integral = 5.0, 0.2
+    loop.to(0.15)
+    loop.error = 0.1  # the last 25 looks count
+    loop.to(1.35)
+    loop.known, loop.integral = Known(1, (torque(2.0),), since=1.32), 0.7
+    loop.to(1.4)
+    loop.error, loop.integral = after, 0.9
+    assert_allclose(loop.to(3.6), [2.0 - 0.7, 2.0, 0.0])
+    assert loop.given_back == 0
+    # without a jump, and with what was taken off for the integrator, which is needed again
+    assert_allclose(loop.to(3.65), [2.0 - 0.7, 2.0, 0.0])
+    assert loop.given_back == back
+    if not back:
+        assert_allclose(loop.to(6.5), [2.0 - 0.7, 2.0, 0.0])
+        return
+    assert_allclose(loop.to(3.9), 0.75 * np.array([2.0 - 0.7, 2.0, 0.0]))
+    assert_allclose(loop.to(4.65), 0.0)
+    # it is not taken again, but another is
+    loop.known = Known(2, (torque(2.0), torque(7.0, "faulty sensor", sensor=True)), since=0.2)
+    assert_allclose(loop.to(6.5), 0.0)
+    loop.known = Known(3, (torque(2.0), torque(1.0, "more")), since=6.4)
+    assert_allclose(loop.to(9.0), [1.0, 2.0, 0.0])
+    assert loop.given_back == 1
+
+
+def test_by_default_half_of_the_effort_and_times_above_zero() -> None:
+    model: Any = SimpleNamespace(arm=three_axis())
+    system = AdaptiveFeedforward(model)
+    assert_allclose(system._bound, [0.5 * joint.effort for joint in three_axis().joints])
+    for wrong in ({"ramp": 0.0}, {"trial": 0.05}, {"bound": [1.0, 0.0, 1.0]}):
+        with pytest.raises(ValueError, match="must be above 0"):
+            AdaptiveFeedforward(model, **wrong)  # type: ignore[arg-type]

@@ -1,0 +1,174 @@
+"""Which model serves which controller, how stiff it is, what a scenario's reference may be, and what a run is scored by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.drake.control import controllers
+from armloop.drake.control.controllers import controller_named
+from armloop.drake.experiments import collection, scenario_references, tracking
+from armloop.experiment.excitation import MotionRanges
+from armloop.robot.arm import load_arm
+from armloop.schemas.scenarios import ReferenceData
+from armloop.util.errors import ScenarioError
+
+ARM = load_arm("three_axis")
+
+
+class TestControllers:
+    def test_a_model_of_its_own_name_or_step_comes_first(self) -> None:
+        scenario: Any = None
+        models: Any = {"model": 0, "step2": 2, "pid_step3": 3, "mine": 4}
+
+        def served(name: str) -> Any:
+            return controller_named(name).model(scenario, models, ())
+
+        assert [served(name) for name in ("pid", "pid_step1", "pid_step2", "pid_step3")] == [None, 0, 2, 3]
+        assert served("pid_mine") == 4 and served("computed_torque") == 0
+        with pytest.raises(
+            ValueError, match="no model for the controller pid_yours; the models given are: model, step2"
+        ):
+            served("pid_yours")
+        steps = [
+            controller_named(name).step for name in ("pid", "pid_step1", "pid_step2", "pid_step3", "pid_mine")
+        ]
+        assert steps == [3, 1, 2, 3, 3]
+
+    def test_who_can_run(self) -> None:
+        assert controller_named("pid").served_by({})
+        step1 = controller_named("pid_step1")
+        assert (
+            not step1.served_by({"step2": 0})
+            and step1.served_by({"step1": 0})
+            and step1.served_by({"model": 0})
+        )
+        assert step1.served_by({"pid_step1": 0})
+        names = ("mine", "step1", "pid", "pid_step2")
+        assert [controllers.controller_of(name) for name in names] == [
+            "pid_mine",
+            "pid_step1",
+            "pid_pid",
+            "pid_step2",
+        ]
+
+    def test_as_stiff_as_pid_at_the_start_but_no_faster_than_it_samples(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        class Model:
+            pass
+
+        inertia = np.array([[2.0, 0.3], [0.3, 0.5]])
+        asked: list[Any] = []
+        monkeypatch.setattr(controllers, "ReconstructedModel", Model)
+        monkeypatch.setattr(
+            controllers,
+            "Dynamics",
+            lambda model, symmetric: SimpleNamespace(mass_matrix=lambda q: (asked.append(q), inertia)[1]),
+        )
+        scenario: Any = SimpleNamespace(
+            plant=SimpleNamespace(arm=SimpleNamespace(n=2), config=SimpleNamespace(time_step=0.001)),
+            bandwidth=None,
+            gains=SimpleNamespace(kp=np.array([50.0, 80.0])),
+            reference=SimpleNamespace(evaluate=lambda t: (np.array([[0.1, 0.2]]), None, None)),
+        )
+        model: Any = Model()
+        gains = controllers._as_stiff(scenario, model)
+        assert_allclose(gains.kp, [25.0, 160.0])
+        assert_allclose(gains.kd, [10.0, 2 * np.sqrt(160.0)])
+        assert asked[0].tolist() == [0.1, 0.2]
+        scenario.plant.config.time_step = 0.01  # 10 rad/s
+        assert_allclose(controllers._as_stiff(scenario, model).kp, [25.0, 100.0])
+        assert_allclose(controllers._as_stiff(scenario, None).kp, [400.0, 400.0])
+        scenario.bandwidth = 3.0
+        assert_allclose(controllers._as_stiff(scenario, model).kp, [9.0, 9.0])
+
+
+def test_a_run_is_scored_over_its_interval_in_degrees_and_millimetres() -> None:
+    arm = SimpleNamespace(n=2, revolute=np.array([True, False]))
+    scenario: Any = SimpleNamespace(
+        plant=SimpleNamespace(arm=arm, config=SimpleNamespace(time_step=0.1)), score=(0.2, 0.5)
+    )
+    time = 0.1 * np.arange(8)
+    q_ref, v_ref = np.zeros((10, 2)), np.ones((10, 2))
+    state = np.zeros((8, 4))
+    state[:, :2], state[:, 2:] = 9.0, 1.0
+    state[2:5, 0], state[2:5, 1] = np.deg2rad([1.0, -2.0, 3.0]), [0.001, 0.002, -0.003]
+    tau = np.ones((8, 2))
+    found = tracking.score(scenario, "pid", time, (q_ref, v_ref, v_ref), state, tau, tau)
+    assert found.scored == slice(2, 5) and found.unit == ("deg", "mm")
+    assert_allclose(found.eta, [2.0, 2.0])
+    assert_allclose(found.rms, [np.sqrt(14 / 3)] * 2)
+    assert_allclose(found.largest, [3.0, 3.0])
+    assert found.q_ref.shape == found.q.shape == (8, 2) and found.metrics.effort.tolist() == [1.0, 1.0]
+
+
+class TestReferences:
+    RANGES = MotionRanges.of(ARM)
+
+    def of(self, **given: Any) -> Any:
+        data = ReferenceData(**given)
+        return scenario_references.reference_of(data, ARM, self.RANGES, 1, Path("mine.yaml"), "mine")
+
+    def test_a_reference_keeps_the_joints_limits(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        lower, upper = ARM.joints[1].lower, ARM.joints[1].upper
+        for low, high, says in (
+            (lower, upper, ""),
+            (lower - 0.1, upper, "from"),
+            (lower, upper + 0.1, "from"),
+        ):
+            q = np.zeros((3, 3))
+            q[1, 1], q[2, 1] = low, high
+            reference = SimpleNamespace(duration=0.02, evaluate=lambda t, q=q: (q, q, q))
+            monkeypatch.setattr(scenario_references, "fourier_reference", lambda *_, r=reference: r)
+            if says:
+                with pytest.raises(ScenarioError, match="mine: reference: joint 2 would go from"):
+                    self.of(kind="fourier")
+            else:
+                assert self.of(kind="fourier") is reference
+
+    @pytest.mark.parametrize("kind", ["places", "csv"])
+    def test_it_lasts_ten_minutes_at_most(self, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        q = np.zeros((1, 3))
+        for seconds in (600.0, 601.0):
+            reference = SimpleNamespace(duration=seconds, evaluate=lambda t: (q, q, q))
+            for name in ("places_reference", "read_reference"):
+                monkeypatch.setattr(scenario_references, name, lambda *_, r=reference, **__: r)
+            given: dict[str, Any] = {"kind": kind, "places": [[0.0] * 3] * 2, "file": "motion.csv"}
+            if seconds <= 600:
+                assert self.of(**given) is reference
+            else:
+                with pytest.raises(ScenarioError, match=r"601 s; (it must be|they may take)"):
+                    self.of(**given)
+
+    def test_places_are_two_or_more_for_all_joints(self) -> None:
+        for places in ([], [[0.0] * 3], [[0.0] * 3, [0.0] * 2]):
+            with pytest.raises(ScenarioError, match="two or more places of 3 numbers each"):
+                self.of(kind="places", places=places)
+        with pytest.raises(ScenarioError, match=r"reference\.file is missing"):
+            self.of(kind="csv")
+        with pytest.raises(ScenarioError, match=r"reference\.kind is 'dance'"):
+            self.of(kind="dance")
+
+
+def test_the_parts_of_a_collection() -> None:
+    plan = collection.CollectionPlan(static_poses=3, velocity_segments=2, trajectories=2)
+    config: Any = SimpleNamespace(ranges=MotionRanges.of(ARM), time_step=0.002)
+    static, constant, varying = collection._parts(ARM, config, plan, 7)
+    assert [part.name for part in (static, constant, varying)] == ["static", "constant_velocity", "varying"]
+    assert [part.settle for part in (static, constant, varying)] == [0.09, 0.08, 0.0]
+    assert [part.time_step for part in (static, constant, varying)] == [plan.segment_time_step] * 2 + [0.002]
+    assert static.references[0].duration == pytest.approx(0.44)
+    assert constant.references[0].duration == pytest.approx(0.48)
+    assert [each.duration for each in varying.references] == [20.0, 20.0]
+    one, two = (each.evaluate([1.0])[0] for each in varying.references)
+    assert not np.allclose(one, two)
+    again = collection._parts(ARM, config, plan, 7)[2].references[1].evaluate([1.0])[0]
+    assert np.array_equal(again, two)
+    crew = collection._Crew(ARM, config, 500.0, [static, constant, varying])
+    assert crew.duration((2, 1)) == 20.0 and crew.duration((0, 0)) == static.references[0].duration

@@ -1,0 +1,248 @@
+"""How friction is selected, which samples slide, and how corners are compared, on numbers small enough to see through."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, three_axis
+
+from armloop.data.motion import Motion
+from armloop.data.signals import Conditioning
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction import bandwidth, shared
+from armloop.identification.reconstruction import friction_selection as selection
+from armloop.laws.friction import FrictionTerm
+from armloop.util.errors import ExcitationError, InputError, LogError
+
+
+class Table:
+    """Stands for the pooled regression: the held-out errors (folds, n) follow from the choice by a table."""
+
+    def __init__(self, errors: dict[str, Any], counts: Any = ((10.0, 10.0), (10.0, 10.0))) -> None:
+        self.errors, self.counts, self.candidates = errors, np.array(counts), [[], []]
+        self.squares = np.array(counts)
+
+    def solve(self, choice: Any, prior: Any = None) -> Any:
+        return SimpleNamespace(weights=np.ones(2))
+
+    def held_out(self, choice: Any, weights: Any, prior: Any) -> np.ndarray:
+        key = " ".join("".join(map(str, own)) or "-" for own in choice)
+        return np.broadcast_to(np.array(self.errors[key], dtype=float), self.counts.shape)
+
+    def evidence(self, choice: Any, weights: Any, prior: Any) -> float:
+        return float(prior)
+
+
+def state(errors: dict[str, Any], taken: list[list[int]] | None = None, **of: Any) -> Any:
+    errors = {"- -": 4.0, **errors}
+    table: Any = Table(errors, **{k: v for k, v in of.items() if k == "counts"})
+    found = selection._State(table, [[0], [1], [2]], of.get("priors", {}))
+    if taken is not None:
+        found.taken = taken
+        found._weights, found._errors = found._judged()
+    return found
+
+
+class TestLadder:
+    def test_errors_are_relative_to_the_torque_and_meant_over_the_joints(self) -> None:
+        # per joint 4 + 4 of 20 samples whose mean square is 1
+        assert state({})._error(np.array([[4.0, 1.0], [4.0, 4.0]])) == pytest.approx(
+            0.5 * (np.sqrt(8 / 20) + np.sqrt(5 / 20))
+        )
+        # a joint that does not slide anywhere counts as without error
+        still = state({}, counts=((10.0, 0.0), (10.0, 0.0)))
+        assert still._error(np.array([[4.0, 0.0], [4.0, 0.0]])) == pytest.approx(0.5 * np.sqrt(8 / 20))
+
+    def test_gains_are_mean_log_ratios_against_their_scatter_over_the_folds(self) -> None:
+        one = state({})
+        half = np.full((2, 2), 2.0)
+        assert one._gain(half, 1.0) == (pytest.approx(np.log(2)), True)
+        assert one._gain(2 * half, 1.0) == (pytest.approx(0.0), False)
+        # of one joint alone, by its samples
+        assert one._gain(np.array([[2.0, 4.0], [2.0, 4.0]]), 1.0)[0] == pytest.approx(np.log(2) / 2)
+        assert one._gain(np.array([[2.0, 4.0], [2.0, 4.0]]), 1.0, [0])[0] == pytest.approx(np.log(2))
+        # gains of the folds a and b: their sum must exceed times |a - b|
+        for a, b, times, sure in (
+            (1.0, 0.1, 1.0, True),
+            (1.0, -0.1, 1.0, False),
+            (1.0, 0.3, 2.0, False),
+            (1.0, 0.4, 2.0, True),
+        ):
+            errors = 4 * np.exp(-2 * np.array([[a, a], [b, b]]))
+            gain, is_sure = one._gain(errors, times)
+            assert (gain, is_sure) == (pytest.approx(a + b), sure)
+        single = state({}, counts=((10.0, 10.0),))
+        assert single._gain(np.full((1, 2), 2.0), 1.0) == (pytest.approx(np.log(2)), False)
+
+    def test_the_first_rung_is_taken_anyway_and_the_prior_with_most_evidence_with_it(self) -> None:
+        one = state({"0 0": 5.0}, priors={"drawings": 1.0, "nothing": 3.0, "other": 2.0})
+        took = one.take(0, "first", one_by_one=True)
+        assert one.taken == [[0], [0]] and (one.prior_name, one.prior) == ("nothing", 3.0)
+        assert (took.rung, took.refused, took.joints) == ("first", None, [0, 1])
+        assert (took.before, took.after) == (pytest.approx(np.sqrt(8 / 20)), pytest.approx(np.sqrt(10 / 20)))
+        assert took.to_dict()["joints"] == [1, 2]
+
+    def test_a_rung_is_taken_for_all_for_some_or_not(self) -> None:
+        first: dict[str, Any] = {"0 0": 4.0}
+        worth = 4 * np.exp(-0.0051), 4 * np.exp(-0.0049)
+        for errors, all_of_them in zip(worth, (True, False), strict=True):
+            one = state({**first, "01 01": errors}, [[0], [0]])
+            took = one.take(1, "second", one_by_one=False)
+            assert one.taken == ([[0, 1]] * 2 if all_of_them else [[0]] * 2)
+            assert took.joints == ([0, 1] if all_of_them else [])
+            assert took.refused == (None if all_of_them else pytest.approx(np.sqrt(2 * errors / 20)))
+        # the second joint's folds disagree: the first alone gains surely, by twice the scatter of its own
+        helps = {
+            "01 01": [[2.0, 1.0], [2.0, 18.0]],
+            "01 0": [[2.0, 4.0], [2.0, 4.0]],
+            "0 01": [[4.0, 1.0], [4.0, 18.0]],
+        }
+        one = state({**first, **helps}, [[0], [0]])
+        assert one.take(1, "second", one_by_one=True).joints == [0] and one.taken == [[0, 1], [0]]
+        assert one._error(one._errors) == pytest.approx(0.5 * (np.sqrt(4 / 20) + np.sqrt(8 / 20)))
+        one = state({**first, **helps}, [[0], [0]])
+        assert one.take(1, "second", one_by_one=False).joints == []
+
+    def test_a_joint_hands_back_the_rungs_that_it_does_not_miss_the_last_first(self) -> None:
+        kept, missed = 4 * np.exp(0.0019), 4 * np.exp(0.0021)
+        errors = {
+            "012 012": 4.0,
+            **{"01 012": [[kept, 4.0]] * 2, "01 01": [[kept, missed]] * 2},
+            **{"0 012": [[2 * missed, 4.0]] * 2, "01 02": [[kept, missed]] * 2},
+            **{"1 012": [[9.0, 4.0]] * 2, "01 12": [[kept, 9.0]] * 2},
+        }
+        one = state(errors, [[0, 1, 2], [0, 1, 2]])
+        took = one.eliminate_backward()
+        assert one.taken == [[0, 1], [0, 1, 2]] and took.joints == [0]
+        assert took.rung == "backward elimination" and took.refused is None
+        assert took.before == pytest.approx(np.sqrt(8 / 20))
+        assert took.after == pytest.approx(0.5 * (np.sqrt(2 * kept / 20) + np.sqrt(8 / 20)))
+
+    def test_elements_follow_the_speeds(self) -> None:
+        motion = fourier_motion(5.0, 100.0, 1)
+        motion.v[:] = np.array([4.0, 0.1, 1.0])
+        coulomb, _, falls, *_, by_load, memory, _ = selection.extensions(three_axis(), motion)
+        assert [t.parameter for t in coulomb.elements[0]] == [0.003, 0.01, 0.03, 0.1, 0.0]
+        assert [t.kind for t in coulomb.elements[0]] == ["smooth_sign"] * 4 + ["viscous"]
+        assert [t.parameter for t in falls.elements[0]] == [0.02, 0.056, 0.15, 0.43, 1.2]
+        assert [t.parameter for t in falls.elements[1]] == [0.02, 0.024, 0.028, 0.034, 0.04]
+        assert [t.parameter for t in by_load.elements[2]] == [0.003, 0.01, 0.03, 0.1]
+        assert [t.parameter for t in memory.elements[1]] == [3e-4, 1e-3, 3e-3, 1e-2, 3e-2]
+        slow = selection.extensions(three_axis(), motion, np.array([0.0028, 0.5, 0.5]))[0]
+        assert [own[0].parameter for own in slow.elements] == [0.0007, 0.00075, 0.00075]
+
+    def test_a_law_must_have_a_name(self) -> None:
+        selection.check_laws(None)
+        selection.check_laws(["coulomb", "viscous"])
+        with pytest.raises(InputError, match="unknown friction law 'dry'"):
+            selection.check_laws(["coulomb", "dry"])
+        with pytest.raises(InputError, match="no friction law is named"):
+            selection.check_laws([])
+
+
+class TestSharedSamples:
+    def samples(self, v: np.ndarray, cutoff: float = 5.0, starts: tuple[int, ...] = (0,)) -> Any:
+        motion = Motion(np.arange(len(v)) * 0.1, 0 * v, v, 0 * v, np.array(starts))
+        return SimpleNamespace(motion=motion, cutoff_hz=cutoff, period=0.1, moving=np.abs(v) > 0.001)
+
+    def test_steady_creep_keeps_direction_and_half_of_its_speed_over_a_period_of_the_corner(self) -> None:
+        v = np.full((30, 1), 0.008)
+        v[10], v[20] = 0.0041, 0.0039
+        # two samples to both sides
+        steady = shared._steady(self.samples(v))[:, 0]
+        assert np.flatnonzero(~steady).tolist() == [18, 19, 20, 21, 22]
+        assert np.array_equal(shared._steady(self.samples(-v))[:, 0], steady)
+        assert np.flatnonzero(~shared._steady(self.samples(v, starts=(0, 20)))[:, 0]).tolist() == [20, 21, 22]
+        assert not shared._steady(self.samples(v, cutoff=0.0)).any()
+        turn = np.where(np.arange(30) < 15, 0.008, -0.008)[:, None]
+        assert np.flatnonzero(~shared._steady(self.samples(turn))[:, 0]).tolist() == [13, 14, 15, 16]
+
+    def test_a_joint_slides_if_it_is_fast_or_creeps_steadily(self) -> None:
+        v = np.full((30, 1), 0.02)
+        v[20:] = -0.011
+        samples = self.samples(v)
+        assert shared.fast_rows(samples).all() and shared.sliding_rows(samples).all()
+        v[20:] = -0.009
+        samples = self.samples(v)
+        assert np.flatnonzero(~shared.fast_rows(samples)[:, 0]).tolist() == [*range(20, 30)]
+        assert np.flatnonzero(~shared.sliding_rows(samples)[:, 0]).tolist() == [20, 21]
+        samples.moving[25] = False
+        assert not shared.sliding_rows(samples)[25, 0]
+
+    def test_the_range_of_a_motion(self) -> None:
+        q = np.linspace(-1.0, 3.0, 1001)[:, None]
+        motion = Motion(np.arange(1001.0), q, -q, 2 * q, np.array([0]))
+        half, v, vdot, centre = shared.motion_range(motion)
+        assert half == pytest.approx([0.5 * 0.99 * 4]) and centre == pytest.approx([1.0])
+        # |v| spreads evenly from 0 to 1 twice, then to 3 once: its 0.995 quantile leaves 0.005 of the samples
+        assert v == pytest.approx([3 - 0.005 * 4], abs=1e-9) and vdot == pytest.approx([2 * v[0]])
+
+    def test_joints_must_move_and_terms_that_vanished_are_left_out(self) -> None:
+        shared.check_moves(three_axis(), np.array([100, 100, 100]))
+        with pytest.raises(ExcitationError, match=r"q2: joint .* moves in 99 samples, at least 100"):
+            shared.check_moves(three_axis(), np.array([100, 99, 0]))
+        laws = [
+            [FrictionTerm("viscous"), FrictionTerm("offset")],
+            [FrictionTerm("hysteresis", parameter=0.01)],
+        ]
+        found = shared.found_friction(laws, np.array([1e-13, -2e-12, 3.0]))
+        assert found == [[FrictionTerm("offset", -2e-12)], [FrictionTerm("hysteresis", 3.0, 0.01)]]
+
+    def test_most_base_parameters_must_be_told_apart(self) -> None:
+        base = BaseParameters.of_arm(three_axis())
+        third = base.count // 3
+        G = np.eye(base.count)
+        assert shared.undetermined_notes(G, base) == []
+        for weak in (third, third + 1):
+            G[:weak, :weak] = 0.0
+            (note,) = shared.undetermined_notes(G, base)
+            assert f"does not determine {weak} of {base.count} inertial" in note and "; what" not in note
+            if weak == third:
+                shared.check_rank(G, base)
+        with pytest.raises(ExcitationError, match=f"leaves {third + 1} of {base.count} inertial parameters"):
+            shared.check_rank(G, base)
+
+
+class TestCorners:
+    @staticmethod
+    def log(period: float, samples: int = 10) -> Any:
+        log = SimpleNamespace(period=period, samples=samples, name="run", runs=lambda: [slice(0, samples)])
+        log.read, log.select = lambda: log, lambda rows: SimpleNamespace(**{**vars(log), "rows": rows})
+        return log
+
+    def test_the_highest_is_four_tenths_of_the_lowest_rate(self) -> None:
+        how: Any = SimpleNamespace(cutoff_hz=10.0)
+        assert bandwidth.highest_corner([self.log(0.01)], how) == 10.0
+        assert bandwidth.highest_corner([self.log(0.01), self.log(0.05)], how) == 8.0
+
+    def test_it_lies_below_half_of_the_rate(self) -> None:
+        bandwidth.check_nyquist([self.log(0.01)], 49.9)
+        with pytest.raises(LogError, match=r"50 Hz is not below 50 Hz, half of the 100 samples a second"):
+            bandwidth.check_nyquist([self.log(0.01)], 50.0)
+
+    @pytest.mark.parametrize(
+        ("count", "samples", "picked"),
+        [
+            (3, 10, [0, 1, 2]),
+            (5, 60_000, [0]),
+            (5, 20_000, [0, 2, 4]),
+            (1, 90_000, [0]),
+            (9, 15_000, [0, 2, 5, 8]),
+        ],
+    )
+    def test_some_logs_evenly(self, count: int, samples: int, picked: list[int]) -> None:
+        logs = [self.log(0.01, samples) for _ in range(count)]
+        assert bandwidth._selected(logs) == picked
+        each = bandwidth.even_selection(logs)
+        assert [log.rows for log in each] == [slice(0, min(samples, 60_000 // len(picked)))] * len(picked)
+
+    def test_a_library_keeps_its_corner_where_it_is_lower(self) -> None:
+        found = bandwidth.Bandwidth(5.0, ((10.0, 0.5), (5.0, 0.3)))
+        assert found.suited(Conditioning(cutoff_hz=9.5)).cutoff_hz == 5.0
+        assert found.suited(Conditioning(cutoff_hz=4.0)).cutoff_hz == 4.0
+        assert found.notes() and bandwidth.Bandwidth(10.0, found.trials).notes() == []
+        assert bandwidth.root_mean_square(np.array([3.0, 4.0, 0.0, 0.0])) == 2.5
+        assert bandwidth.root_mean_square(np.zeros(0)) == 0.0
