@@ -115,11 +115,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if type(error).__name__ != "BrokenProcessPool":
             raise
         return _fault("a worker process was ended from outside, perhaps for want of memory; run again", 1)
-    except KeyboardInterrupt:
-        return _fault("interrupted", 130)
-    except _Ended:
-        return _fault("ended on request (SIGTERM)", 143)
+    except (KeyboardInterrupt, _Ended, ImportError) as error:
+        ended = _end_of(error)
+        if ended is None:
+            raise
+        return ended
     return int(status or 0)
+
+
+def _end_of(error: BaseException | None) -> int | None:
+    """Exit status of a command that was asked to end, which a compiled module's import calls an ``ImportError``; or None."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return _fault("interrupted", 130)
+        if isinstance(error, _Ended):
+            return _fault("ended on request (SIGTERM)", 143)
+        error = error.__cause__ or error.__context__
+    return None
 
 
 def _fault(message: str, status: int) -> int:

@@ -81,7 +81,14 @@ def run(options: Reconstruct) -> None:
     from armloop.identification.reconstruction import reconstruct as run
     from armloop.regression.estimators import LISTED, REGISTRY
     from armloop.regression.sparse import Sparse
-    from armloop.reports.tables import formulas, libraries_table, parts_table, score_table, steps_table
+    from armloop.reports.tables import (
+        compared,
+        formulas,
+        libraries_table,
+        parts_table,
+        score_table,
+        steps_table,
+    )
     from armloop.util.errors import InputError
     from armloop.util.files import write_text
     from armloop.util.workers import Cluster, Processes
@@ -132,7 +139,7 @@ def run(options: Reconstruct) -> None:
         return
     for warning in result.warnings:
         print(f"WARNING: {warning}")
-    if len(result.libraries) > 1:
+    if compared(result.libraries):
         print(libraries_table(result.libraries), end="\n\n")
     print(steps_table(result.reports))
     print()
