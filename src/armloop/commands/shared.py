@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,7 +25,10 @@ def progress(options: argparse.Namespace) -> Progress:
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
     stream = sys.stderr if sys.stderr.isatty() else sys.stdout
-    return with_time_left(lambda message: print(f"  … {message}", file=stream, flush=True))
+    # % stands apart from its number, as in the tables
+    return with_time_left(
+        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=stream, flush=True)
+    )
 
 
 def print_json(value: Any) -> None:
