@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_json, add_logs, seed
+from armloop.commands.arguments import Json, Logs, seed
+from armloop.commands.options import option
 
 HELP = "sort samples into static, constant-velocity and varying-velocity data"
 EXAMPLE = "armloop cluster out/logs/*.csv"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_logs(p)
-    p.add_argument(
-        "--indicator",
+class Cluster(Logs, Json):
+    """The options."""
+
+    indicator: str = option(
+        "the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
+        "robust",
         choices=("robust", "paper"),
-        default="robust",
-        help="the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
     )
-    p.add_argument("--seed", type=seed, default=0, help="of k-means (%(default)s)")
-    add_json(p)
+    seed: int = option("of k-means (%(default)s)", 0, type=seed)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Cluster) -> None:
     """Sort the samples of logs by condition."""
     from armloop.commands.shared import TORQUE, print_json, read_logs
     from armloop.data.regimes import sort_samples
