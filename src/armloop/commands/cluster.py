@@ -26,6 +26,7 @@ def run(options: Cluster) -> None:
     from armloop.data.regimes import sort_samples
     from armloop.data.signals import Conditioning, preprocess
     from armloop.reports.tables import table
+    from armloop.reports.words import percent
     from armloop.util.errors import InputError
 
     logs = read_logs(options.logs, None, TORQUE)
@@ -46,7 +47,7 @@ def run(options: Cluster) -> None:
         )
         return
     rows = [
-        [name, count, f"{count / samples.motion.samples:.1%}"] for name, count in clusters.counts().items()
+        [name, count, percent(count / samples.motion.samples)] for name, count in clusters.counts().items()
     ]
     print(table(["condition", "samples", "share"], rows))
     print("\nwithin-cluster sum for 1, 2, … clusters: " + ", ".join(f"{w:.4g}" for w in clusters.wcss))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -25,7 +26,10 @@ def progress(options: Options) -> Progress:
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
     stream = sys.stderr if sys.stderr.isatty() else sys.stdout
-    return with_time_left(lambda message: print(f"  … {message}", file=stream, flush=True))
+    # % stands apart from its number, as in the tables
+    return with_time_left(
+        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=stream, flush=True)
+    )
 
 
 def print_json(value: Any) -> None:
