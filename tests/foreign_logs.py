@@ -38,7 +38,17 @@ def bag(
 
 
 def _messages(
-    store, log, order, names, *, stamps=True, gripper=False, topics=("/joint_states",), shuffle=False
+    store,
+    log,
+    order,
+    names,
+    *,
+    stamps=True,
+    gripper=False,
+    topics=("/joint_states",),
+    shuffle=False,
+    velocity=True,
+    effort=True,
 ):
     state, header = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
     clock = store.types["builtin_interfaces/msg/Time"]
@@ -55,8 +65,8 @@ def _messages(
                     header=header(stamp=stamp, frame_id=""),
                     name=[names[j] for j in turn],
                     position=log.q[k, turn],
-                    velocity=log.v[k, turn],
-                    effort=log.tau[k, turn],
+                    velocity=log.v[k, turn] if velocity else np.empty(0),
+                    effort=log.tau[k, turn] if effort else np.empty(0),
                 ),
             )
         if gripper:

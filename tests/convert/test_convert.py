@@ -15,6 +15,7 @@ from synthetic import three_axis
 from armloop.cli import main
 from armloop.convert import Answers, convert, read_map
 from armloop.convert.headers import suggest
+from armloop.convert.joints import match
 from armloop.data.log import MotionLog, read_log
 from armloop.util.errors import InputError
 
@@ -75,6 +76,31 @@ def test_an_order_of_the_alphabet_needs_the_arm(tmp_path, log):
         convert([path], answers=TORQUE)
     counted = bag(tmp_path / "counted", log, [0, 1, 2], kind="db3", names=["j1", "j2", "j3"])
     assert_same(convert([counted], answers=TORQUE).log, log)
+
+
+def test_numbers_out_of_turn_need_the_arm(tmp_path, log):
+    names = ["panda_joint1", "panda_joint2", "panda_joint3"]
+    path = bag(tmp_path / "bag", log, [2, 0, 1], kind="mcap", names=names)
+    with pytest.raises(InputError, match="other than that of their numbers"):
+        convert([path], answers=TORQUE)
+
+
+def test_one_prefix_tells_the_arms_joints_from_a_fingers():
+    names = ["panda_joint2", "panda_finger_joint1", "panda_joint1"]
+    assert match(names, ["joint1", "joint2"], "") == [2, 0]
+    assert match(names, ["panda_joint1"], "") == [2]
+    with pytest.raises(InputError, match="more than one joint matches joint1"):
+        match(["left_joint1", "right_joint1", "left_joint2", "right_joint2"], ["joint1", "joint2"], "")
+
+
+def test_a_bag_without_velocities_is_differentiated(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="db3", velocity=False)
+    found = convert([path], arm=three_axis(), answers=TORQUE)
+    assert any(note.startswith("v: central differences") for note in found.notes)
+    np.testing.assert_allclose(found.log.v[1:-1], log.v[1:-1], atol=1e-2 * np.abs(log.v).max())
+    none = bag(tmp_path / "none", log, [0, 1, 2], kind="db3", effort=False)
+    with pytest.raises(InputError, match="message 1: 3 positions, 3 velocities, 0 efforts for 3 joints"):
+        convert([none], arm=three_axis(), answers=TORQUE)
 
 
 def test_several_topics_are_asked_for(tmp_path, log):

@@ -126,3 +126,14 @@ sys.exit(cli.main(["evaluate", "model.json", "run.csv"]))
     )
     assert done.returncode == 1
     assert done.stderr.startswith("armloop: not enough memory") and done.stderr.count("\n") == 1
+
+
+def test_an_end_during_a_compiled_modules_import_is_no_fault(monkeypatch, capsys) -> None:
+    """Such a module's import calls whatever interrupts it an ImportError."""
+
+    def ended(options: object) -> None:
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    monkeypatch.setattr("armloop.commands.cluster.run", ended)
+    assert main(["cluster", "run.csv"]) == 130
+    assert capsys.readouterr().err == "armloop: interrupted\n"

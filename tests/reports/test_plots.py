@@ -15,10 +15,11 @@ from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis import Diagnosis, close
 from armloop.reports import plots
-from armloop.reports.html import svg
+from armloop.reports.html import Picture, svg
 from armloop.reports.plots import style
 from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import thin, with_gaps
+from armloop.reports.plots.watch import NARROW, heat_figure
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
 from armloop.util.files import write_figure
 
@@ -203,11 +204,44 @@ def test_joints_in_columns_stay_together_on_a_narrow_page(loop: SimpleNamespace)
     assert tops == sorted(tops, reverse=True)
 
 
-def test_long_names_before_a_panel_leave_a_figure_as_it_is() -> None:
+def test_long_names_before_a_panel_stand_above_its_rows_on_a_narrow_page() -> None:
     rungs = [
         {"rung": "presliding by load", "before": 0.1, "after": 0.1, "refused": 0.2, "joints": []},
+        {"rung": "Coulomb", "before": 0.4, "after": 0.1, "refused": None, "joints": [1, 2]},
     ]
-    assert 'class="narrow"' not in svg(plots.ladder_figure(rungs))
+    figure = plots.ladder_figure(rungs)
+    assert 'class="narrow"' in svg(figure)
+    assert stack(figure) and figure.get_figwidth() == 4.0
+    (axes,) = figure.axes
+    said = [text.get_text() for text in axes.texts]
+    assert said == ["presliding by load: 20 %", "Coulomb: 10 %   joints 1, 2"]
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert all(box.x1 < figure.bbox.x1 and box.y1 < figure.bbox.y1 for box in boxes)
+
+
+def test_the_ring_is_a_column_on_a_narrow_page() -> None:
+    stage = plots.Stage("Measure", "1 run", "of one", lambda axes: None)
+    told = ([stage] * 8, "A headline that is longer than a phone is wide", "a line")
+    page = Picture(plots.ring_figure(*told), narrow=plots.column_figure(*told)).svg()
+    assert page.count("<svg ") == 2 and "--width:25.6rem" in page
+    cards = plots.column_figure(*told).axes[1:]
+    assert len(cards) == 8
+    assert all(a.get_position().y0 > b.get_position().y1 for a, b in itertools.pairwise(cards))
+
+
+def test_a_fleets_effects_are_parted_into_blocks_on_a_narrow_page() -> None:
+    places = [f"effect {k}" for k in range(25)]
+    evidence = np.outer([1.0, 2.0], np.arange(25.0))
+    data = (["a", "b"], places, evidence, np.array([20.0, 20.0]), evidence > 40)
+    wide, narrow = heat_figure(*data), heat_figure(*data, NARROW)
+    assert len(wide.axes) == 2 and narrow.get_figwidth() == NARROW
+    blocks = [
+        axes for axes in narrow.axes if [text.get_text() for text in axes.get_yticklabels()] == ["a", "b"]
+    ]
+    assert [label.get_text() for axes in blocks for label in axes.get_xticklabels()] == places
+    drawn = np.hstack([axes.images[0].get_array() for axes in blocks])
+    np.testing.assert_allclose(drawn, np.clip(evidence / 20.0, 0, 1))
 
 
 def test_thinning_keeps_spikes_and_gaps() -> None:

@@ -127,6 +127,10 @@ def test_a_number_keeps_its_error_and_unit() -> None:
     assert tied("2 numbers and 3 more") == "2 numbers and 3 more"
 
 
+def test_a_percentage_stands_apart_from_its_sign() -> None:
+    assert tied("it leaves 54% of 1.5 % and 50 %") == "it leaves 54\u00a0% of 1.5\u00a0% and 50\u00a0%"
+
+
 def test_text_cannot_become_markup() -> None:
     text = render(Report("<b>", "a & b", [Section("<i>", ["<u>"])], [Card("<s>", "<q>")]))
     assert not {"<b>", "<i>", "<u>", "<s>", "<q>"} & set(re.findall(r"<[^>]*>", text))

@@ -38,3 +38,4 @@ def test_names() -> None:
     assert unit("kg*m^2") == "kg·m²"
     assert listed(["a", "b", "c"]) == "a, b and c"
     assert [percent(x) for x in (0.004271, 0.0985, 0.9996)] == ["0.43 %", "9.8 %", "100 %"]
+    assert [percent(x) for x in (0.0, 7.2e-10, 1.2e-5)] == ["0 %", "< 0.001 %", "0.0012 %"]

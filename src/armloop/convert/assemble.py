@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.convert.joints import match, may_be_unordered
+from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording
 from armloop.convert.units import CURRENTS, FACTORS, canonical
@@ -260,9 +260,9 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
     names, where = mapping.joints, str(recording.path)
     if arm is None:
         if names is not None and recording.named:
-            if may_be_unordered(names):
+            if (doubt := doubtful_order(names)) is not None:
                 raise LogError(
-                    f"{where}: the joints are in the order of the alphabet ({', '.join(names)}), which need not be that "
+                    f"{where}: the joints are {doubt} ({', '.join(names)}), which need not be that "
                     "of the arm; give --arm with its URDF, or a --map with joints base to tip"
                 )
             notes.append(

@@ -64,12 +64,16 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
                     continue
                 names = names or tuple(found[k] for k in index)
                 others |= dict.fromkeys(name for k, name in enumerate(found) if k not in index)
-                if not (len(message.position) == len(message.velocity) == len(message.effort) == len(found)):
+                # Velocities may be missing, from the first message on: they are then the rates of the positions.
+                moving = len(message.velocity) > 0 if not rows else len(rows[0][1]) > 0
+                sizes = len(message.position), len(message.velocity), len(message.effort)
+                if sizes != (len(found), len(found) * moving, len(found)):
                     raise _short(path, chosen, len(rows) + 1, message, len(found))
                 stamp = message.header.stamp
                 stamps.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
                 received.append(at)
-                rows.append((message.position[index], message.velocity[index], message.effort[index]))
+                velocity = message.velocity[index] if moving else message.velocity
+                rows.append((message.position[index], velocity, message.effort[index]))
     except (
         AnyReaderError,
         msgspec.DecodeError,
@@ -107,6 +111,8 @@ def _recording(
     fields = {}
     for k, (field, kind) in enumerate((("position", "q"), ("velocity", "v"), ("effort", "tau"))):
         values = np.array([row[k] for row in rows], dtype=np.float64)
+        if not values.size:
+            continue
         fields[kind] = [f"{name}/{field}" for name in names]
         columns |= {column: values[:, j] for j, column in enumerate(fields[kind])}
     mapping = Mapping(
@@ -114,7 +120,7 @@ def _recording(
         # rad or m, rad/s or m/s: the joint's kind says which, and both are SI
         QuantityMap(fields["q"], "rad"),
         QuantityMap(fields["tau"], None),
-        QuantityMap(fields["v"], "rad/s"),
+        QuantityMap(fields["v"], "rad/s") if "v" in fields else None,
         joints=list(names),
     )
     return Recording(
@@ -160,6 +166,6 @@ def _has_joints(reader: Any, topic: str, wanted: Sequence[str]) -> bool:
 def _short(path: Path, topic: str, row: int, message: Any, n: int) -> LogError:
     sizes = f"{len(message.position)} positions, {len(message.velocity)} velocities, {len(message.effort)} efforts"
     return LogError(
-        f"{path}: {topic}, message {row}: {sizes} for {n} joints; a log needs all three of every joint, "
-        "so record a driver that publishes effort"
+        f"{path}: {topic}, message {row}: {sizes} for {n} joints; a log needs every joint's position and effort in each "
+        "message, and its velocity in each or in none, so record a driver that publishes them"
     )

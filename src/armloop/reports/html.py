@@ -28,6 +28,7 @@ _DPI = 150
 _TIES = re.compile(
     r"(?<=[±→×]) | (?=%)|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
 )
+_PERCENT = re.compile(r"(?<=\d)%")
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
 
@@ -36,12 +37,18 @@ _REM_PER_INCH = 6.4
 class Picture:
     """A figure with a caption that says what it shows; with a ``summary``, folded away behind it until asked for.
 
-    ``figure`` may be drawn already: the text of :func:`svg`.
+    ``figure`` may be drawn already: the text of :func:`svg`. ``narrow`` is shown instead on a page as narrow as a
+    phone's, where rearranging the figure's panels would not do.
     """
 
     figure: Figure | str
     caption: str = ""
     summary: str = ""
+    narrow: Figure | None = None
+
+    def svg(self) -> str:
+        """As :func:`svg`."""
+        return svg(self.figure, self.narrow)
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,7 @@ class Section:
         return {
             "title": self.title,
             "text": self.text,
-            "pictures": [[svg(p.figure), p.caption, p.summary] for p in self.pictures],
+            "pictures": [[p.svg(), p.caption, p.summary] for p in self.pictures],
             "tables": [asdict(table) for table in self.tables],
             "formulas": self.formulas,
             "notes": self.notes,
@@ -122,28 +129,31 @@ def render(report: Report) -> str:
     environment = Environment(
         loader=PackageLoader("armloop.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["svg"] = lambda figure: Markup(svg(figure))
+    environment.filters["svg"] = lambda picture: Markup(picture.svg())
     environment.filters["tied"] = tied
     return environment.get_template("report.html").render(report=report, version=__version__)
 
 
 def tied(text: str) -> str:
-    """Keep a number's sign, error and unit on one line with it."""
-    return _TIES.sub("\u00a0", text)
+    """Keep a number's sign, error and unit on one line with it; % stands apart from its number, as everywhere."""
+    return _TIES.sub("\u00a0", _PERCENT.sub(" %", text))
 
 
-def svg(figure: Figure | str) -> str:
+def svg(figure: Figure | str, narrow: Figure | None = None) -> str:
     """A figure as ``<svg>`` elements that take their frame colours from the page; one drawn already as it is.
 
     A figure of several panels comes twice, as drawn and with its panels one below the other: the page shows the one
-    that suits its width. The figure itself is left stacked.
+    that suits its width. ``narrow`` is the second one where it is a figure of its own. The figure itself stays as it is.
     """
     if isinstance(figure, str):
         return figure
     wide = _drawn(figure, "wide")
-    # A copy of our own making: the figure stays as it is for whoever shows or draws it again.
-    narrow: Figure = pickle.loads(pickle.dumps(figure))
-    return wide + _drawn(narrow, "narrow") if stack(narrow) else wide
+    if narrow is None:
+        # A copy of our own making: the figure stays as it is for whoever shows or draws it again.
+        narrow = pickle.loads(pickle.dumps(figure))
+        if not stack(narrow):
+            return wide
+    return wide + _drawn(narrow, "narrow")
 
 
 def _drawn(figure: Figure, variant: str) -> str:

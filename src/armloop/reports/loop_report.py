@@ -18,7 +18,7 @@ from armloop.reports import paper as published
 from armloop.reports.diagnosis_report import diagnosis_sections, strongest_joint
 from armloop.reports.findings import headline
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots import Stage, eta_figure, ring_figure, tracking_figure
+from armloop.reports.plots import Stage, column_figure, eta_figure, ring_figure, tracking_figure
 from armloop.reports.plots.ring import bars, lines
 from armloop.reports.plots.style import (
     AFTER,
@@ -120,6 +120,7 @@ def loop_report(
         *further,
         _account_section(result),
     ]
+    told = _told(result, varying)
     return render(
         Report(
             f"The whole loop on {result.arm.name}",
@@ -129,17 +130,22 @@ def loop_report(
             _cards(result),
             [*([("Watch the replay", replay)] if replay else []), *links],
             Picture(
-                loop_figure(result, varying),
-                "The loop, clockwise from the upper left, with the numbers and signals of this run.",
+                ring_figure(*told),
+                "The loop, from stage to stage, with the numbers and signals of this run.",
+                narrow=column_figure(*told),
             ),
         )
     )
 
 
-def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
+def loop_figure(result: LoopResult) -> Figure:
     """The loop as a ring of eight stages with this run's numbers; save it on a light background."""
+    return ring_figure(*_told(result, _varying(result)))
+
+
+def _told(result: LoopResult, samples: Samples) -> tuple[list[Stage], str, str]:
+    """The eight stages, a headline, and a line on the whole run."""
     diagnosis, tracking = result.diagnosis, dict(result.tracking)
-    samples = varying or _varying(result)
     model = result.reconstruction.model
     loaded = int(np.argmax(np.sqrt(np.mean(samples.tau**2, axis=0))))
     part = _piece(samples)
@@ -232,7 +238,7 @@ def loop_figure(result: LoopResult, varying: Samples | None = None) -> Figure:
         ),
     ]
     verdict = "the verdict was right" if result.right else "the verdict was wrong"
-    return ring_figure(
+    return (
         stages,
         "Measure, model, control; find what changed; control better",
         f"{result.arm.name}, seed {result.seed}:  hidden was {_truth_name(result)};  {verdict};  "

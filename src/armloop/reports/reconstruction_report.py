@@ -25,6 +25,7 @@ from armloop.reports.plots import (
 )
 from armloop.reports.tables import (
     Table,
+    compared,
     formulas,
     libraries_table,
     make_table,
@@ -141,7 +142,7 @@ def reconstruction_sections(
         pictures.append(Picture(torque_figure(model, samples), _TORQUE))
         pictures.append(Picture(friction_figure(model, samples), _FRICTION))
     tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
-    if len(reconstruction.libraries) > 1:
+    if compared(reconstruction.libraries):
         tables.insert(0, libraries_table(reconstruction.libraries))
     text = [
         f"The model was reconstructed from {counted(len(history.get('logs', [])), 'log')} with the method "

@@ -129,6 +129,11 @@ def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the
     return make_table(headers, rows, title)
 
 
+def compared(libraries: Sequence[Contender]) -> bool:
+    """Whether two libraries or more were fitted; that one alone could be, the notes say."""
+    return sum(one.checks is not None for one in libraries) > 1
+
+
 def libraries_table(libraries: Sequence[Contender], title: str | None = "Libraries compared") -> Table:
     """Error on the blocks that choose the library, number of coefficients, and the checks of physics of each library."""
     rows: list[list[object]] = []

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots.watch import MOST_ARMS, heat_figure, trend_figure
+from armloop.reports.plots.watch import MOST_ARMS, NARROW, heat_figure, trend_figure
 from armloop.reports.tables import make_table
 from armloop.reports.watch_tables import (
     alarm_words,
@@ -117,7 +117,8 @@ def _heat(outcome: Outcome) -> Section:
                 evidence[a, kept.index(name)] = item["log_evidence"]
         alarmed[a] = [(arm["arm"], name) in found for name in kept]
     limit = np.array([arm["limit"] for arm in arms])
-    picture = Picture(heat_figure([arm["arm"] for arm in arms], kept, evidence, limit, alarmed), _HEAT)
+    shown = ([arm["arm"] for arm in arms], kept, evidence, limit, alarmed)
+    picture = Picture(heat_figure(*shown), _HEAT, narrow=heat_figure(*shown, NARROW))
     notes = [f"{arm['arm']}: {note}" for arm in outcome.arms for note in arm["notes"]]
     if len(outcome.arms) > len(arms):
         notes.append(f"The {len(arms)} arms with the most evidence, of {len(outcome.arms)}.")

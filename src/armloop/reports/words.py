@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armloop.laws.effects import Effect
 
 MISSING = "–"
+_LEAST_PART = 1e-5
 
 _STEPS = {"step1": "Step I", "step2": "Step II", "step3": "Step III"}
 _OTHER_CONTROLLERS = {
@@ -40,9 +41,11 @@ def numbers(values: Iterable[float | None], digits: int = 3, separator: str = " 
 
 
 def percent(x: float | None) -> str:
-    """A part as a percentage."""
+    """A part as a percentage; one that is too small to matter as less than what would."""
     if x is None or not np.isfinite(x):
         return MISSING
+    if 0 < abs(x) < _LEAST_PART:
+        return f"< {100 * _LEAST_PART:g} %"
     return f"{100 * x:.0f} %" if abs(x) >= 0.0995 else f"{number(100 * x, 2)} %"
 
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from armloop.diagnosis import Closing, Diagnosis
-from armloop.reports.plots.style import BLUE, MUTED, figure, legend, panels, polish, thin, with_gaps
+from armloop.reports.plots.style import BLUE, GREY, figure, legend, panels, polish, thin, with_gaps
 from armloop.reports.residuals import time_axis
 from armloop.reports.words import number, unit
 
@@ -23,9 +23,9 @@ def feedforward_figure(diagnosis: Diagnosis, closing: Closing) -> Figure:
         u = unit(diagnosis.model.arm.joints[j].torque_unit)
         axes.plot(
             *thin(*with_gaps(time, samples.tau[:, j])),
-            color=MUTED,
+            color=GREY,
             linewidth=2.4,
-            alpha=0.4,
+            alpha=0.7,
             label="measured",
             rasterized=True,
         )

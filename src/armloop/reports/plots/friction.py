@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.reports.plots.style import BLUE, MUTED, every, figure, legend, panels, polish
+from armloop.reports.plots.style import BLUE, GREY, every, figure, legend, panels, polish
 from armloop.reports.words import unit
 from armloop.util.arrays import Array
 
@@ -31,7 +31,7 @@ def friction_figure(model: ReconstructedModel, samples: Samples) -> Figure:
         v, points = motion.v[slides, j], rest[slides, j]
         shown = every(len(v), _MOST_DOTS)
         axes.scatter(
-            v[shown], points[shown], s=4, color=MUTED, alpha=0.3, linewidths=0, rasterized=True, label="data"
+            v[shown], points[shown], s=4, color=GREY, alpha=0.5, linewidths=0, rasterized=True, label="data"
         )
         fastest = float(np.quantile(np.abs(v), 0.999)) if len(v) else 1.0
         for speeds in (

@@ -21,6 +21,8 @@ _TITLE, _TICKS, _GAP = 0.3, 0.26, 0.12
 _INCHES_PER_LETTER, _INCHES_PER_LINE = 0.078, 0.17
 #: Names before a panel that are longer than this leave it too little of a narrow page.
 _LONGEST_NAMES = 1.2
+#: Height of a row whose name stands above it.
+_ROW = 0.58
 #: Values above bars that are closer than this stand upright.
 _BAR_PITCH = 0.36
 
@@ -38,9 +40,9 @@ class _Panel:
 def stack(made: Figure) -> bool:
     """Rearrange a figure made with :func:`~armloop.reports.plots.style.panels` in place; True where that was possible.
 
-    Names before a panel that would take most of such a page leave the figure as it is. Panels of a grid whose columns
-    are joints (only the first row has titles) are stacked column by column, others row by row. What a panel shared with
-    its neighbours, labels and ticks, it then has itself.
+    Names before a panel that would take most of such a page stand above their rows, if it is the only one, and leave
+    the figure as it is otherwise. Panels of a grid whose columns are joints (only the first row has titles) are stacked
+    column by column, others row by row. What a panel shared with its neighbours, labels and ticks, it then has itself.
     """
     width, height = made.get_size_inches()
     specs = [axes.get_subplotspec() for axes in made.axes]
@@ -48,7 +50,7 @@ def stack(made: Figure) -> bool:
         return False
     left, bottom = made.subplotpars.left * width, made.subplotpars.bottom * height
     if left > _LONGEST_NAMES:
-        return False
+        return len(specs) == 1 and _names_above(made)
     rows, columns = specs[0].get_geometry()[:2]  # type: ignore[union-attr]
     grid = np.array(made.axes, dtype=object).reshape(rows, columns)
     by_column = columns > 1 and not any(axes.get_title(loc="left") for axes in grid[1:].ravel())
@@ -66,6 +68,43 @@ def stack(made: Figure) -> bool:
             (left / _WIDTH, at / total, 1 - (left + _RIGHT) / _WIDTH, panel.height / total)
         )
         at -= panel.below
+    return True
+
+
+def _names_above(made: Figure) -> bool:
+    """Write a panel's names, and what stands beside its rows, above the rows of a figure laid out anew; True."""
+    (axes,) = made.axes
+    top = legend_above(made, _WIDTH)
+    names = dict(zip(axes.get_yticks(), axes.get_yticklabels(), strict=True))
+    beside = {float(note.xy[1]): note for note in axes.texts if isinstance(note, Annotation)}
+    letters = int((_WIDTH - 2 * _RIGHT) / _INCHES_PER_LETTER)
+    lines, low = 1, float(max(names, default=0.0)) + 0.5
+    for tick, label in names.items():
+        note = beside.get(float(tick))
+        words = textwrap.wrap(f"{label.get_text()}: {note.get_text()}" if note else label.get_text(), letters)
+        lines = max(lines, len(words))
+        axes.text(
+            0.0,
+            tick - 0.36,
+            "\n".join(words),
+            transform=axes.get_yaxis_transform(),
+            color=note.get_color() if note else label.get_color(),
+            fontweight=note.get_fontweight() if note else "normal",
+            fontsize=9.5,
+            va="bottom",
+        )
+    for note in beside.values():
+        note.remove()
+    row = _ROW + _INCHES_PER_LINE * (lines - 1)
+    highest = -0.4 - _INCHES_PER_LINE * lines / row
+    axes.set_yticks([])
+    axes.set_ylim(low, highest)
+    label = textwrap.wrap(axes.get_xlabel(), letters)
+    axes.set_xlabel("\n".join(label))
+    height, below = row * (low - highest), 0.4 + _INCHES_PER_LINE * len(label)
+    total = top + height + below
+    made.set_size_inches(_WIDTH, total)
+    axes.set_position((_RIGHT / _WIDTH, below / total, 1 - 2 * _RIGHT / _WIDTH, height / total))
     return True
 
 

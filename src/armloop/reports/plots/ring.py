@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,6 +20,8 @@ from armloop.util.arrays import Array
 _WIDTH, _HEIGHT = 12.8, 6.9
 _CARD_WIDTH, _CARD_HEIGHT = 2.66, 2.34
 _MARGIN, _BOTTOM = 0.42, 0.36
+#: On a page as narrow as a phone's: a column, and the room between its cards.
+_NARROW_WIDTH, _NARROW_CARD, _NARROW_GAP = 4.0, 3.4, 0.34
 _PER_ROW = 4
 _SPARK_POINTS = 400
 
@@ -49,29 +53,50 @@ def ring_figure(stages: Sequence[Stage], headline: str, line: str) -> Figure:
     """
     if len(stages) != 2 * _PER_ROW:
         raise ValueError(f"the ring has room for {2 * _PER_ROW} stages, there are {len(stages)}")
-    made = Figure(figsize=(_WIDTH, _HEIGHT), dpi=110)
-    made.patch.set_alpha(0.0)
-    page = made.add_axes((0, 0, 1, 1))
-    page.set_xlim(0, _WIDTH)
-    page.set_ylim(0, _HEIGHT)
-    page.axis("off")
+    made, page = _blank(_WIDTH, _HEIGHT)
     places = _places()
     _track(page, places)
     for k, (stage, place) in enumerate(zip(stages, places, strict=True)):
-        _card(made, page, k + 1, stage, place)
+        _card(made, page, k + 1, stage, (*place, _CARD_WIDTH))
     middle = 0.5 * _HEIGHT
-    page.text(
-        0.5 * _WIDTH,
-        middle + 0.2,
-        headline,
-        color=INK,
-        fontsize=17,
-        fontweight="bold",
-        ha="center",
-        va="center",
-    )
-    page.text(0.5 * _WIDTH, middle - 0.27, line, color=MUTED, fontsize=11.5, ha="center", va="center")
+    center: dict[str, Any] = {"ha": "center", "va": "center"}
+    page.text(0.5 * _WIDTH, middle + 0.2, headline, color=INK, fontsize=17, fontweight="bold", **center)
+    page.text(0.5 * _WIDTH, middle - 0.27, line, color=MUTED, fontsize=11.5, **center)
     return made
+
+
+def column_figure(stages: Sequence[Stage], headline: str, line: str) -> Figure:
+    """The ring of :func:`ring_figure` for a narrow page: its stages one below the other, and the way back at the side."""
+    words = [*textwrap.wrap(headline, 38), ""], textwrap.wrap(line, 50)
+    head = 0.3 + 0.22 * len(words[0]) + 0.19 * len(words[1])
+    pitch = _CARD_HEIGHT + _NARROW_GAP
+    height = head + pitch * len(stages)
+    made, page = _blank(_NARROW_WIDTH, height)
+    page.text(0.12, height - 0.1, "\n".join(words[0]), color=INK, fontsize=13, fontweight="bold", va="top")
+    under = height - 0.1 - 0.22 * len(words[0])
+    page.text(0.12, under, "\n".join(words[1]), color=MUTED, fontsize=9.5, va="top", linespacing=1.3)
+    x, at = 0.12, height - head
+    middle = x + 0.5 * _NARROW_CARD
+    for k, stage in enumerate(stages):
+        _card(made, page, k + 1, stage, (x, at - _CARD_HEIGHT, _NARROW_CARD))
+        if k + 1 < len(stages):
+            _arrow(page, (middle, at - _CARD_HEIGHT - 0.04), (middle, at - pitch + 0.02))
+        at -= pitch
+    edge, first, last = x + _NARROW_CARD, height - head - 0.5 * _CARD_HEIGHT, at + pitch - 0.5 * _CARD_HEIGHT
+    page.plot([edge, edge + 0.3, edge + 0.3], [last, last, first], color=INK, linewidth=2)
+    _arrow(page, (edge + 0.3, first), (edge + 0.02, first))
+    return made
+
+
+def _blank(width: float, height: float) -> tuple[Figure, Axes]:
+    """A figure, and axes over all of it that count inches."""
+    made = Figure(figsize=(width, height), dpi=110)
+    made.patch.set_alpha(0.0)
+    page = made.add_axes((0, 0, 1, 1))
+    page.set_xlim(0, width)
+    page.set_ylim(0, height)
+    page.axis("off")
+    return made, page
 
 
 def _places() -> list[tuple[float, float]]:
@@ -110,19 +135,24 @@ def _track(page: Axes, places: Sequence[tuple[float, float]]) -> None:
             other = to_x if step > 0 else to_x + _CARD_WIDTH
             level = y + 0.5 * _CARD_HEIGHT
             ends = ((gap + 0.06 * step, level), (other - 0.04 * step, level))
-        page.add_patch(
-            FancyArrowPatch(
-                *ends, arrowstyle="-|>", mutation_scale=17, color=INK, linewidth=2, shrinkA=0, shrinkB=0
-            )
+        _arrow(page, *ends)
+
+
+def _arrow(page: Axes, tail: tuple[float, float], tip: tuple[float, float]) -> None:
+    page.add_patch(
+        FancyArrowPatch(
+            tail, tip, arrowstyle="-|>", mutation_scale=17, color=INK, linewidth=2, shrinkA=0, shrinkB=0
         )
+    )
 
 
-def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float, float]) -> None:
-    x, y = place
+def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float, float, float]) -> None:
+    """A stage's card at ``place``: x and y of its lower left corner, and its width."""
+    x, y, wide = place
     page.add_patch(
         FancyBboxPatch(
-            place,
-            _CARD_WIDTH,
+            (x, y),
+            wide,
             _CARD_HEIGHT,
             boxstyle="round,pad=0,rounding_size=0.14",
             facecolor=SURFACE,
@@ -158,9 +188,14 @@ def _card(made: Figure, page: Axes, count: int, stage: Stage, place: tuple[float
     page.text(
         x + 0.18, y + 0.2, stage.text, color=MUTED, fontsize=_fitting(stage.text), va="center", zorder=5
     )
-    inset = (x + 0.18, y + 0.78, _CARD_WIDTH - 0.36, _CARD_HEIGHT - 1.36)
+    width, height = made.get_size_inches()
     axes = made.add_axes(
-        (inset[0] / _WIDTH, inset[1] / _HEIGHT, inset[2] / _WIDTH, inset[3] / _HEIGHT),
+        (
+            (x + 0.18) / width,
+            (y + 0.78) / height,
+            (wide - 0.36) / width,
+            (_CARD_HEIGHT - 1.36) / height,
+        ),
         facecolor="none",
         zorder=6,
     )

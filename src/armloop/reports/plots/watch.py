@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
 from armloop.util.arrays import Array
@@ -16,43 +17,73 @@ from armloop.util.arrays import Array
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60
 _INCHES_PER_LETTER = 0.085
+#: Inches of a cell, and of a figure on a page as narrow as a phone's.
+_CELL, NARROW = 0.26, 4.0
 # s that the axis of time covers at least
 _LEAST_SPAN = 86_400.0
 
 
 def heat_figure(
-    arms: Sequence[str], places: Sequence[str], evidence: Array, limit: Array, alarmed: Array
+    arms: Sequence[str],
+    places: Sequence[str],
+    evidence: Array,
+    limit: Array,
+    alarmed: Array,
+    width: float | None = None,
 ) -> Figure:
     """Arms × effects, coloured by the evidence as a part of the threshold.
 
     Args:
         evidence: (A, E) natural logarithm; NaN where there is none.
         limit: (A,) threshold of each arm; alarmed: (A, E) true where an alarm was traced to the effect.
+        width: inches; the effects are then parted into blocks one below the other, as many as that takes.
     """
     left = 0.4 + _INCHES_PER_LETTER * max([len(name) for name in arms], default=0)
     bottom = 0.4 + 0.066 * max([len(name) for name in places], default=0)
-    made = figure(max(6.0, left + 0.9 + 0.26 * len(places)), 0.5 + bottom + 0.26 * max(1, len(arms)))
-    width, height = made.get_size_inches()
-    axes = made.add_axes(
-        (left / width, bottom / height, 1 - (left + 0.9) / width, 1 - (bottom + 0.4) / height)
-    )
+    most = len(places) if width is None else max(1, int((width - left - 0.2) / _CELL))
+    blocks = -(-len(places) // max(most, 1)) or 1
+    each = -(-len(places) // blocks)
+    high = _CELL * max(1, len(arms))
+    height = 0.6 + blocks * (high + bottom)
+    made = figure(width or max(6.0, left + 0.9 + _CELL * len(places)), height)
+    across = (width - left - 0.2) if width else made.get_figwidth() - left - 0.9
     part = np.clip(np.nan_to_num(evidence, nan=0.0) / limit[:, None], 0.0, 1.0)
-    image = axes.imshow(part, cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest")
-    for a, e in np.argwhere(alarmed):
-        axes.plot(e, a, "o", color="white", markeredgecolor=INK, markersize=6)
-    polish(axes, grid="both")
-    axes.grid(False)
-    axes.set_yticks(range(len(arms)), list(arms))
-    axes.set_xticks(range(len(places)), list(places), rotation=90)
-    axes.tick_params(labelsize=8.5, labelcolor=INK)
+    image: AxesImage | None = None
+    for k in range(blocks):
+        kept = slice(k * each, (k + 1) * each)
+        names = places[kept]
+        down = height - 0.5 - k * (high + bottom) - high
+        axes = made.add_axes(_inches(made, left, down, across * len(names) / max(each, 1), high))
+        image = axes.imshow(
+            part[:, kept], cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest"
+        )
+        for a, e in np.argwhere(alarmed[:, kept]):
+            axes.plot(e, a, "o", color="white", markeredgecolor="black", markersize=6)
+        polish(axes, grid="both")
+        axes.grid(False)
+        axes.set_yticks(range(len(arms)), list(arms))
+        axes.set_xticks(range(len(names)), list(names), rotation=90)
+        axes.tick_params(labelsize=8.5, labelcolor=INK)
+    beside = (made.get_figwidth() - 0.7, height - 0.5 - high, 0.14, high)
+    place = (left, height - 0.42, across, 0.1) if width else beside
+    assert image is not None
     bar = made.colorbar(
         image,
-        cax=made.add_axes((1 - 0.7 / width, bottom / height, 0.14 / width, 1 - (bottom + 0.4) / height)),
+        cax=made.add_axes(_inches(made, *place)),
+        orientation="horizontal" if width else "vertical",
+        ticklocation="top" if width else "auto",
     )
     bar.set_ticks([0.0, 0.5, 1.0], labels=["0", "half", "alarm"])
     bar.ax.tick_params(labelsize=8.5, labelcolor=MUTED, length=0)
     bar.outline.set_visible(False)
     return made
+
+
+def _inches(made: Figure, *box: float) -> tuple[float, float, float, float]:
+    """A box of left, bottom, width and height in inches as parts of a figure."""
+    width, height = made.get_size_inches()
+    left, bottom, across, high = box
+    return left / width, bottom / height, across / width, high / height
 
 
 def trend_figure(
