@@ -32,8 +32,9 @@ LAYERS = (
     {"watch"},
     {"reports"},
     {"workflows"},
-    {"api", "armloop_paper"},
+    {"armloop_paper"},
     {"commands"},
+    {"api"},
     {"cli"},
     {"__main__"},
 )

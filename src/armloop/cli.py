@@ -17,11 +17,12 @@ from importlib import import_module
 from typing import Any
 
 from armloop import __version__
+from armloop.commands.options import Options
 from armloop.util.doubts import listening
 from armloop.util.errors import InputError
 from armloop.util.outputs import guarding
 
-#: In the order of the help. A command `name` is the module armloop.commands.name.
+#: In the order of the help. A command `name` is the module armloop.commands.name, its options the class Name in it.
 COMMANDS = (
     "loop",
     "collect",
@@ -57,14 +58,11 @@ class _Command(_Parser):
 
     def learn(self) -> None:
         """Declare the command's options."""
-        command = import_module(f"armloop.commands.{self.prog.split()[-1]}")
-        command.arguments(self)
-        self.add_argument(
-            "--force",
-            action="store_true",
-            help="replace files that are read, or that this command has not written",
-        )
-        self.set_defaults(run=command.run)
+        name = self.prog.split()[-1]
+        command = import_module(f"armloop.commands.{name}")
+        kind = getattr(command, name.capitalize())
+        kind.declare(self)
+        self.set_defaults(run=command.run, kind=kind)
 
 
 class _Completion(argparse.Action):
@@ -96,9 +94,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         with listening() as doubts, _ending_on_request():
-            options = build_parser().parse_args(arguments)
+            given = build_parser().parse_args(arguments)
+            options = given.kind(vars(given))
             with guarding(options.command, _named_files(options), options.force):
-                status = options.run(options)
+                status = given.run(options)
         for doubt in doubts:
             print(f"armloop: warning: {doubt}", file=sys.stderr)
     except InputError as error:
@@ -162,7 +161,7 @@ def _ending_on_request() -> Iterator[None]:
 _WRITTEN = {"out", "report", "next_run", "store"}
 
 
-def _named_files(options: argparse.Namespace) -> list[str]:
+def _named_files(options: Options) -> list[str]:
     """Files that the command line names as inputs: LOG, NAME=MODEL.json, FILE:NAME."""
     found = []
     for name, value in vars(options).items():

@@ -1,17 +1,24 @@
 """The package as Python: cheap to import, the commands' defaults, and results that show themselves."""
 
-import argparse
 import inspect
 import subprocess
 import sys
-from importlib import import_module
+from dataclasses import MISSING, fields
+from inspect import getattr_static
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 import armloop as al
+from armloop.commands.diagnose import Diagnose
+from armloop.commands.excite import Excite
+from armloop.commands.options import Option
+from armloop.commands.reconstruct import Reconstruct
 from armloop.data.log import MotionLog
+from armloop.experiment.design import Settings
+from armloop.identification.reconstruction import Options as ReconstructionOptions
+from armloop.regression.sparse import Sparse
 from armloop.util.errors import InputError, LogError
 
 PUBLIC = (
@@ -64,25 +71,29 @@ def test_options_can_only_be_given_by_name():
                 )
 
 
-@pytest.mark.parametrize("name", ["reconstruct", "excite"])
-def test_defaults_are_the_commands(name):
-    parser = argparse.ArgumentParser()
-    import_module(f"armloop.commands.{name}").arguments(parser)
-    words = {
-        "reconstruct": ["x.csv", "--arm", "scara", "--out", "m.json"],
-        "excite": ["scara", "--out", "r.csv"],
-    }
-    options = vars(parser.parse_args(words[name])) | {"physical": True}
+@pytest.mark.parametrize(
+    ("name", "options", "settings", "least"),
+    [
+        ("reconstruct", Reconstruct, (ReconstructionOptions, Sparse), 6),
+        ("excite", Excite, (Settings,), 9),
+        ("diagnose", Diagnose, (), 2),
+    ],
+)
+def test_a_default_is_one_for_command_function_and_engine(name, options, settings, least):
     compared = 0
     for parameter in inspect.signature(getattr(al, name)).parameters.values():
         if (
             parameter.kind is inspect.Parameter.KEYWORD_ONLY
-            and parameter.name in options
-            and parameter.name != "model"
+            and isinstance(getattr_static(options, parameter.name, None), Option)
+            and parameter.name not in ("model", "held_out")  # an object here, a file there
         ):
-            assert parameter.default == options[parameter.name], parameter.name
+            assert parameter.default == getattr(options, parameter.name), parameter.name
             compared += 1
-    assert compared >= 8
+    assert compared >= least
+    for field in (field for kind in settings for field in fields(kind)):
+        default = getattr(options, field.name, None)  # None: chosen by the arm or the data
+        if default is not None and field.default is not MISSING:
+            assert field.default == default, field.name
 
 
 def test_a_model_scores_plots_and_shows_itself(model, tmp_path):

@@ -10,6 +10,7 @@ from armloop.api.model import Model
 from armloop.api.reading import as_logs
 from armloop.api.score import logs_for
 from armloop.api.shown import displayed, page
+from armloop.commands.diagnose import Diagnose as Command
 from armloop.data.log import MotionLog
 from armloop.diagnosis import Diagnosis as Found
 from armloop.diagnosis import close
@@ -88,8 +89,8 @@ def diagnose(
     logs: MotionLog | Sequence[MotionLog],
     *,
     held_out: MotionLog | Sequence[MotionLog] = (),
-    adopt: bool = False,
-    jobs: int | None = None,
+    adopt: bool = Command.adopt,
+    jobs: int | None = Command.jobs,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Find what a model lacks on a measured run, trace it to a physical effect, and add it; see ``armloop diagnose``.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from armloop.api.reading import as_arm
 from armloop.api.shown import displayed, page
+from armloop.commands.excite import Excite as Command
 from armloop.experiment.design import Excitation, Settings, baseline_noise
 from armloop.experiment.design import excite as run
 from armloop.experiment.excitation import MotionRanges, ranges_with, write_reference
@@ -33,7 +34,7 @@ class Reference:
     def __init__(self, result: Excitation) -> None:
         self.result = result
 
-    def save(self, path: str | Path, *, rate: float = 500.0) -> int:
+    def save(self, path: str | Path, *, rate: float = Command.rate) -> int:
         """Write it as a table (CSV or Parquet) with so many rows per second; returns their number."""
         return write_reference(str(path), self.result.reference, rate)
 
@@ -70,22 +71,22 @@ class Reference:
 def excite(
     arm: Arm | str | Path,
     *,
-    library: str | None = None,
-    criterion: str = "variance",
-    duration: float | None = None,
-    base_frequency: float | None = None,
-    harmonics: int | None = None,
-    order: int = 1,
+    library: str | None = Command.library,
+    criterion: str = Command.criterion,
+    duration: float | None = Command.duration,
+    base_frequency: float | None = Command.base_frequency,
+    harmonics: int | None = Command.harmonics,
+    order: int = Command.order,
     lower: Sequence[float] | None = None,
     upper: Sequence[float] | None = None,
     velocity: Sequence[float] | None = None,
     acceleration: Sequence[float] | None = None,
-    reserve: float = 0.2,
+    reserve: float = Command.reserve,
     model: ReconstructedModel | None = None,
     noise: Sequence[float] | None = None,
-    starts: int | None = None,
-    random: int = 20,
-    seed: int = 0,
+    starts: int | None = Command.starts,
+    random: int = Command.random,
+    seed: int = Command.seed,
     progress: Progress = silent,
 ) -> Reference:
     """Design an optimised exciting reference within an arm's limits; the options of ``armloop excite``.
@@ -111,6 +112,7 @@ def excite(
     Raises:
         InputError: settings out of range, or limits that exclude any motion.
     """
+    Command.checked(starts=starts)
     arm = as_arm(arm)
     chosen = library or default_library(arm)
     given = None if noise is None else tuple(map(float, noise))

@@ -12,6 +12,7 @@ import numpy as np
 from armloop.api.reading import as_arm, as_logs
 from armloop.api.score import Score, evaluate, samples_for
 from armloop.api.shown import displayed, page
+from armloop.commands.reconstruct import Reconstruct as Command
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.export import Exported, states_of
@@ -143,13 +144,13 @@ def reconstruct(
     logs: MotionLog | Sequence[MotionLog],
     arm: Arm | str | Path,
     *,
-    method: str = "stepwise",
-    library: str | None = None,
-    estimator: str = "evidence",
-    penalty: float | None = None,
+    method: str = Command.method,
+    library: str | None = Command.library,
+    estimator: str = Command.estimator,
+    penalty: float | None = Command.penalty,
     snr: tuple[float, float, float] | None = None,
-    max_order: int = 4,
-    cutoff: float | None = None,
+    max_order: int = Command.max_order,
+    cutoff: float | None = Command.cutoff,
     friction: Sequence[str] | None = None,
     physical: bool = True,
     progress: Progress = silent,
@@ -175,8 +176,7 @@ def reconstruct(
     units = {log.tau_unit for log in given}
     if len(units) != 1:
         raise InputError("reconstruct: give logs, all of them with torques or all with currents")
-    if cutoff is not None and not 0 <= cutoff < 1e4:
-        raise InputError(f"cutoff {cutoff}: give a frequency in Hz, or 0 for no filter")
+    Command.checked(max_order=max_order, cutoff=cutoff, penalty=penalty)
     options = Options(
         sparse=Sparse(estimator, penalty),
         max_order=max_order,

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_json, add_logs, seed
+from armloop.commands.arguments import Json, Logs, seed
+from armloop.commands.options import option
 
 HELP = "sort samples into static, constant-velocity and varying-velocity data"
 EXAMPLE = "armloop cluster out/logs/*.csv"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_logs(p)
-    p.add_argument(
-        "--indicator",
+class Cluster(Logs, Json):
+    """The options."""
+
+    indicator: str = option(
+        "the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
+        "robust",
         choices=("robust", "paper"),
-        default="robust",
-        help="the paper's relative activation indicator, or one whose switch follows the noise (%(default)s)",
     )
-    p.add_argument("--seed", type=seed, default=0, help="of k-means (%(default)s)")
-    add_json(p)
+    seed: int = option("of k-means (%(default)s)", 0, type=seed)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Cluster) -> None:
     """Sort the samples of logs by condition."""
     from armloop.commands.shared import TORQUE, print_json, read_logs
     from armloop.data.regimes import sort_samples
     from armloop.data.signals import Conditioning, preprocess
     from armloop.reports.tables import table
+    from armloop.reports.words import percent
     from armloop.util.errors import InputError
 
     logs = read_logs(options.logs, None, TORQUE)
@@ -49,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
         )
         return
     rows = [
-        [name, count, f"{count / samples.motion.samples:.1%}"] for name, count in clusters.counts().items()
+        [name, count, percent(count / samples.motion.samples)] for name, count in clusters.counts().items()
     ]
     print(table(["condition", "samples", "share"], rows))
     print("\nwithin-cluster sum for 1, 2, … clusters: " + ", ".join(f"{w:.4g}" for w in clusters.wcss))

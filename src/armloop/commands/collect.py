@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import argparse
-
 from armloop.commands.arguments import ARM_HELP, seed
+from armloop.commands.options import Options, argument, option, required
 
 HELP = "simulate the paper's data collection in Drake, one log per condition"
 EXAMPLE = "armloop collect three_axis --out out/logs --seed 3"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("arm", help=ARM_HELP)
-    p.add_argument("--out", required=True, help="folder for the logs")
-    p.add_argument(
-        "--plan",
-        default="paper",
-        help="a plan of scenarios/collection.yaml (paper, dwell, quick: closed loop on the plant with friction), or "
+class Collect(Options):
+    """The options."""
+
+    arm: str = argument(help=ARM_HELP)
+    out: str = required("folder for the logs")
+    plan: str = option(
+        "a plan of scenarios/collection.yaml (paper, dwell, quick: closed loop on the plant with friction), or "
         "`simulation`: friction-free inverse dynamics with the paper's numbers of samples (%(default)s)",
+        "paper",
     )
-    p.add_argument("--seed", type=seed, default=1, help="(%(default)s)")
+    seed: int = option("(%(default)s)", 1, type=seed)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Collect) -> None:
     """Simulate a data collection."""
     from armloop.commands.shared import out_folder, progress
     from armloop.data.log import write_log

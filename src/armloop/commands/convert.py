@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import ARM_HELP, add_chain, add_json
+from armloop.commands.arguments import ARM_HELP, Chain, Json, drive_gains, tau_unit
+from armloop.commands.options import argument, flag, option
 
 HELP = (
     "turn other programs' logs (ROS bags, RTDE, libfranka, LeRobot, .mat, .npz, any table) into a motion log"
@@ -17,51 +16,31 @@ EXAMPLE = (
 )
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument(
-        "sources",
+class Convert(Chain, Json):
+    """The options."""
+
+    sources: list[str] = argument(
+        "SOURCE",
+        "a ROS bag (folder, .db3, .mcap, .bag), CSV of RTDE or libfranka, a LeRobot data set, .mat, .npz or a table",
         nargs="+",
-        metavar="SOURCE",
-        help="a ROS bag (folder, .db3, .mcap, .bag), CSV of RTDE or libfranka, a LeRobot data set, .mat, .npz or a table",
     )
-    p.add_argument("--out", default=None, metavar="LOG", help="the log to write, .parquet or .csv")
-    p.add_argument("--arm", default=None, help=f"match the joints by name with those of {ARM_HELP}")
-    add_chain(p)
-    p.add_argument(
-        "--map",
-        default=None,
-        metavar="MAP.yaml",
-        help="what the columns are (with --suggest: where to write it)",
+    out: str | None = option("the log to write, .parquet or .csv", metavar="LOG")
+    arm: str | None = option(f"match the joints by name with those of {ARM_HELP}")
+    map: str | None = option("what the columns are (with --suggest: where to write it)", metavar="MAP.yaml")
+    suggest: bool = flag(
+        "write a map from the header instead of a log, to --map (else beside --out), and say what is unsure"
     )
-    p.add_argument(
-        "--suggest",
-        action="store_true",
-        help="write a map from the header instead of a log, to --map (else beside --out), and say what is unsure",
+    tau_unit: str | None = tau_unit(
+        "what effort, current or torque columns hold, where the source does not say"
     )
-    p.add_argument(
-        "--tau-unit",
-        choices=("N*m", "A"),
-        default=None,
-        help="what effort, current or torque columns hold, where the source does not say",
+    drive_gains: str | None = drive_gains("N·m/A per joint: turn motor currents into torques")
+    angle_unit: str | None = option(
+        "of positions and velocities, where the source does not say", choices=("rad", "deg")
     )
-    p.add_argument(
-        "--drive-gains",
-        default=None,
-        metavar="K1,..,KN",
-        help="N·m/A per joint: turn motor currents into torques",
-    )
-    p.add_argument(
-        "--angle-unit",
-        choices=("rad", "deg"),
-        default=None,
-        help="of positions and velocities, where the source does not say",
-    )
-    p.add_argument("--topic", default=None, help="which joint states of a bag with several")
-    add_json(p)
+    topic: str | None = option("which joint states of a bag with several")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Convert) -> None:
     """Convert, or suggest a map."""
     from pathlib import Path
 
@@ -93,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
     _tell(found, out, arm)
 
 
-def _suggest(options: argparse.Namespace, arm: object) -> None:
+def _suggest(options: Convert, arm: object) -> None:
     from pathlib import Path
 
     from armloop.commands.shared import out_file, print_json

@@ -2,65 +2,61 @@
 
 from __future__ import annotations
 
-import argparse
+from typing import Any
 
-from armloop.commands.arguments import ARM_HELP, add_chain, add_jobs, add_json, add_logs, add_recorded
+from armloop.commands.arguments import (
+    ARM_HELP,
+    CUTOFF,
+    CUTOFF_HELP,
+    MAX_ORDER,
+    MAX_ORDER_HELP,
+    METHOD_HELP,
+    Chain,
+    Json,
+    Logs,
+    Recorded,
+    processes,
+)
+from armloop.commands.options import flag, option, positive, required
 
 HELP = "reconstruct with each log, or alternating blocks, left out in turn, and score what was left out"
 EXAMPLE = "armloop crossvalidate run1.csv run2.csv run3.csv --arm arm.urdf"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_logs(p)
-    p.add_argument("--arm", required=True, help=ARM_HELP)
-    add_chain(p)
-    p.add_argument(
-        "--leave-out",
+class Crossvalidate(Logs, Chain, Recorded, Json):
+    """The options."""
+
+    arm: str = required(ARM_HELP)
+    leave_out: str | None = option(
+        "each log in turn, or alternating blocks of every log, both halves in turn (default: file where there are two or "
+        "more)",
         choices=("file", "blocks"),
-        default=None,
-        help="each log in turn, or alternating blocks of every log, both halves in turn (default: file where there "
-        "are two or more)",
     )
-    p.add_argument(
-        "--block", type=float, default=1.0, metavar="SECONDS", help="length of a block (%(default)s)"
+    block: float = option(
+        "length of a block (%(default)s)",
+        1.0,
+        metavar="SECONDS",
+        check=positive("give a positive number of seconds"),
     )
-    p.add_argument(
-        "--method",
-        default="stepwise",
-        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
+    method: str = option(METHOD_HELP, "stepwise")
+    library: str | None = option("as of armloop reconstruct (default: by number of joints)")
+    cutoff: float | None = option(CUTOFF_HELP, check=CUTOFF)
+    max_order: int = option(MAX_ORDER_HELP, 4, check=MAX_ORDER)
+    no_physical: bool = flag(
+        "do not keep M(q) positive definite and friction from driving", but_not="physical"
     )
-    p.add_argument("--library", default=None, help="as of armloop reconstruct (default: by number of joints)")
-    p.add_argument(
-        "--cutoff",
-        type=float,
-        default=None,
-        help="low-pass in Hz, 0 for none (default: by held-out error, at most 10)",
+    compare_physical: bool = flag(
+        "do both, and insist on it as well, and say what physical consistency costs and gains",
+        but_not="physical",
     )
-    p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
-    choice = p.add_mutually_exclusive_group()
-    choice.add_argument(
-        "--no-physical",
-        action="store_true",
-        help="do not keep M(q) positive definite and friction from driving",
+    out: str | None = option(
+        "folder for crossvalidation.json; each fit is kept there until the end, so that the same call goes on where it was "
+        "ended"
     )
-    choice.add_argument(
-        "--compare-physical",
-        action="store_true",
-        help="do both, and insist on it as well, and say what physical consistency costs and gains",
-    )
-    p.add_argument(
-        "--out",
-        default=None,
-        help="folder for crossvalidation.json; each fit is kept there until the end, so that the same call goes on where "
-        "it was ended",
-    )
-    add_jobs(p, "make the fits, which are the same for any number (default: one per core)")
-    add_recorded(p, "N*m")
-    add_json(p)
+    jobs: int | None = processes("make the fits, which are the same for any number (default: one per core)")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Crossvalidate) -> None:
     """Reconstruct with part of the logs left out, in turn, and score what was left out."""
     from armloop.commands.shared import (
         TORQUE,
@@ -80,21 +76,14 @@ def run(options: argparse.Namespace) -> None:
         physical_table,
     )
     from armloop.util.checkpoints import Kept
-    from armloop.util.errors import InputError
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
 
-    if not 0 < options.block < float("inf"):
-        raise InputError(f"--block {options.block}: give a positive number of seconds")
-    if not 1 <= options.max_order <= 6:
-        raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
-    if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
-        raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
     arm = arm_of(options)
     logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
     folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
     kept = Kept(folder, "crossvalidate")
-    how = {
+    how: dict[str, Any] = {
         "leave_out": options.leave_out,
         "block_seconds": options.block,
         "method": options.method,

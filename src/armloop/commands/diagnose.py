@@ -2,45 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_chain, add_jobs, add_json, add_logs, add_recorded
-from armloop.commands.next_run import add_next_run
+from armloop.commands.arguments import HeldOut, Json, OfModel, processes
+from armloop.commands.next_run import NextRun
+from armloop.commands.options import flag, required
 
 HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
 EXAMPLE = "armloop diagnose model.json run.csv --out out/diagnosis"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("model", metavar="MODEL.json")
-    add_logs(p)
-    p.add_argument(
-        "--out", required=True, help="folder for diagnosis.json, model.json (augmented), report.html"
+class Diagnose(HeldOut, OfModel, NextRun, Json):
+    """The options."""
+
+    out: str = required("folder for diagnosis.json, model.json (augmented), report.html")
+    adopt: bool = flag(
+        "put an unlisted law that was found into the augmented model and its feedforward; it acts where the run has been "
+        "and fades outside of that"
     )
-    p.add_argument(
-        "--held-out",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="LOG",
-        help="further runs of the arm as it is now, never fitted: error before and after on each of them",
+    jobs: int | None = processes(
+        "try the hypotheses (default: one per core, at most four); the answer does not depend on it"
     )
-    p.add_argument(
-        "--adopt",
-        action="store_true",
-        help="put an unlisted law that was found into the augmented model and its feedforward; it acts where the run has "
-        "been and fades outside of that",
-    )
-    p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
-    add_chain(p)
-    add_recorded(p, "as the model's training logs")
-    add_next_run(p)
-    add_jobs(p, "try the hypotheses (default: one per core, at most four); the answer does not depend on it")
-    add_json(p)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Diagnose) -> None:
     """Trace what a model lacks on a run."""
     from armloop.commands.next_run import plan, wish
     from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
@@ -58,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
     result = result.adopt() if options.adopt else result
     closing = close(model, result.model, result.samples, apart)
     answer = {**result.to_dict(), **closing.to_dict()}
-    planned = None if wanted is None else plan(options.next_run, result, wanted, progress(options))
+    planned = None if wanted is None else plan(str(options.next_run), result, wanted, progress(options))
     if planned is not None:
         answer["next_run"] = planned.to_dict()
     page = diagnosis_report(result, model, [log.name for log in logs], closing)

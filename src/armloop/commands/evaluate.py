@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_chain, add_json, add_logs, add_recorded
+from armloop.commands.arguments import Json, OfModel
 
 HELP = (
     "compare a model's prediction with logs: RMSE and nRMSE (RMSE over RMS of the measured signal) per joint"
@@ -12,17 +10,11 @@ HELP = (
 EXAMPLE = "armloop evaluate model.json run.csv"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("model", metavar="MODEL.json")
-    add_logs(p)
-    p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
-    add_chain(p)
-    add_recorded(p, "as the model's training logs")
-    add_json(p)
+class Evaluate(OfModel, Json):
+    """The options."""
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Evaluate) -> None:
     """Score a model on logs."""
     from armloop.commands.shared import model_and_logs, print_json
     from armloop.data.signals import preprocess

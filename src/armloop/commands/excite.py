@@ -2,84 +2,59 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import ARM_HELP, add_chain, add_json, seed
-from armloop.commands.ranges import add_ranges, numbers, read_ranges
+from armloop.commands.arguments import ARM_HELP, Chain, Json, seed
+from armloop.commands.options import argument, flag, option, required, within
+from armloop.commands.ranges import Ranges, numbers, ranges, read_ranges
 
 HELP = "design an exciting reference within an arm's limits, optimised for the library that will be regressed"
 EXAMPLE = "armloop excite three_axis --out reference.csv --compare --report reference.html"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("arm", help=ARM_HELP)
-    add_chain(p)
-    p.add_argument(
-        "--out",
-        required=True,
-        metavar="REF.csv",
-        help="the reference: time,q1..qn,v1..vn,vdot1..vdotn (SI units)",
+class Excite(Ranges, Chain, Json):
+    """The options."""
+
+    arm: str = argument(help=ARM_HELP)
+    out: str = required("the reference: time,q1..qn,v1..vn,vdot1..vdotn (SI units)", metavar="REF.csv")
+    library: str | None = option(
+        "what will be regressed: double-feature-set (default up to four joints) or rigid-body (default beyond)"
     )
-    p.add_argument(
-        "--library",
-        default=None,
-        help="what will be regressed: double-feature-set (default up to four joints) or rigid-body (default beyond)",
+    criterion: str = option(
+        "what is optimised: variance (mean variance of the coefficients), logdet (log-determinant of the information) or "
+        "condition (condition number of the regression) (%(default)s)",
+        "variance",
     )
-    p.add_argument(
-        "--criterion",
-        default="variance",
-        help="what is optimised: variance (mean variance of the coefficients), logdet (log-determinant of the "
-        "information) or condition (condition number of the regression) (%(default)s)",
+    duration: float | None = option("s (rigid-body 20, double-feature-set 60, at four joints 120)")
+    base_frequency: float | None = option(
+        "(default: one period is the duration, up to two minutes)", metavar="HZ"
     )
-    p.add_argument(
-        "--duration",
-        type=float,
-        default=None,
-        help="s (rigid-body 20, double-feature-set 60, at four joints 120)",
-    )
-    p.add_argument(
-        "--base-frequency",
-        type=float,
-        default=None,
-        metavar="HZ",
-        help="(default: one period is the duration, up to two minutes)",
-    )
-    p.add_argument(
-        "--harmonics", type=int, default=None, help="of the base frequency (default: as many as reach 0.4 Hz)"
-    )
-    p.add_argument(
-        "--order", type=int, default=1, help="N1 of the double feature set's candidates (%(default)s)"
-    )
-    add_ranges(p, "the plant of a built-in arm, else urdf", "without a plant: twice the velocity")
-    p.add_argument(
-        "--model",
-        default=None,
+    harmonics: int | None = option("of the base frequency (default: as many as reach 0.4 Hz)")
+    order: int = option("N1 of the double feature set's candidates (%(default)s)", 1)
+    ranges: str | None = ranges("the plant of a built-in arm, else urdf")
+    model: str | None = option(
+        "predict the torque with this model, friction included, instead of the URDF's inertias",
         metavar="MODEL.json",
-        help="predict the torque with this model, friction included, instead of the URDF's inertias",
     )
-    p.add_argument(
-        "--noise",
-        default=None,
+    noise: str | None = option(
+        "torque noise, N·m or N per joint (default: the model's baseline error, or 1 %% of the effort limit)",
         metavar="X1,..,XN",
-        help="torque noise, N·m or N per joint (default: the model's baseline error, or 1 %% of the effort limit)",
     )
-    p.add_argument(
-        "--starts", type=int, default=None, help="of the optimiser (default: 4, from five joints on 3)"
+    starts: int | None = option(
+        "of the optimiser (default: 4, from five joints on 3)", check=within(1, 1000, "give 1 to 1000")
     )
-    p.add_argument("--random", type=int, default=20, help="random references to compare with (%(default)s)")
-    p.add_argument("--seed", type=seed, default=0, help="(%(default)s)")
-    p.add_argument("--rate", type=float, default=500.0, help="rows per second of the file (%(default)s)")
-    p.add_argument(
-        "--compare",
-        action="store_true",
-        help="simulate noisy regressions: how much more data do random references need for the same coefficient error",
+    random: int = option("random references to compare with (%(default)s)", 20)
+    seed: int = option("(%(default)s)", 0, type=seed)
+    rate: float = option(
+        "rows per second of the file (%(default)s)",
+        500.0,
+        check=within(1, 1e4, "give 1 to 10000 rows per second"),
     )
-    p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
-    add_json(p)
+    compare: bool = flag(
+        "simulate noisy regressions: how much more data do random references need for the same coefficient error"
+    )
+    report: str | None = option("also write a report with plots", metavar="HTML")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Excite) -> None:
     """Design an exciting reference and write it."""
     from armloop.commands.shared import arm_of, out_file, print_json, progress
     from armloop.data.tables import CSV, PARQUET
@@ -95,10 +70,6 @@ def run(options: argparse.Namespace) -> None:
         out_file(getattr(options, name), f"--{name}")
     if not options.out.endswith((CSV, PARQUET)):
         raise InputError(f"--out {options.out}: a reference ends in {CSV} or {PARQUET}")
-    if not 1 <= options.rate <= 1e4:
-        raise InputError(f"--rate {options.rate:g}: give 1 to 10000 rows per second")
-    if options.starts is not None and not 1 <= options.starts <= 1000:
-        raise InputError(f"--starts {options.starts}: give 1 to 1000")
     arm = arm_of(options)
     library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None
@@ -121,9 +92,9 @@ def run(options: argparse.Namespace) -> None:
     )
     settings.timing(arm.n)  # faults of the options before anything is computed
     whole = options.arm in urdf_names() and not options.lock and options.tip is None
-    ranges = read_ranges(options, arm, options.arm if whole else "urdf")
+    found = read_ranges(options, arm, options.arm if whole else "urdf")
     tell = progress(options)
-    result = excite(arm, ranges, settings, model.predict if model else None, tell)
+    result = excite(arm, found, settings, model.predict if model else None, tell)
     ratio = None
     if options.compare or options.report:
         tell("simulating noisy regressions on this reference and on random ones")

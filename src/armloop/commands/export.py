@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_json
+from armloop.commands.arguments import REFUSE_OTHERS, Json
+from armloop.commands.options import argument, option, required, several
 
 HELP = "write a model as URDF, SDFormat, MJCF (MuJoCo), a Drake program or C, read it back and compare the torques"
 EXAMPLE = (
@@ -14,29 +13,24 @@ EXAMPLE = (
 )
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("model", metavar="MODEL.json")
-    p.add_argument(
-        "--to",
-        required=True,
+class Export(Json):
+    """The options."""
+
+    model: str = argument("MODEL.json")
+    to: str = required(
+        "urdf and sdf: link inertias, rotors, damping; mjcf: dry friction and springs too; drake: a folder with the arm and "
+        "a program that has all of the model; c: one C99 file with the torques",
         choices=("urdf", "sdf", "mjcf", "drake", "c"),
-        help="urdf and sdf: link inertias, rotors, damping; mjcf: dry friction and springs too; drake: a folder with the "
-        "arm and a program that has all of the model; c: one C99 file with the torques",
     )
-    p.add_argument("--out", required=True, metavar="PATH", help="the file to write (drake: the folder)")
-    p.add_argument(
-        "--log",
-        action="append",
-        default=[],
-        metavar="LOG",
-        help="compare on this log's motion (may be repeated) instead of random states within the training range",
+    out: str = required("the file to write (drake: the folder)", metavar="PATH")
+    log: list[str] = several(
+        "compare on this log's motion (may be repeated) instead of random states within the training range",
+        "LOG",
     )
-    p.add_argument("--arm", default=None, help="refuse the model unless it was made for this arm")
-    add_json(p)
+    arm: str | None = option(REFUSE_OTHERS)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Export) -> None:
     """Export."""
     from armloop.commands.shared import out_file, out_folder, print_json, read_logs
     from armloop.data.signals import preprocess

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import argparse
-
 from armloop.commands.arguments import seed
+from armloop.commands.options import Options, flag, option
 
 HELP = "the main job: collect, reconstruct, track, measure again, find the undeclared effect, add it, track again"
 EXAMPLE = "armloop loop --out out/loop"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument(
-        "--out", default="out/loop", help="folder for report.html, loop.json, logs, models (%(default)s)"
-    )
-    p.add_argument(
-        "--seed", type=seed, default=1, help="draws the data and the undeclared effect (%(default)s)"
-    )
-    p.add_argument(
-        "--measured",
-        action="store_true",
-        help="the measured part alone: a UR5's model from free motion, a run in which something happened that "
-        "nobody declared, what it was (the logs come with armloop, Apache-2.0)",
+class Loop(Options):
+    """The options."""
+
+    out: str = option("folder for report.html, loop.json, logs, models (%(default)s)", "out/loop")
+    seed: int = option("draws the data and the undeclared effect (%(default)s)", 1, type=seed)
+    measured: bool = flag(
+        "the measured part alone: a UR5's model from free motion, a run in which something happened that nobody declared, "
+        "what it was (the logs come with armloop, Apache-2.0)"
     )
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Loop) -> None:
     """Run the whole loop."""
     from armloop.commands.shared import out_folder, progress
     from armloop.workflows import LOOP_FILES, run_loop
@@ -38,7 +32,7 @@ def run(options: argparse.Namespace) -> None:
     run_loop(folder, options.seed, progress(options))
 
 
-def _measured(options: argparse.Namespace) -> None:
+def _measured(options: Loop) -> None:
     """Run the measured loop and print what it found."""
     from armloop.commands.shared import out_folder, progress
     from armloop.reports.measured_report import measured_words

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import textwrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from armloop.commands.ranges import add_ranges, ranges_stated, read_ranges, reserve_stated
+from armloop.commands.options import option
+from armloop.commands.ranges import Ranges, acceleration, ranges, ranges_stated, read_ranges, reserve_stated
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
-    from armloop.diagnosis.next_run import NextRun, Wish
+    from armloop.diagnosis.next_run import NextRun as Next
+    from armloop.diagnosis.next_run import Wish
     from armloop.model import ReconstructedModel
     from armloop.util.progress import Progress
 
@@ -19,27 +20,24 @@ _RATE = 500.0
 _WIDTH = 110
 
 
-def add_next_run(p: argparse.ArgumentParser) -> None:
+class NextRun(Ranges):
     """``--next-run`` and what it may do."""
-    group = p.add_argument_group("the motion to make next")
-    group.add_argument(
-        "--next-run",
-        default=None,
+
+    group = "the motion to make next"
+
+    next_run: str | None = option(
+        "write a reference that tells what was found from its alternatives, as far as a motion can; without any, one that "
+        "measures it better, or, for an unlisted effect, one that shows its joint at all postures and speeds",
         metavar="REF.csv",
-        help="write a reference that tells what was found from its alternatives, as far as a motion can; without any, "
-        "one that measures it better, or, for an unlisted effect, one that shows its joint at all postures and speeds",
     )
-    group.add_argument(
-        "--next-run-duration",
-        type=float,
-        default=None,
-        metavar="S",
-        help="s, rounded up to whole periods of 20 s (default: 60)",
+    next_run_duration: float | None = option(
+        "s, rounded up to whole periods of 20 s (default: 60)", metavar="S"
     )
-    add_ranges(group, "those of the model's training data", "default: as in the model's training data")
+    ranges: str | None = ranges("those of the model's training data")
+    acceleration: str | None = acceleration("default: as in the model's training data")
 
 
-def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
+def wish(options: NextRun, model: ReconstructedModel) -> Wish | None:
     """What the options say of the motion; None if none is wanted. Faults are found before any work is done."""
     from armloop.commands.shared import out_file
     from armloop.data.tables import CSV, PARQUET
@@ -55,8 +53,8 @@ def wish(options: argparse.Namespace, model: ReconstructedModel) -> Wish | None:
         raise InputError(f"--next-run {options.next_run}: a reference ends in {CSV} or {PARQUET}")
     duration = 60.0 if options.next_run_duration is None else options.next_run_duration
     known = training_ranges(model)
-    ranges = read_ranges(options, model.arm, "urdf", known) if ranges_stated(options) else known
-    wanted = Wish(ranges, options.reserve, duration)
+    stated = read_ranges(options, model.arm, "urdf", known) if ranges_stated(options) else known
+    wanted = Wish(stated, options.reserve, duration)
     wanted.check(model)
     return wanted
 
@@ -65,7 +63,7 @@ class Planned(NamedTuple):
     """The answer of ``--next-run``: the motion, or why there is none."""
 
     path: str
-    run: NextRun | None
+    run: Next | None
     fault: str = ""
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,7 +103,7 @@ def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Plann
         return Planned(path, None, str(error))
 
 
-def _words(path: str, run: NextRun) -> str:
+def _words(path: str, run: Next) -> str:
     from armloop.diagnosis.next_run import FAR_ENOUGH
     from armloop.reports.tables import make_table
     from armloop.reports.words import effect_label, number, percent

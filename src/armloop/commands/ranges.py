@@ -2,62 +2,58 @@
 
 from __future__ import annotations
 
-import argparse
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from armloop.commands.options import Options, option
 
 if TYPE_CHECKING:
     from armloop.experiment.excitation import MotionRanges
     from armloop.robot.arm import Arm
 
-#: Part of the effort limits that is kept free unless an option says otherwise.
-RESERVE = 0.2
 _NAMES = ("lower", "upper", "velocity", "acceleration")
 
 
-def add_ranges(p: argparse._ActionsContainer, ranges: str, acceleration: str) -> None:
-    """Ranges of motion and reserve; ``ranges`` and ``acceleration`` say what holds where nothing is stated."""
-    p.add_argument(
-        "--ranges",
-        default=None,
+def ranges(default: str) -> Any:
+    """The option ``--ranges``; ``default`` says what holds where it is not given."""
+    return option(
+        "take the ranges of motion from this plant of scenarios/plants.yaml, or `urdf`: nine tenths of the travel and half "
+        f"the speed of the URDF's limits (default: {default})",
         metavar="PLANT",
-        help="take the ranges of motion from this plant of scenarios/plants.yaml, or `urdf`: nine tenths of the travel and "
-        f"half the speed of the URDF's limits (default: {ranges})",
-    )
-    for name, unit in (("lower", "rad or m"), ("upper", "rad or m"), ("velocity", "rad/s or m/s")):
-        p.add_argument(
-            f"--{name}",
-            default=None,
-            metavar="X1,..,XN",
-            help=f"{unit} per joint; write --{name}=-1,2 if negative",
-        )
-    p.add_argument(
-        "--acceleration",
-        default=None,
-        metavar="X1,..,XN",
-        help=f"rad/s² or m/s² per joint ({acceleration})",
-    )
-    p.add_argument(
-        "--reserve",
-        type=float,
-        default=RESERVE,
-        help="part of the URDF's effort limits that is kept free (%(default)s)",
     )
 
 
-def ranges_stated(options: argparse.Namespace) -> bool:
+def acceleration(default: str) -> Any:
+    """The option ``--acceleration``."""
+    return option(f"rad/s² or m/s² per joint ({default})", metavar="X1,..,XN")
+
+
+def _range(name: str, unit: str) -> Any:
+    return option(f"{unit} per joint; write --{name}=-1,2 if negative", metavar="X1,..,XN")
+
+
+class Ranges(Options):
+    """Ranges of motion and reserve."""
+
+    ranges: str | None = ranges("urdf")
+    lower: str | None = _range("lower", "rad or m")
+    upper: str | None = _range("upper", "rad or m")
+    velocity: str | None = _range("velocity", "rad/s or m/s")
+    acceleration: str | None = acceleration("without a plant: twice the velocity")
+    reserve: float = option("part of the URDF's effort limits that is kept free (%(default)s)", 0.2)
+
+
+def ranges_stated(options: Ranges) -> bool:
     """Whether any range is stated."""
     return any(getattr(options, name) is not None for name in ("ranges", *_NAMES))
 
 
-def reserve_stated(options: argparse.Namespace) -> bool:
+def reserve_stated(options: Ranges) -> bool:
     """Whether another reserve than the default is stated."""
-    return bool(options.reserve != RESERVE)
+    return bool(options.reserve != Ranges.reserve)
 
 
-def read_ranges(
-    options: argparse.Namespace, arm: Arm, plant: str, known: MotionRanges | None = None
-) -> MotionRanges:
+def read_ranges(options: Ranges, arm: Arm, plant: str, known: MotionRanges | None = None) -> MotionRanges:
     """The ranges of ``--ranges``, else ``known``, else those of ``plant``, with what the options say instead.
 
     Raises:

@@ -2,94 +2,77 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 
-from armloop.commands.arguments import ARM_HELP, add_chain, add_jobs, add_json, add_logs, add_recorded
+from armloop.commands.arguments import (
+    ARM_HELP,
+    CUTOFF,
+    CUTOFF_HELP,
+    MAX_ORDER,
+    MAX_ORDER_HELP,
+    METHOD_HELP,
+    Chain,
+    Json,
+    Logs,
+    Recorded,
+    processes,
+)
+from armloop.commands.options import flag, option, positive, required
 
 HELP = "reconstruct a readable model of the joint torques from logs"
 EXAMPLE = "armloop reconstruct out/logs/*.csv --arm three_axis --out model.json"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_logs(p)
-    p.add_argument("--arm", required=True, help=ARM_HELP)
-    add_chain(p)
-    p.add_argument("--out", required=True, help="the model file, JSON")
-    p.add_argument(
-        "--method",
-        default="stepwise",
-        help="stepwise, or sindy: one regression of everything, the reference method (%(default)s)",
+class Reconstruct(Logs, Chain, Recorded, Json):
+    """The options."""
+
+    arm: str = required(ARM_HELP)
+    out: str = required("the model file, JSON")
+    method: str = option(METHOD_HELP, "stepwise")
+    library: str | None = option(
+        "double-feature-set (the paper's, up to four joints), rigid-body (base parameters of the URDF's chain) or "
+        "lagrangian (few terms of the energies, found without the URDF's lengths); default: all of them, and of those that "
+        "pass the checks of physics the best on blocks held out for this choice"
     )
-    p.add_argument(
-        "--library",
-        default=None,
-        help="double-feature-set (the paper's, up to four joints), rigid-body (base parameters of the URDF's chain) or "
-        "lagrangian (few terms of the energies, found without the URDF's lengths); default: all of them, and of those "
-        "that pass the checks of physics the best on blocks held out for this choice",
+    estimator: str = option(
+        "how terms are chosen: evidence (Lasso path, information criterion, exchange of terms), lasso, debiased_lasso, "
+        "adaptive_lasso, thresholded, stlsq, sr3, stability or least_squares (%(default)s)",
+        "evidence",
     )
-    p.add_argument(
-        "--estimator",
-        default="evidence",
-        help="how terms are chosen: evidence (Lasso path, information criterion, exchange of terms), lasso, "
-        "debiased_lasso, adaptive_lasso, thresholded, stlsq, sr3, stability or least_squares (%(default)s)",
+    penalty: float | None = option(
+        "λ of the Lassos (Eq. 32), or the threshold of thresholded, stlsq and sr3, for columns and torque of unit root mean "
+        "square (default: by held-out error)",
+        check=positive("λ must be positive"),
     )
-    p.add_argument(
-        "--penalty",
-        type=float,
-        default=None,
-        help="λ of the Lassos (Eq. 32), or the threshold of thresholded, stlsq and sr3, for columns and torque of unit "
-        "root mean square (default: by held-out error)",
-    )
-    p.add_argument(
-        "--snr",
-        default=None,
+    snr: str | None = option(
+        "signal-to-noise ratios in dB of q, v and vdot, where they are known and the samples are no time series (--cutoff "
+        "0): coefficients are corrected for this noise after the terms are chosen",
         metavar="Q,V,VDOT",
-        help="signal-to-noise ratios in dB of q, v and vdot, where they are known and the samples are no time series "
-        "(--cutoff 0): coefficients are corrected for this noise after the terms are chosen",
     )
-    p.add_argument("--max-order", type=int, default=4, help="largest truncation order N1 tried (%(default)s)")
-    p.add_argument(
-        "--cutoff",
-        type=float,
-        default=None,
-        help="low-pass in Hz, 0 for none (default: by held-out error, at most 10)",
-    )
-    p.add_argument(
-        "--coefficients", action="store_true", help="print every coefficient with its standard error, too"
-    )
-    p.add_argument(
-        "--friction",
-        default=None,
+    max_order: int = option(MAX_ORDER_HELP, 4, check=MAX_ORDER)
+    cutoff: float | None = option(CUTOFF_HELP, check=CUTOFF)
+    coefficients: bool = flag("print every coefficient with its standard error, too")
+    friction: str | None = option(
+        "friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, coulomb_fading "
+        "(its sign fades in with the speed), viscous, offset (levels differ by direction), stribeck, nonlinear_viscous, "
+        "viscous_by_direction, coulomb_by_load, presliding (memory: spring-like before it slides), presliding_by_load; the "
+        "first of these is taken anyway, each other where it earns its place on held-out data (default: all)",
         metavar="LAW,..",
-        help="friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, "
-        "coulomb_fading (its sign fades in with the speed), viscous, offset (levels differ by direction), stribeck, "
-        "nonlinear_viscous, viscous_by_direction, coulomb_by_load, presliding (memory: spring-like before it slides), "
-        "presliding_by_load; the first of these is taken anyway, each other where it earns its place on held-out data "
-        "(default: all)",
     )
-    p.add_argument(
-        "--no-physical",
-        action="store_true",
-        help="do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)",
+    no_physical: bool = flag(
+        "do not keep M(q) positive definite and friction from driving (rigid-body and lagrangian)"
     )
-    add_jobs(
-        p,
-        "pass over logs of more than 500,000 samples, which are read piece by piece (default: one per core)",
+    jobs: int | None = processes(
+        "pass over logs of more than 500,000 samples, which are read piece by piece (default: one per core)"
     )
-    p.add_argument(
-        "--scheduler",
-        default=None,
+    scheduler: str | None = option(
+        "pass over the logs on a Dask cluster whose workers see the same files (extra: dask)",
         metavar="ADDRESS",
-        help="pass over the logs on a Dask cluster whose workers see the same files (extra: dask)",
     )
-    p.add_argument("--report", default=None, metavar="HTML", help="also write a report with plots")
-    add_recorded(p, "N*m")
-    add_json(p)
+    report: str | None = option("also write a report with plots", metavar="HTML")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Reconstruct) -> None:
     """Reconstruct a model and write it."""
     from armloop.commands.shared import TORQUE, arm_of, out_file, print_json, progress, recorded_as
     from armloop.data.pieces import IN_MEMORY, first_samples, log_sources
@@ -113,12 +96,6 @@ def run(options: argparse.Namespace) -> None:
     if REGISTRY.find(options.estimator) is None:
         names = ", ".join([*LISTED, *REGISTRY.own_names()])
         raise InputError(f"unknown estimator {options.estimator!r}; there are: {names}")
-    if options.penalty is not None and not 0 < options.penalty < math.inf:
-        raise InputError(f"--penalty {options.penalty}: λ must be positive")
-    if not 1 <= options.max_order <= 6:
-        raise InputError(f"--max-order {options.max_order}: give an order from 1 to 6")
-    if options.cutoff is not None and not 0 <= options.cutoff < 1e4:
-        raise InputError(f"--cutoff {options.cutoff}: give a frequency in Hz, or 0 for no filter")
     _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
@@ -186,7 +163,7 @@ def _laws(text: str | None) -> tuple[str, ...] | None:
     return None if text is None else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
-def _snr(options: argparse.Namespace) -> tuple[float, float, float] | None:
+def _snr(options: Reconstruct) -> tuple[float, float, float] | None:
     """The signal-to-noise ratios of q, v and vdot, or None."""
     from armloop.util.errors import InputError
 

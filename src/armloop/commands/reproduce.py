@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from armloop.commands.arguments import add_json
+from armloop.commands.arguments import Json
+from armloop.commands.options import argument, option, required, within
 
 HELP = "reproduce the paper's tables and figures, ours beside the paper's"
 EXAMPLE = "armloop reproduce table2 fig9 --out out/reproduction"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument(
-        "items",
-        nargs="*",
-        metavar="ITEM",
-        help="fig1, table2, fig5, fig6, fig8, fig9, fig10, fig11, fig14, fig15 (default: all of these); beyond the paper "
+class Reproduce(Json):
+    """The options."""
+
+    items: list[str] = argument(
+        "ITEM",
+        "fig1, table2, fig5, fig6, fig8, fig9, fig10, fig11, fig14, fig15 (default: all of these); beyond the paper "
         "estimators, conditions, coverage, friction",
+        nargs="*",
     )
-    p.add_argument("--out", required=True, help="folder for reproduction.json and report.html")
-    p.add_argument(
-        "--draws", type=int, default=10, help="noise draws per case; the paper shows one (%(default)s)"
+    out: str = required("folder for reproduction.json and report.html")
+    draws: int = option(
+        "noise draws per case; the paper shows one (%(default)s)",
+        10,
+        check=within(1, 1000, "give a number of draws from 1 to 1000"),
     )
-    add_json(p)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Reproduce) -> None:
     """Run the items, print and write what they come to."""
     import time
     from functools import partial
@@ -49,8 +50,6 @@ def run(options: argparse.Namespace) -> None:
         ) from None
 
     names = chosen(options.items)
-    if not 1 <= options.draws <= 1000:
-        raise InputError(f"--draws {options.draws}: give a number of draws from 1 to 1000")
     folder = out_folder(options.out, ("reproduction.json", "report.html"))
     tell = progress(options)
     context = Context(draws=options.draws, progress=tell)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
+from armloop.commands.options import Options
 from armloop.data.log import GAINS, MotionLog, read_log, same_measurement
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
@@ -19,12 +21,15 @@ from armloop.util.outputs import take_file, take_folder
 from armloop.util.progress import Progress, silent, with_time_left
 
 
-def progress(options: argparse.Namespace) -> Progress:
+def progress(options: Options) -> Progress:
     """Progress on the terminal; with none, before the answer, so that standard error is for faults alone."""
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
     stream = sys.stderr if sys.stderr.isatty() else sys.stdout
-    return with_time_left(lambda message: print(f"  … {message}", file=stream, flush=True))
+    # % stands apart from its number, as in the tables
+    return with_time_left(
+        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=stream, flush=True)
+    )
 
 
 def print_json(value: Any) -> None:
@@ -42,7 +47,7 @@ def out_file(path: str | None, option: str) -> None:
     take_file(path, option)
 
 
-def arm_of(options: argparse.Namespace) -> Arm:
+def arm_of(options: Chain) -> Arm:
     """The arm of ``--arm`` (or ARM), with what ``--lock`` and ``--tip`` say; raises ``InputError``."""
     lock: dict[str, float] = {}
     for text in options.lock:
@@ -58,7 +63,7 @@ def arm_of(options: argparse.Namespace) -> Arm:
     return load_arm(options.arm, lock, options.tip)
 
 
-def stated_arm(options: argparse.Namespace) -> Arm | None:
+def stated_arm(options: Chain) -> Arm | None:
     """:func:`arm_of` where ``--arm`` is given, else None; raises ``InputError``."""
     if options.arm:
         return arm_of(options)
@@ -86,7 +91,7 @@ def drive_gains(text: str | None) -> list[float] | None:
 CURRENTS_ONLY = "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
 
 
-def recorded_as(options: argparse.Namespace, default: dict[str, Any]) -> dict[str, Any]:
+def recorded_as(options: Recorded, default: dict[str, Any]) -> dict[str, Any]:
     """What the torque columns hold, by the options or else as ``default`` says."""
     gains = drive_gains(options.drive_gains)
     unit = options.tau_unit
@@ -110,7 +115,7 @@ def read_logs(paths: list[str], joints: int | None, recorded: dict[str, Any]) ->
 TORQUE = {"unit": "N*m", "drive_gains": None}
 
 
-def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, list[MotionLog]]:
+def model_and_logs(options: OfModel) -> tuple[ReconstructedModel, list[MotionLog]]:
     """The model of a command line and the logs that are to be compared with it."""
     model = load_model(options.model, stated_arm(options))
     recorded = recorded_as(options, model.recorded)
@@ -119,9 +124,7 @@ def model_and_logs(options: argparse.Namespace) -> tuple[ReconstructedModel, lis
     return model, read_logs(options.logs, model.arm.n, recorded)
 
 
-def held_out_logs(
-    options: argparse.Namespace, model: ReconstructedModel, fitted: list[MotionLog]
-) -> list[MotionLog]:
+def held_out_logs(options: HeldOut, model: ReconstructedModel, fitted: list[MotionLog]) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
     for path, log in zip(options.held_out, logs, strict=True):

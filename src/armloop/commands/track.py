@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from math import inf
 from typing import TYPE_CHECKING
 
-from armloop.commands.arguments import add_json
+from armloop.commands.arguments import Json
+from armloop.commands.options import Check, argument, flag, option, several
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.scenarios import TrackingScenario
@@ -32,46 +32,33 @@ _FILES = (
 _PATIENCE = 30.0  # s that are waited for a browser
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument(
-        "scenario",
-        metavar="SCENARIO",
-        help="a built-in scenario (three_axis_tracking, scara_pick_and_place, ur10e_tracking, ..) or a YAML file; "
-        "FILE:NAME for one of several in a file (three_axis_tracking:all_controllers)",
+class Track(Json):
+    """The options."""
+
+    scenario: str = argument(
+        "SCENARIO",
+        "a built-in scenario (three_axis_tracking, scara_pick_and_place, ur10e_tracking, ..) or a YAML file; FILE:NAME for "
+        "one of several in a file (three_axis_tracking:all_controllers)",
     )
-    p.add_argument(
-        "--arm",
-        default=None,
-        metavar="URDF",
-        help="the arm of a scenario that leaves it open (ur10e_tracking)",
+    arm: str | None = option("the arm of a scenario that leaves it open (ur10e_tracking)", metavar="URDF")
+    model: list[str] = several(
+        "step1, step2 and step3 are the feedforwards of pid_step1, pid_step2 and pid_step3, computed_torque is that "
+        "controller's model, `model` serves all of them; any other NAME adds a controller pid_NAME. Without any, a model is "
+        "reconstructed from data collected on the scenario's arm first, if a controller needs it",
+        "NAME=MODEL.json",
     )
-    p.add_argument(
-        "--model",
-        action="append",
-        default=[],
-        metavar="NAME=MODEL.json",
-        help="step1, step2 and step3 are the feedforwards of pid_step1, pid_step2 and pid_step3, computed_torque is that "
-        "controller's model, `model` serves all of them; any other NAME adds a controller pid_NAME. Without any, a "
-        "model is reconstructed from data collected on the scenario's arm first, if a controller needs it",
+    out: str | None = option("folder for tracking.json, plots and replay.html")
+    meshcat: bool = flag(
+        "show the arms while they move, in a browser on this computer; waits half a minute for it at most"
     )
-    p.add_argument("--out", default=None, help="folder for tracking.json, plots and replay.html")
-    p.add_argument(
-        "--meshcat",
-        action="store_true",
-        help="show the arms while they move, in a browser on this computer; waits half a minute for it at most",
-    )
-    p.add_argument(
-        "--rate",
-        type=float,
-        default=None,
+    rate: float | None = option(
+        "simulated seconds per second of --meshcat; 1 by default, 0: as fast as it goes, without waiting",
         metavar="R",
-        help="simulated seconds per second of --meshcat; 1 by default, 0: as fast as it goes, without waiting",
+        check=Check(lambda rate: 0 <= rate < inf, "it must be a number of at least 0"),
     )
-    add_json(p)
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Track) -> None:
     """Compare controllers in closed loop."""
     # Whatever can be wrong is told before Drake is imported, which takes a second.
     from armloop.commands.shared import out_folder, print_json, progress
@@ -137,17 +124,14 @@ def _paths(items: list[str]) -> dict[str, str]:
     return paths
 
 
-def _view(options: argparse.Namespace, scenario: TrackingScenario) -> LiveView:
+def _view(options: Track, scenario: TrackingScenario) -> LiveView:
     """The live view of ``--meshcat``, its address told, once a browser looks or nobody came."""
     from armloop.drake.view.live import LiveView
     from armloop.util.errors import InputError
 
     if scenario.wear is not None:
         raise InputError(f"--meshcat: {scenario.name} runs many times at once; there is nothing to look at")
-    rate = 1.0 if options.rate is None else options.rate
-    if not 0 <= rate < inf:
-        raise InputError(f"--rate {rate:g}: it must be a number of at least 0")
-    view = LiveView(scenario.plant.arm, rate)
+    view = LiveView(scenario.plant.arm, 1.0 if options.rate is None else options.rate)
     stream = sys.stderr if options.json else sys.stdout
     print(f"live view: {view.address}", file=stream, flush=True)
     view.wait(_PATIENCE)

@@ -2,37 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
-
-from armloop.commands.arguments import add_json
+from armloop.commands.arguments import Json
+from armloop.commands.options import argument, option
 
 HELP = "margins of a tracking scenario's PID gains, and gains for a wanted bandwidth and phase margin"
 EXAMPLE = "armloop tune three_axis_tracking --bandwidth 5 --margin 60 --out out/tune"
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument("scenario", metavar="SCENARIO", help="as for `armloop track`")
-    p.add_argument("--arm", default=None, metavar="URDF", help="the arm of a scenario that leaves it open")
-    p.add_argument(
-        "--bandwidth",
-        type=float,
-        default=5.0,
-        metavar="HZ",
-        help="of every joint's closed loop; 5 by default",
-    )
-    p.add_argument("--margin", type=float, default=60.0, metavar="DEG", help="phase margin; 60 by default")
-    p.add_argument(
-        "--model",
-        default=None,
+class Tune(Json):
+    """The options."""
+
+    scenario: str = argument("SCENARIO", "as for `armloop track`")
+    arm: str | None = option("the arm of a scenario that leaves it open", metavar="URDF")
+    bandwidth: float = option("of every joint's closed loop; %(default)g by default", 5.0, metavar="HZ")
+    margin: float = option("phase margin; %(default)g by default", 60.0, metavar="DEG")
+    model: str | None = option(
+        "a reconstructed model to design with; by default the simulated arm's own inertia",
         metavar="MODEL.json",
-        help="a reconstructed model to design with; by default the simulated arm's own inertia",
     )
-    p.add_argument("--out", default=None, help="folder for tune.json, report.html, bode.png and step.png")
-    add_json(p)
+    out: str | None = option("folder for tune.json, report.html, bode.png and step.png")
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Tune) -> None:
     """Analyse the gains of a scenario and propose others."""
     from math import pi
 

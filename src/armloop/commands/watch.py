@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TextIO
 
-from armloop.commands.arguments import add_jobs, add_json
+from armloop.commands.arguments import Json, processes
+from armloop.commands.options import flag, option, required
 
 if TYPE_CHECKING:
     from armloop.watch.store import Store
@@ -17,62 +18,55 @@ EXAMPLE = "armloop watch --models models --logs logs --store store --report watc
 NEW_ALARM = 3
 
 
-def arguments(p: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    p.add_argument(
-        "--models",
-        required=True,
-        metavar="DIR",
-        help="folder with ARM.json or ARM/model.json, or one model for all",
-    )
-    p.add_argument(
-        "--logs",
-        required=True,
+def _hours(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no time; give a positive number of hours")
+    return value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of them; give a whole number from 1")
+    return int(text)
+
+
+class Watch(Json):
+    """The options."""
+
+    models: str = required("folder with ARM.json or ARM/model.json, or one model for all", metavar="DIR")
+    logs: list[str] = required(
+        "folders with ARM/[PROGRAMME/]LOG, or logs (the arm is their folder), or - for paths line by line from standard "
+        "input; columns arm, programme, temperature[1..n] in °C and since_start in s are used where they are",
         nargs="+",
         metavar="DIR",
-        help="folders with ARM/[PROGRAMME/]LOG, or logs (the arm is their folder), or - for paths line by line from "
-        "standard input; columns arm, programme, temperature[1..n] in °C and since_start in s are used where they are",
     )
-    p.add_argument(
-        "--store",
-        required=True,
-        metavar="DIR",
-        help="folder that keeps sums, tests and alarms; made if it is not there",
-    )
-    p.add_argument(
-        "--false-alarm-hours",
-        type=_hours,
-        default=1000.0,
+    store: str = required("folder that keeps sums, tests and alarms; made if it is not there", metavar="DIR")
+    false_alarm_hours: float = option(
+        "promised mean time between false alarms of one whole arm, hours of operation (default: %(default)g)",
+        1000.0,
         metavar="H",
-        help="promised mean time between false alarms of one whole arm, hours of operation (default: 1000)",
+        type=_hours,
     )
-    p.add_argument(
-        "--healthy",
-        type=_count,
-        default=20,
+    healthy: int = option(
+        "the first N logs of an arm are known to be healthy: how warmth matters is learned there (default: %(default)s)",
+        20,
         metavar="N",
-        help="the first N logs of an arm are known to be healthy: how warmth matters is learned there (default: 20)",
+        type=_count,
     )
-    p.add_argument(
-        "--sums-only",
-        action="store_true",
-        help="name a change from the store's sums alone, without a diagnosis of the logs themselves",
+    sums_only: bool = flag(
+        "name a change from the store's sums alone, without a diagnosis of the logs themselves"
     )
-    p.add_argument("--report", default=None, metavar="HTML", help="write one self-contained page")
-    p.add_argument(
-        "--arm", default=None, help="whose trends the page shows (default: the arm of the newest alarm)"
-    )
-    p.add_argument(
-        "--scheduler",
-        default=None,
-        metavar="ADDRESS",
-        help="map over a Dask cluster, such as tcp://10.0.0.7:8786",
-    )
-    add_jobs(p, "watch arms side by side on this machine (default: 1)", 1)
-    add_json(p)
+    report: str | None = option("write one self-contained page", metavar="HTML")
+    arm: str | None = option("whose trends the page shows (default: the arm of the newest alarm)")
+    scheduler: str | None = option("map over a Dask cluster, such as tcp://10.0.0.7:8786", metavar="ADDRESS")
+    jobs: int = processes("watch arms side by side on this machine (default: %(default)s)", 1)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: Watch) -> int:
     """Watch; the exit status is 3 if there is a new alarm."""
     import sys
 
@@ -132,19 +126,3 @@ def _batches(stream: TextIO) -> Iterator[list[str]]:
             waiting = []
     if waiting:
         yield waiting
-
-
-def _hours(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is no time; give a positive number of hours")
-    return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of them; give a whole number from 1")
-    return int(text)

@@ -79,7 +79,7 @@ def read_lerobot(path: Path) -> Recording:
         )
     episode = arrays.get("episode_index")
     starts = [0] if episode is None else [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(episode)))]
-    notes = [f"{len(starts)} episodes"]
+    notes = [f"{len(starts)} episode{'s' * (len(starts) != 1)}"]
     return Recording(path, "LeRobot data set", columns, mapping, named=named, starts=starts, notes=notes)
 
 

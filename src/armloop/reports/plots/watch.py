@@ -58,7 +58,7 @@ def heat_figure(
             part[:, kept], cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest"
         )
         for a, e in np.argwhere(alarmed[:, kept]):
-            axes.plot(e, a, "o", color="white", markeredgecolor=INK, markersize=6)
+            axes.plot(e, a, "o", color="white", markeredgecolor="black", markersize=6)
         polish(axes, grid="both")
         axes.grid(False)
         axes.set_yticks(range(len(arms)), list(arms))
