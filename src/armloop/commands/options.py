@@ -161,4 +161,5 @@ class Options:
 
 def _checked(each: Option, said: str, value: Any) -> None:
     if each.check is not None and value is not None and not each.check.holds(value):
-        raise InputError(f"{said} {value:g}: {each.check.wrong}")
+        shown = f"{value:g}" if isinstance(value, float) else value
+        raise InputError(f"{said} {shown}: {each.check.wrong}")
