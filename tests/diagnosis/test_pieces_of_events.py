@@ -20,6 +20,13 @@ def motion(lengths: list[int], period: float = 0.04, joints: int = 1, pause: flo
     return Motion(time, *np.zeros((3, N, joints)), starts)
 
 
+def circling(N: int, period: int) -> Motion:
+    """One joint that swings between -1 and 1 rad, a period of so many samples of 0.04 s."""
+    phase = np.arange(N) * 2 * np.pi / period
+    q, v = np.sin(phase)[:, None], np.cos(phase)[:, None]
+    return Motion(np.arange(N) * 0.04, q, v, np.zeros((N, 1)), np.array([0]))
+
+
 def steps(N: int, *stretches: tuple[int, int, float]) -> np.ndarray:
     """Zero but for stretches [first, last] of a height."""
     level = np.zeros(N)
@@ -209,14 +216,7 @@ class TestJoints:
 
     def test_what_comes_back_with_the_posture_at_most_passages_is_no_event(self) -> None:
         N = 400
-        phase = np.arange(N) * 2 * np.pi / 100
-        given = Motion(
-            np.arange(N) * 0.04,
-            np.sin(phase)[:, None],
-            np.cos(phase)[:, None],
-            np.zeros((N, 1)),
-            np.array([0]),
-        )
+        given = circling(N, 100)
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
         burst = Burst(slice(120, 131), frozenset({0}))
 
@@ -260,16 +260,9 @@ class TestLikeMotion:
 
     def test_what_like_motion_shows_too_is_no_news_and_what_it_does_not_is_so_many_deviations(self) -> None:
         N = 2000
-        phase = np.arange(N) * 2 * np.pi / 100
-        given = Motion(
-            np.arange(N) * 0.04,
-            np.sin(phase)[:, None],
-            np.cos(phase)[:, None],
-            np.zeros((N, 1)),
-            np.array([0]),
-        )
+        given = circling(N, 100)
         rest = np.zeros((N, 1), dtype=bool)
-        wrong = 3 * np.sin(phase)[:, None]
+        wrong = 3 * given.q
         rows, new = novelty.novelty(self.evidence(given), wrong, rest)
         assert rows.tolist() == list(range(N))
         assert np.abs(new[5:-5]).max() < 1e-6
@@ -280,14 +273,7 @@ class TestLikeMotion:
 
     def test_like_motion_has_its_load_and_its_rest(self) -> None:
         N = 1000
-        phase = np.arange(N) * 2 * np.pi / 50
-        given = Motion(
-            np.arange(N) * 0.04,
-            np.sin(phase)[:, None],
-            np.cos(phase)[:, None],
-            np.zeros((N, 1)),
-            np.array([0]),
-        )
+        given = circling(N, 50)
         # every other second the same motion carries a load, and the joint shows something then
         loaded = (np.arange(N) // 50 % 2 == 0)[:, None]
         innovation = np.where(loaded, 4.0, 0.0)

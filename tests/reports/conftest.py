@@ -1,7 +1,9 @@
 """One small run of the loop without a simulator, shared by all tests of the reports."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,15 @@ from armloop.diagnosis import diagnose
 from armloop.drake.experiments.tracking import TrackingResult
 from armloop.identification.reconstruction import Reconstruction, StepReport
 from armloop.identification.scoring import score
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _drawings(_no_drawings: Callable[[Any], str]) -> Iterator[None]:
+    """Here pages are drawn as they are for users."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("armloop.reports.html.svg", _no_drawings)
+        yield
+
 
 SPRING = {"stiffness": 1.5, "rest": 0.3}
 

@@ -93,6 +93,7 @@ def test_the_picture_has_eight_small_figures(loop: SimpleNamespace) -> None:
     assert len(loop_figure(loop).axes) == 9
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_diagnosis_page(loop: SimpleNamespace, clean: Diagnosis) -> None:
     found = diagnosis_report(loop.diagnosis, loop.reconstruction.model, ["again"])
     assert "Diagnosis: joint spring, joint 2" in found and re.search(r"tau1 = ", found)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from armloop.data.motion import Motion
 from armloop.robot.arm import Arm
@@ -74,24 +73,6 @@ class BaseParameters:
         return cls._keeping(columns, _independent(_rows(columns), _usual_order(arm.n, rotors)), rotors)
 
     @classmethod
-    def of_columns(cls, columns: Array, tolerance: float, rotors: bool = False) -> BaseParameters:
-        """The sums that one motion can tell apart, by a rank-revealing pivoted QR.
-
-        Args:
-            columns: (N, n, P) of :func:`full_columns` on that motion.
-            tolerance: a column counts as dependent if less than this part of the largest scaled pivot is
-                its own; around 1e-3 for measured motion, since what excites less is lost in the noise.
-            rotors: whether the columns include rotor inertias.
-        """
-        rows = _rows(columns)
-        scale = np.linalg.norm(rows, axis=0)
-        alive = np.flatnonzero(scale > _TOLERANCE * scale.max(initial=0.0))
-        upper, pivots = qr(rows[:, alive] / scale[alive], mode="r", pivoting=True)
-        pivot_sizes = np.abs(np.diag(upper))
-        rank = int(np.count_nonzero(pivot_sizes > tolerance * pivot_sizes.max(initial=0.0)))
-        return cls._keeping(columns, np.sort(alive[pivots[:rank]]), rotors)
-
-    @classmethod
     def _keeping(cls, columns: Array, kept: NDArray[np.intp], rotors: bool) -> BaseParameters:
         rows = _rows(columns)
         grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
@@ -121,16 +102,6 @@ class BaseParameters:
     def columns(self, arm: Arm, motion: Motion) -> Array:
         """(N, n, r) torques per unit of every base parameter."""
         return full_columns(arm, motion, self.rotors)[:, :, self.kept]
-
-    def step_columns(self, arm: Arm, motion: Motion) -> tuple[Array, Array, Array]:
-        """The columns split as the stepwise method meets them; the three (N, n, r) add up to ``columns``.
-
-        Step I is gravity (at rest), step II what velocity adds to it, step III what acceleration adds.
-        """
-        rest = np.zeros_like(motion.v)
-        gravity = self.columns(arm, Motion(motion.time, motion.q, rest, rest, motion.starts))
-        coasting = self.columns(arm, Motion(motion.time, motion.q, motion.v, rest, motion.starts))
-        return gravity, coasting - gravity, self.columns(arm, motion) - coasting
 
     def from_full(self, full: Array) -> Array:
         """(r,) base parameters of (P,) full ones."""

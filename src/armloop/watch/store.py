@@ -240,8 +240,3 @@ def _read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError(f"{path}: holds no JSON object; move it away, and it is made anew")
     return value
-
-
-def size_on_disk(folder: Path) -> int:
-    """Bytes of all files below a folder."""
-    return sum(os.stat(path).st_size for path in folder.rglob("*") if path.is_file())

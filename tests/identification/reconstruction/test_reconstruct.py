@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.data.blocks import folds
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning, preprocess
 from armloop.experiment.excitation import MotionRanges
@@ -13,11 +14,16 @@ from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
 from armloop.identification.reconstruction.block_length import independent_blocks
 from armloop.identification.reconstruction.data import Data
-from armloop.identification.reconstruction.reconstruct import default_library, held_out_rows
+from armloop.identification.reconstruction.reconstruct import default_library
 from armloop.identification.reconstruction.rigid_body import rigid_body
 from armloop.identification.reconstruction.shared import SHARED_CONDITIONING
 from armloop.identification.scoring import score
 from armloop.util.errors import InputError, LogError
+
+
+def held_out_rows(samples, options):
+    """(N,) every ``folds``-th block, which no step may fit."""
+    return folds(samples, options.folds, options.block_seconds) == 0
 
 
 def a_run(seed: int, seconds: float = 40.0) -> MotionLog:

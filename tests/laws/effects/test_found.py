@@ -127,3 +127,13 @@ def test_a_file_with_another_law_is_refused_in_one_line(
     with pytest.raises(ModelError, match=says) as caught:
         load_model(tmp_path / "model.json")
     assert "\n" not in str(caught.value)
+
+
+def test_a_range_must_know_the_joints_of_all_terms() -> None:
+    known = {
+        key: [-1.0] * 3 if key.endswith("low") else [1.0] * 3
+        for key in ("q_low", "q_high", "v_low", "v_high")
+    }
+    for term, right in (("cos(q3)*v3", True), ("cos(q4)", False), ("v4", False), ("sin(q1+q4)", False)):
+        fault = FoundLaw.fault({term: 1.0, **known})
+        assert (fault == "") == right and (right or "a joint that its range does not know" in fault)

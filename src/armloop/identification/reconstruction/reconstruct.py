@@ -7,12 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from armloop.data.blocks import folds
 from armloop.data.log import require_different
-from armloop.data.motion import Samples
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import check_physics
@@ -315,8 +310,3 @@ def _finished(
         progress("standard errors of the coefficients")
         model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
-
-
-def held_out_rows(samples: Samples, options: Options) -> NDArray[np.bool_]:
-    """(N,) every ``folds``-th block, which no step may fit."""
-    return folds(samples, options.folds, options.block_seconds) == 0
