@@ -46,6 +46,8 @@ _ADDS = (
     "The feedforward with the augmented model minus the feedforward with the model before, along the run's "
     "motion. A sensor's fault and a contact are not in it: no controller should supply them."
 )
+#: Events that have a card of their own.
+_MOST_EVENTS = 6
 
 
 def strongest_joint(diagnosis: Diagnosis) -> int:
@@ -168,7 +170,12 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
     )
     found = diagnosis.outcome.found
     if not found and diagnosis.contacts:
-        return [_contact_card(diagnosis, k) for k in range(min(4, len(diagnosis.contacts)))]
+        count = len(diagnosis.contacts)
+        shown = count if count <= _MOST_EVENTS else _MOST_EVENTS - 1
+        cards = [_contact_card(diagnosis, k) for k in range(shown)]
+        if shown < count:
+            cards.append(Card(f"{count - shown} more", "Further events", "in the table below"))
+        return cards
     if not found:
         tone = "good" if diagnosis.verdict == "no_effect" else "bad"
         return [
