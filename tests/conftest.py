@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 # before numpy is imported: the tests run in one process per core, where more threads only hinder
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -34,14 +33,16 @@ def _no_teams() -> None:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _no_drawings() -> Iterator[Callable[[Any], str]]:
+def _no_drawings() -> Iterator[Callable[..., str]]:
     """Figures are made, and written out by the tests of reports alone: a page takes as long as the diagnosis it is of."""
     from armloop.reports import html
 
     drawn = html.svg
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            html, "svg", lambda figure: figure if isinstance(figure, str) else '<svg class="wide"></svg>'
+            html,
+            "svg",
+            lambda figure, narrow=None: figure if isinstance(figure, str) else '<svg class="wide"></svg>',
         )
         yield drawn
 

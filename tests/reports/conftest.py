@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ from armloop.identification.scoring import score
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _drawings(_no_drawings: Callable[[Any], str]) -> Iterator[None]:
+def _drawings(_no_drawings: Callable[..., str]) -> Iterator[None]:
     """Here pages are drawn as they are for users."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("armloop.reports.html.svg", _no_drawings)
