@@ -300,6 +300,16 @@ def test_two_effects_are_told_apart(model: ReconstructedModel) -> None:
     assert answer["effects"][0]["share"] > answer["effects"][1]["share"]
 
 
+def test_a_drag_with_the_cube_of_the_speed_is_not_taken_for_listed_ones(model: ReconstructedModel) -> None:
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 1, 0.4 * motion.v[:, 0] ** 3)
+
+    found = diagnose(model, [run(law, seed=6)])
+    assert found.verdict == "unlisted_effect" and found.unlisted is not None and not found.outcome.found
+    assert (found.unlisted.joint, next(iter(found.unlisted.parameters))) == (1, "v1^3")
+    assert found.unlisted.parameters["v1^3"].value == pytest.approx(0.4, rel=0.1)
+
+
 def test_a_law_that_is_not_listed_is_said_to_be_unlisted(model: ReconstructedModel) -> None:
     def law(motion: Motion) -> np.ndarray:
         return on_joint(motion, 1, 0.5 * np.cos(2 * motion.q[:, 0]) * motion.v[:, 1])

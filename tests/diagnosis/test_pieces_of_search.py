@@ -263,16 +263,21 @@ class TestLawThatIsNotListed:
         """What is made of effects that leave ``left``, beside a law in their place that leaves ``simpler``."""
 
         def outcome(found: int, energy: float, complexity: int) -> Any:
-            stacked = SimpleNamespace(joint=np.array([0, 1, 1, 1, 1]))
+            stacked = SimpleNamespace(joint=np.array([0, 1, 1, 1, 1]), block=np.array([0, 0, 0, 1, 1]))
+            held_out = np.array([9.0, *np.full(4, np.sqrt(energy / 4))])
             fit = SimpleNamespace(
-                stacked=stacked, score=SimpleNamespace(complexity=complexity), energy=energy
+                stacked=stacked,
+                score=SimpleNamespace(complexity=complexity),
+                energy=energy,
+                held_out=held_out,
             )
             return SimpleNamespace(found=[None] * found, after=fit)
 
         with_effects, without = outcome(2, left, 5), outcome(0, bare, 2)
         law = SimpleNamespace(terms=[], energy=0.9 * left, left=None, form=lambda scale: "none")
+        of_rows = np.full(4, np.sqrt(simpler / 4))
         instead = SimpleNamespace(
-            terms=[(1.0, "v2")] * terms, energy=simpler, left=None, form=lambda scale: "law"
+            terms=[(1.0, "v2")] * terms, energy=simpler, left=of_rows, form=lambda scale: "law"
         )
         monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: 1)
         monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: without)
@@ -294,7 +299,7 @@ class TestLawThatIsNotListed:
         # root mean square over the joint's four rows, in N·m
         assert (kept, found.form, found.rmse_with_form) == ("bare", "law", pytest.approx(2 * np.sqrt(50 / 4)))
         assert found.rmse == pytest.approx(2 * np.sqrt(400 / 4)) and found.parameters
-        for simpler, terms in ((51.0, 3), (50.0, 4), (50.0, 0)):
+        for simpler, terms in ((51.0, 3), (50.0, 4), (50.0, 0), (99.0, 3)):
             found, kept = self.found(monkeypatch, simpler, terms, 100.0, 400.0)
             assert (kept, found.form, found.parameters) == ("effects", "none", {})
             assert found.rmse == pytest.approx(2 * np.sqrt(100 / 4))
@@ -303,10 +308,73 @@ class TestLawThatIsNotListed:
         assert self.found(monkeypatch, 500.0, 1, 119.0, 400.0)[1] == "effects"
         assert self.found(monkeypatch, 500.0, 1, 121.0, 400.0)[1] == "bare"
 
+    def test_of_fewer_parameters_a_law_that_leaves_significantly_less_is_enough(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        leads = iter((3.1, 2.9))
+        monkeypatch.setattr(unlisted, "lead_of", lambda *sums: next(leads))
+        assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "bare"
+        assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "effects"
+
+    def test_what_was_named_at_a_joint_is_asked_even_if_it_leaves_what_the_baseline_does(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of joint 2 the effects leave ``left`` on 100 rows, the law 55."""
+        asked: list[int] = []
+        named = [SimpleNamespace(effect=SimpleNamespace(joint=2, other_joint=None)) for _ in range(2)]
+        arm = SimpleNamespace(effect=SimpleNamespace(joint=None, other_joint=None))
+
+        def verdict(left: float, found: list[Any], kept: list[Any]) -> str:
+            stacked = SimpleNamespace(joint=np.repeat([0, 1], 100), block=np.arange(200) // 10)
+            asked.clear()
+
+            def outcome(found: list[Any], energy: float, complexity: int) -> Any:
+                fit = SimpleNamespace(
+                    stacked=stacked,
+                    score=SimpleNamespace(complexity=complexity),
+                    held_out=np.repeat([1.0, np.sqrt(energy / 100)], 100),
+                )
+                return SimpleNamespace(found=found, after=fit)
+
+            with_effects, bare = outcome(found, left, 3), outcome(kept, 900.0, 1)
+
+            def law(evidence: Any, fit: Any, joint: int) -> Any:
+                asked.append(joint)
+                rows = np.full(100, np.sqrt(0.55))
+                return SimpleNamespace(
+                    terms=[(1.0, "v2")] * 2, energy=55.0, left=rows, form=lambda scale: "law"
+                )
+
+            monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: None)
+            monkeypatch.setattr(unlisted, "pruned", lambda evidence, outcome: outcome)
+            monkeypatch.setattr(unlisted, "_parameters", lambda evidence, law, joint: {"v2": None})
+            monkeypatch.setattr(unlisted, "_law", law)
+            monkeypatch.setattr(
+                unlisted,
+                "without_effects_at",
+                lambda evidence, outcome, joint: bare if joint == 1 else outcome,
+            )
+            evidence: Any = SimpleNamespace(
+                scale=np.ones(2), samples=SimpleNamespace(motion=SimpleNamespace(joints=2))
+            )
+            found_law, after = unlisted.find_law(evidence, with_effects, lambda text: None)  # type: ignore[arg-type]
+            assert (found_law is None) == (after is with_effects)
+            return "effects" if found_law is None else f"law at joint {found_law.joint}"
+
+        assert verdict(111.0, named, []) == "law at joint 2" and asked == [1]
+        assert verdict(109.0, named, []) == "effects" and asked == [1]  # not half of what they leave
+        assert verdict(99.0, named, []) == "effects" and asked == []  # less than the baseline
+        # an effect of the whole arm goes with them: a law of one joint cannot take its place
+        assert verdict(111.0, [*named, arm], []) == "effects" and asked == []
+        assert verdict(111.0, [*named, arm], [arm]) == "law at joint 2"
+
     def test_none_is_left(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: None)
-        nothing: Any = object()
-        assert unlisted.find_law(nothing, nothing, lambda text: None) == (None, nothing)
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=SimpleNamespace(joints=2)))
+        monkeypatch.setattr(unlisted, "without_effects_at", lambda evidence, outcome, joint: outcome)
+        after = SimpleNamespace(stacked=SimpleNamespace(joint=np.zeros(0)))
+        nothing: Any = SimpleNamespace(found=[], after=after)
+        assert unlisted.find_law(evidence, nothing, lambda text: None) == (None, nothing)
 
 
 class TestDesign:

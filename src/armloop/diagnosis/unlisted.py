@@ -1,7 +1,7 @@
 """A residual that no listed effect explains: is it real, where is it, and what is its law?
 
 The law is sought with the sparse machinery among waves of the angles and their sums, velocities, their products
-and directions, and reported only if both halves of the run choose it.
+and directions, and the joint's own speed to the third power, and reported only if both halves of the run choose it.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ EXCESS, EVENTS = 2.0, 2
 REMAINDER = 0.03
 #: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
 FORCED = 0.3
-#: Nor are those that leave a real residual of which a law of no more parameters, in their place, leaves but this part.
+#: Nor are those of which a law of no more parameters, in their place, leaves but this part.
 FAR_LESS = 0.5
 _FEWEST = 50
 _MOST_TERMS = 4
@@ -96,7 +96,8 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     """The largest residual left, if it is real, and its law; None if the run looks like the baseline.
 
     Effects that were only the nearest names for a law that is not listed are struck off: those that leave most of
-    what they were to explain, and those for which a law of no more parameters explains far more.
+    what they were to explain, and those for which a law of no more parameters explains far more: the latter even if what
+    they leave is no more than the baseline at its worst, for several effects of one joint bend to much.
 
     Args:
         outcome: what the search found.
@@ -106,24 +107,57 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     """
     j = _left_over(evidence, outcome)
     if j is None:
-        return None, outcome
+        return _one_instead(evidence, outcome, progress)
     progress(f"joint {j + 1}: a residual that no listed effect explains is left; searching its law")
     bare = without_effects_at(evidence, outcome, j)
     law = _law(evidence, outcome.after, j)
     if len(bare.found) < len(outcome.found):
-        parameters = outcome.after.score.complexity - bare.after.score.complexity
         simpler = _law(evidence, bare.after, j)
-        left = _energy(outcome.after, j)
-        if 0 < len(simpler.terms) <= parameters and simpler.energy <= FAR_LESS * left:
+        if _is_simpler(simpler, outcome, bare, j):
             law, outcome = simpler, bare
-        elif left > FORCED * _energy(bare.after, j):
+        elif _energy(outcome.after, j) > FORCED * _energy(bare.after, j):
             return find_law(evidence, bare, progress)
+    return _stated(evidence, outcome, law, j), pruned(evidence, outcome)
+
+
+def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[Unlisted | None, Outcome]:
+    """One law in place of what was named at a joint, where it is simpler and leaves far less of it."""
+    for j in range(evidence.samples.motion.joints):
+        there = [f for f in outcome.found if f.effect.joint == j + 1 and f.effect.other_joint is None]
+        bare = without_effects_at(evidence, outcome, j)
+        rows = int((outcome.after.stacked.joint == j).sum())
+        if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:
+            continue
+        if _energy(outcome.after, j) <= rows:
+            continue  # no more than the baseline's
+        progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
+        law = _law(evidence, bare.after, j)
+        if _is_simpler(law, outcome, bare, j):
+            return _stated(evidence, bare, law, j), pruned(evidence, bare)
+    return None, outcome
+
+
+def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
+    """Whether a law has no more parameters than the effects in whose place it is put, and leaves far less.
+
+    With fewer parameters it need not be far less: significantly less will do.
+    """
+    parameters = outcome.after.score.complexity - bare.after.score.complexity
+    if not 0 < len(law.terms) <= parameters:
+        return False
+    mine = outcome.after.stacked.joint == j
+    left, blocks = outcome.after.held_out[mine] ** 2, outcome.after.stacked.block[mine]
+    sums = (block_sums(x, blocks) for x in (left, law.left**2, np.ones(len(left))))
+    fewer = len(law.terms) < parameters and lead_of(*sums) > SIGNIFICANCE
+    return fewer or law.energy <= FAR_LESS * _energy(outcome.after, j)
+
+
+def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:
+    """A joint's residual beside the effects of an outcome, and its law."""
     scale, rows = float(evidence.scale[j]), int((outcome.after.stacked.joint == j).sum())
     rmse, with_form = (float(np.sqrt(e / rows)) * scale for e in (_energy(outcome.after, j), law.energy))
     estimates = _parameters(evidence, law, j) if law.terms else {}
-    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, estimates, law.left), pruned(
-        evidence, outcome
-    )
+    return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, estimates, law.left)
 
 
 def _parameters(evidence: Evidence, law: _Law, j: int) -> dict[str, Estimate]:
@@ -220,14 +254,14 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     motion = evidence.samples.motion
     moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
-    X, direction = library.columns(moving), np.sign(moving.v[:, [j]])
-    X = np.hstack([X, X[:, library.order() <= 1] * direction])
+    X, own = library.columns(moving), moving.v[:, [j]]
+    X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
     signed = [
         f"{name}*sign(v{j + 1})"
         for name, order in zip(library.names, library.order(), strict=True)
         if order <= 1
     ]
-    names = [*library.names, *signed]
+    names = [*library.names, *signed, f"v{j + 1}^3"]
     fold = after.stacked.fold[mine]
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
