@@ -324,7 +324,7 @@ class TestLawThatIsNotListed:
         named = [SimpleNamespace(effect=SimpleNamespace(joint=2, other_joint=None)) for _ in range(2)]
         arm = SimpleNamespace(effect=SimpleNamespace(joint=None, other_joint=None))
 
-        def verdict(left: float, found: list[Any], kept: list[Any]) -> str:
+        def verdict(left: float, found: list[Any], kept: list[Any], form: str = "v2^3") -> str:
             stacked = SimpleNamespace(joint=np.repeat([0, 1], 100), block=np.arange(200) // 10)
             asked.clear()
 
@@ -340,10 +340,7 @@ class TestLawThatIsNotListed:
 
             def law(evidence: Any, fit: Any, joint: int) -> Any:
                 asked.append(joint)
-                rows = np.full(100, np.sqrt(0.55))
-                return SimpleNamespace(
-                    terms=[(1.0, "v2")] * 2, energy=55.0, left=rows, form=lambda scale: "law"
-                )
+                return unlisted._Law([(1.0, "sign(v2)"), (2.0, form)], np.full(100, np.sqrt(0.55)))
 
             monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: None)
             monkeypatch.setattr(unlisted, "pruned", lambda evidence, outcome: outcome)
@@ -364,9 +361,19 @@ class TestLawThatIsNotListed:
         assert verdict(111.0, named, []) == "law at joint 2" and asked == [1]
         assert verdict(109.0, named, []) == "effects" and asked == [1]  # not half of what they leave
         assert verdict(99.0, named, []) == "effects" and asked == []  # less than the baseline
+        assert verdict(111.0, named, [], "v2") == "effects"  # dry and viscous friction are listed
         # an effect of the whole arm goes with them: a law of one joint cannot take its place
         assert verdict(111.0, [*named, arm], []) == "effects" and asked == []
         assert verdict(111.0, [*named, arm], [arm]) == "law at joint 2"
+
+    def test_every_function_that_is_sought_can_be_stated(self) -> None:
+        names = unlisted._names(unlisted._library((True, True, False)), 1)
+        assert len(set(names)) == len(names) and {"sign(v2)", "v2^3", "v2*sign(v2)"} <= set(names)
+        ends = np.zeros(3), np.ones(3)
+        stated = unlisted.found_law(
+            three_axis(), 2, dict.fromkeys(names, (1.0, 0.1)), *zip(ends, ends, strict=True)
+        )
+        assert set(names) < set(stated)
 
     def test_none_is_left(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(unlisted, "_left_over", lambda evidence, outcome: None)

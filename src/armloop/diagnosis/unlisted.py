@@ -132,7 +132,7 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
             continue  # no more than the baseline's
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = _law(evidence, bare.after, j)
-        if _is_simpler(law, outcome, bare, j):
+        if not law.is_listed(j) and _is_simpler(law, outcome, bare, j):
             return _stated(evidence, bare, law, j), pruned(evidence, bare)
     return None, outcome
 
@@ -233,6 +233,11 @@ class _Law:
     def energy(self) -> float:
         return float((self.left**2).sum())
 
+    def is_listed(self, j: int) -> bool:
+        """Whether all of it is what listed effects of the joint (0-based) are: an offset, dry friction and drag."""
+        v = f"v{j + 1}"
+        return {name for _, name in self.terms} <= {"1", v, f"sign({v})", f"{v}^2*sign({v})"}
+
     def form(self, scale: float) -> str:
         """The law in N·m (N)."""
         return " ".join(f"{scale * b:+.3g}*{name}" for b, name in self.terms).removeprefix("+")
@@ -247,6 +252,17 @@ def _library(revolute: tuple[bool, ...]) -> AngleSums:
     )
 
 
+def _names(library: AngleSums, j: int) -> list[str]:
+    """Names of the functions of a law of a joint (0-based): the library's, those with its direction, its speed cubed."""
+    own = f"v{j + 1}"
+    signed = [
+        f"{name}*sign({own})".removeprefix("1*")
+        for name, order in zip(library.names, library.order(), strict=True)
+        if order <= 1
+    ]
+    return [*library.names, *signed, f"{own}^3"]
+
+
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
     y = after.held_out[mine]
@@ -256,12 +272,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, own = library.columns(moving), moving.v[:, [j]]
     X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
-    signed = [
-        f"{name}*sign(v{j + 1})"
-        for name, order in zip(library.names, library.order(), strict=True)
-        if order <= 1
-    ]
-    names = [*library.names, *signed, f"v{j + 1}^3"]
+    names = _names(library, j)
     fold = after.stacked.fold[mine]
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
