@@ -134,7 +134,7 @@ def test_faults_are_one_line(logs: list[MotionLog], tmp_path: Path, capsys: pyte
     write_log(path, logs[0])
     for extra, what in (
         (["--leave-out", "file"], "a single log cannot be left out"),
-        (["--block", "0"], "--block 0.0: give a positive number of seconds"),
+        (["--block", "0"], "--block 0: give a positive number of seconds"),
         (["--block", "1e3"], "shorter than two blocks"),
         (["--library", "nonsense"], "unknown library"),
     ):
