@@ -176,10 +176,11 @@ class TestWhereabouts:
 class TestReasons:
     def test_outside_the_trained_range(self) -> None:
         assert reasons._range(0, 0.02, 0.0) == []
-        (words,) = reasons._range(1, 0.03, 0.01)
-        assert (
-            words.startswith("joint 2: 3% of the run lies outside the range") and "the 1% that lie" in words
-        )
+        start = "joint 2: 3% of the run lies outside the range the model was trained on"
+        beyond = f"lies beyond {reasons.FAR:g} times the range and was not judged"
+        assert reasons._range(1, 0.03, 0.0) == [start]
+        assert reasons._range(1, 0.03, 0.009) == [f"{start}; less than 1% {beyond}"]
+        assert reasons._range(1, 0.03, 0.01) == [f"{start}; 1% {beyond}"]
 
     def test_a_residual_is_real_if_it_can_be_foretold_or_nothing_is_known_of_it(self) -> None:
         def real(left: float | None, error: float | None, noise: float | None) -> bool:

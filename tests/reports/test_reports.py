@@ -10,7 +10,7 @@ import pytest
 from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.reports.diagnosis_report import diagnosis_report
-from armloop.reports.html import Card, Report, Section, render, tied
+from armloop.reports.html import Card, Report, Section, prose, render, tied
 from armloop.reports.loop_report import loop_figure, loop_report
 from armloop.reports.words import number
 
@@ -129,6 +129,13 @@ def test_a_number_keeps_its_error_and_unit() -> None:
 
 def test_a_percentage_stands_apart_from_its_sign() -> None:
     assert tied("it leaves 54% of 1.5 % and 50 %") == "it leaves 54\u00a0% of 1.5\u00a0% and 50\u00a0%"
+
+
+def test_a_command_s_options_are_code() -> None:
+    assert (
+        prose("it is < 1 with --next-run: well-known")
+        == "it is &lt; 1 with <code>--next-run</code>: well-known"
+    )
 
 
 def test_text_cannot_become_markup() -> None:

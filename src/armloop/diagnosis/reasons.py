@@ -90,10 +90,11 @@ def too_still(evidence: Evidence) -> str:
 def _range(j: int, outside: float, far: float) -> list[str]:
     if outside <= _WORTH_A_WORD:
         return []
-    return [
-        f"joint {j + 1}: {outside:.0%} of the run lies outside the range the model was trained on; the {far:.0%} that lie "
-        f"beyond {FAR:g} times the range were not judged"
-    ]
+    words = f"joint {j + 1}: {outside:.0%} of the run lies outside the range the model was trained on"
+    if far == 0:
+        return [words]
+    part = f"{far:.0%}" if far >= 0.01 else "less than 1%"
+    return [f"{words}; {part} lies beyond {FAR:g} times the range and was not judged"]
 
 
 def _too_poor(model: ReconstructedModel, j: int) -> str:

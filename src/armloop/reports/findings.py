@@ -65,7 +65,7 @@ def findings(diagnosis: Diagnosis) -> list[str]:
                 "outside of that."
             )
         elif unlisted.parameters:
-            sentences.append("`--adopt` puts the law into the augmented model and its feedforward.")
+            sentences.append("--adopt puts the law into the augmented model and its feedforward.")
     return sentences or [_nothing(diagnosis)]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import matplotlib
 from jinja2 import Environment, PackageLoader
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from armloop import __version__
@@ -28,6 +28,7 @@ _DPI = 150
 _TIES = re.compile(
     r"(?<=[±→×]) | (?=%)|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
 )
+_OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*\b")
 _PERCENT = re.compile(r"(?<=\d)%")
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
@@ -130,8 +131,13 @@ def render(report: Report) -> str:
         loader=PackageLoader("armloop.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["svg"] = lambda picture: Markup(picture.svg())
-    environment.filters["tied"] = tied
+    environment.filters["prose"] = prose
     return environment.get_template("report.html").render(report=report, version=__version__)
+
+
+def prose(text: str) -> Markup:
+    """A sentence as HTML: tied, a command's options as code."""
+    return Markup(_OPTION.sub(r"<code>\g<0></code>", str(escape(tied(text)))))
 
 
 def tied(text: str) -> str:
