@@ -21,3 +21,11 @@ def test_a_rigid_body_is_its_regressor_times_its_parameters(name: str, rotors: b
     for step, same in ((3, motion), (1, still)):
         expected = full_columns(arm, same, rotors) @ parameters
         np.testing.assert_allclose(body.torque(arm, motion, step), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_what_a_bound_holds_at_zero_is_not_printed() -> None:
+    arm = load_arm("three_axis")
+    body = RigidBody(np.zeros(33), ("mx2 + 0.4 m3", "J2"), np.array([0.0, 0.5]))
+    assert body.terms(arm, 1) == [(3, 0.5, "Y2[J2]")]
+    assert body.legend() == ["J2: 0.5 = J2"]
+    assert body.to_dict()["base_parameters"] == {"mx2 + 0.4 m3": 0.0, "J2": 0.5}

@@ -165,6 +165,8 @@ class RigidBody:
         """
         found = []
         for name, value in zip(self.names, self.values, strict=True):
+            if not value:
+                continue
             lead = name.split(" ")[0]
             link = int(re.sub(r"\D", "", lead))
             acts = link == joint + 1 if lead.startswith("J") else link >= joint + 1
@@ -177,6 +179,7 @@ class RigidBody:
         return [
             f"{name.split(' ')[0]}: {value:.4g} = {name}"
             for name, value in zip(self.names, self.values, strict=True)
+            if value
         ]
 
     def to_dict(self) -> dict[str, Any]:
@@ -235,7 +238,7 @@ class Lagrangian:
         lines = []
         for name, chosen in (("T", ~self.energy.potential), ("U", self.energy.potential)):
             pairs = zip(self.coefficients[chosen], np.array(self.energy.names)[chosen], strict=True)
-            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.4g}*{term}" for c, term in pairs)
+            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.4g}*{term}" for c, term in pairs if c)
             lines.append(f"{name} = {text.removeprefix('+ ') or '0'}")
         return lines
 

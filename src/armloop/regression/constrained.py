@@ -64,8 +64,8 @@ def constrained_least_squares(
         rows = np.unique(np.vstack([rows, violated]), axis=0)
         A = solve_triangular(L, (rows * scale).T, lower=True).T
         A /= np.linalg.norm(A, axis=1, keepdims=True)
-        z = _nearest(target, A)
-        theta = _bounded(scale * solve_triangular(L, z, lower=True, trans="T"), rows)
+        z, pushes = _nearest(target, A)
+        theta = _bounded(scale * solve_triangular(L, z, lower=True, trans="T"), rows, pushes)
         cost = float(np.sum((z - target) ** 2)) - free
         if cost > most:
             raise TooCostly(f"the constraints cost {cost:.3g}")
@@ -80,19 +80,23 @@ def constrained_least_squares(
     return theta, len(rows)
 
 
-def _bounded(theta: Array, rows: Array) -> Array:
-    """θ with bounds of single coefficients met to the last digit: what is undetermined magnifies round-off."""
-    single = rows[np.count_nonzero(rows, axis=1) == 1]
-    above, below = (single > 0).any(axis=0), (single < 0).any(axis=0)
+def _bounded(theta: Array, rows: Array, pushes: Array) -> Array:
+    """θ with bounds of single coefficients met to the last digit: what is undetermined magnifies round-off.
+
+    A bound that pushes is met with equality (complementary slackness): what it holds is zero, and no rounding of it.
+    """
+    one = np.count_nonzero(rows, axis=1) == 1
+    held = (rows[one & (pushes > 0)] != 0).any(axis=0)
+    above, below = (rows[one] > 0).any(axis=0), (rows[one] < 0).any(axis=0)
     theta = np.where(above, np.maximum(theta, 0.0), theta)
-    return np.where(below, np.minimum(theta, 0.0), theta)
+    return np.where(held, 0.0, np.where(below, np.minimum(theta, 0.0), theta))
 
 
-def _nearest(target: Array, A: Array) -> Array:
-    """The point nearest to ``target`` with A z ≥ 0."""
+def _nearest(target: Array, A: Array) -> tuple[Array, Array]:
+    """The point nearest to ``target`` with A z ≥ 0, and how hard each of these conditions pushes it, up to a factor."""
     size = max(float(np.abs(target).max()), 1e-300)
     try:
         pushes, _ = nnls(A.T, -target / size, maxiter=30 * len(A))
     except RuntimeError as error:
         raise ArithmeticError(f"nnls: {error}") from error
-    return np.asarray(target + size * (A.T @ pushes))
+    return np.asarray(target + size * (A.T @ pushes)), pushes
