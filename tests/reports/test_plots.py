@@ -234,8 +234,8 @@ def test_a_fleets_effects_are_parted_into_blocks_on_a_narrow_page() -> None:
     places = [f"effect {k}" for k in range(25)]
     evidence = np.outer([1.0, 2.0], np.arange(25.0))
     data = (["a", "b"], places, evidence, np.array([20.0, 20.0]), evidence > 40)
-    wide, narrow = heat_figure(*data), heat_figure(*data, NARROW)
-    assert len(wide.axes) == 2 and narrow.get_figwidth() == NARROW
+    whole, narrow = heat_figure(*data), heat_figure(*data, NARROW)
+    assert len(whole.axes) == 2 and narrow.get_figwidth() == NARROW
     blocks = [
         axes for axes in narrow.axes if [text.get_text() for text in axes.get_yticklabels()] == ["a", "b"]
     ]

@@ -10,8 +10,9 @@ import pytest
 from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.reports.diagnosis_report import diagnosis_report
-from armloop.reports.html import Card, Report, Section, prose, render, tied
+from armloop.reports.html import Card, Report, Section, prose, render, tied, wide
 from armloop.reports.loop_report import loop_figure, loop_report
+from armloop.reports.tables import make_table
 from armloop.reports.words import number
 
 # written without an end tag
@@ -72,7 +73,7 @@ def test_figures_take_the_pages_colours(page: str) -> None:
 def test_the_loops_numbers_are_the_results(page: str, loop: SimpleNamespace) -> None:
     assert "joint spring, joint 2" in page and "the verdict was right" in page
     for eta in loop.tracking_after.eta:
-        assert f"<td>{number(float(eta))}</td>" in page
+        assert f">{number(float(eta))}</td>" in page
     stiffness = loop.diagnosis.outcome.added()[0].parameters["stiffness"]
     assert f"{stiffness.value:.4g}" in page
     assert "&lt;angle&gt;" in page
@@ -117,13 +118,13 @@ def test_every_joint_has_its_residual_and_what_the_controller_adds(loop: SimpleN
     text = diagnosis_report(loop.diagnosis, model, ["again"], closing)
     assert "What is left, on its own scale" in text and "What it changes" in text
     rms = number(float(closing.feedforward.rms[1]))
-    assert f"<td>{rms}</td>" in text
+    assert f">{rms}</td>" in text
     assert len(text) < 3e6
     assert not [a for a in Page(text).addresses if a.startswith("http")]
 
 
 def test_a_number_keeps_its_error_and_unit() -> None:
-    assert tied("joint 2: 0.71 ± 0.01 N·m, 99 %") == "joint\u00a02: 0.71 ±\u00a00.01\u00a0N·m, 99\u00a0%"
+    assert tied("joint 2: 0.71 ± 0.01 N·m, 99 %") == "joint\u00a02: 0.71\u00a0±\u00a00.01\u00a0N·m, 99\u00a0%"
     assert tied("2 numbers and 3 more") == "2 numbers and 3 more"
 
 
@@ -136,6 +137,12 @@ def test_a_command_s_options_are_code() -> None:
         prose("it is < 1 with --next-run: well-known")
         == "it is &lt; 1 with <code>--next-run</code>: well-known"
     )
+
+
+def test_a_table_is_wide_by_what_cannot_be_parted() -> None:
+    assert not wide(make_table(["a reference of several words", "b"], [["cells of several words"] * 2]))
+    assert wide(make_table(["a"], [["1" * 41]])) and not wide(make_table(["a"], [["1" * 40]]))
+    assert wide(make_table([f"joint {j}" for j in range(1, 7)], [["2.77 ± 0.02"] * 6]))
 
 
 def test_text_cannot_become_markup() -> None:

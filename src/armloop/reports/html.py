@@ -26,12 +26,14 @@ _THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE
 _DPI = 150
 #: Blanks that no line should end at: before a unit or %, after ± and arrows.
 _TIES = re.compile(
-    r"(?<=[±→×]) | (?=%)|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
+    r"(?<=[±→×]) | (?=[%±])|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
 )
 _OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*\b")
 _PERCENT = re.compile(r"(?<=\d)%")
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
+#: Letters of a table's line that a phone has room for.
+_LETTERS = 42
 
 
 @dataclass(frozen=True)
@@ -132,12 +134,20 @@ def render(report: Report) -> str:
     )
     environment.filters["svg"] = lambda picture: Markup(picture.svg())
     environment.filters["prose"] = prose
+    environment.tests["wide"] = wide
     return environment.get_template("report.html").render(report=report, version=__version__)
 
 
 def prose(text: str) -> Markup:
     """A sentence as HTML: tied, a command's options as code."""
     return Markup(_OPTION.sub(r"<code>\g<0></code>", str(escape(tied(text)))))
+
+
+def wide(table: Table) -> bool:
+    """Whether a table is wider than a phone even with every cell parted at its blanks; two letters between columns."""
+    columns = zip(table.headers, *table.rows, strict=True)
+    words = [max(len(word) for cell in column for word in tied(cell).split(" ")) for column in columns]
+    return sum(words) + 2 * len(words) > _LETTERS
 
 
 def tied(text: str) -> str:

@@ -20,7 +20,7 @@ from armloop.reports.watch_tables import (
     named,
     place,
 )
-from armloop.reports.words import counted, number
+from armloop.reports.words import counted, number, percent, unit
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
@@ -180,8 +180,8 @@ def _alarm(alarm: dict[str, Any], new: bool) -> Section:
                     place(effect) if k == 0 else "",
                     key.replace("_", " "),
                     text,
-                    e["unit"],
-                    effect["share"] if k == 0 else "",
+                    unit(e["unit"]),
+                    percent(effect["share"]) if k == 0 else "",
                 ]
             )
     tables = (

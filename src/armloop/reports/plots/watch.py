@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
 from armloop.util.arrays import Array
@@ -17,8 +17,10 @@ from armloop.util.arrays import Array
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60
 _INCHES_PER_LETTER = 0.085
-#: Inches of a cell, and of a figure on a page as narrow as a phone's.
-_CELL, NARROW = 0.26, 4.0
+#: Inches of a cell, of the longest scale of colours, and of a figure on a page and on one as narrow as a phone's.
+_CELL, _BAR, WIDE, NARROW = 0.26, 4.0, 9.6, 4.0
+#: None lets the page through, light or dark.
+_STRENGTH = LinearSegmentedColormap.from_list("evidence", [f"{GREY}1f", ORANGE, "#b0182c"])
 # s that the axis of time covers at least
 _LEAST_SPAN = 86_400.0
 
@@ -29,33 +31,30 @@ def heat_figure(
     evidence: Array,
     limit: Array,
     alarmed: Array,
-    width: float | None = None,
+    width: float = WIDE,
 ) -> Figure:
     """Arms × effects, coloured by the evidence as a part of the threshold.
 
     Args:
         evidence: (A, E) natural logarithm; NaN where there is none.
         limit: (A,) threshold of each arm; alarmed: (A, E) true where an alarm was traced to the effect.
-        width: inches; the effects are then parted into blocks one below the other, as many as that takes.
+        width: inches; the effects are parted into blocks one below the other, as many as that takes.
     """
     left = 0.4 + _INCHES_PER_LETTER * max([len(name) for name in arms], default=0)
-    bottom = 0.4 + 0.066 * max([len(name) for name in places], default=0)
-    most = len(places) if width is None else max(1, int((width - left - 0.2) / _CELL))
-    blocks = -(-len(places) // max(most, 1)) or 1
-    each = -(-len(places) // blocks)
-    high = _CELL * max(1, len(arms))
-    height = 0.6 + blocks * (high + bottom)
-    made = figure(width or max(6.0, left + 0.9 + _CELL * len(places)), height)
-    across = (width - left - 0.2) if width else made.get_figwidth() - left - 0.9
+    most = max(1, int((width - left - 0.2) / _CELL))
+    each = -(-len(places) // (-(-len(places) // most) or 1)) or 1
+    blocks = [slice(k, k + each) for k in range(0, max(len(places), 1), each)]
+    below = [0.4 + 0.066 * max([len(name) for name in places[kept]], default=0) for kept in blocks]
+    high, across = _CELL * max(1, len(arms)), min(width - left - 0.2, 1.5 * _CELL * each)
+    made = figure(width, 0.6 + len(blocks) * high + sum(below))
+    down = made.get_figheight() - 0.5
+    bar = made.add_axes(_inches(made, left, down + 0.08, min(across, _BAR), 0.1))
     part = np.clip(np.nan_to_num(evidence, nan=0.0) / limit[:, None], 0.0, 1.0)
-    image: AxesImage | None = None
-    for k in range(blocks):
-        kept = slice(k * each, (k + 1) * each)
+    for kept, under in zip(blocks, below, strict=True):
         names = places[kept]
-        down = height - 0.5 - k * (high + bottom) - high
-        axes = made.add_axes(_inches(made, left, down, across * len(names) / max(each, 1), high))
+        axes = made.add_axes(_inches(made, left, down - high, across * len(names) / each, high))
         image = axes.imshow(
-            part[:, kept], cmap="YlOrRd", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest"
+            part[:, kept], cmap=_STRENGTH, vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest"
         )
         for a, e in np.argwhere(alarmed[:, kept]):
             axes.plot(e, a, "o", color="white", markeredgecolor="black", markersize=6)
@@ -64,18 +63,12 @@ def heat_figure(
         axes.set_yticks(range(len(arms)), list(arms))
         axes.set_xticks(range(len(names)), list(names), rotation=90)
         axes.tick_params(labelsize=8.5, labelcolor=INK)
-    beside = (made.get_figwidth() - 0.7, height - 0.5 - high, 0.14, high)
-    place = (left, height - 0.42, across, 0.1) if width else beside
-    assert image is not None
-    bar = made.colorbar(
-        image,
-        cax=made.add_axes(_inches(made, *place)),
-        orientation="horizontal" if width else "vertical",
-        ticklocation="top" if width else "auto",
-    )
-    bar.set_ticks([0.0, 0.5, 1.0], labels=["0", "half", "alarm"])
-    bar.ax.tick_params(labelsize=8.5, labelcolor=MUTED, length=0)
-    bar.outline.set_visible(False)
+        down -= high + under
+    made.colorbar(image, cax=bar, orientation="horizontal", ticklocation="top")
+    bar.set_xticks([0.0, 0.5, 1.0], labels=["0", "half", "alarm"])
+    bar.tick_params(labelsize=8.5, labelcolor=MUTED, length=0)
+    for spine in bar.spines.values():
+        spine.set_visible(False)
     return made
 
 
