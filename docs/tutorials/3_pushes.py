@@ -44,5 +44,9 @@ found
 # later.
 
 # %%
+import numpy as np
+
 for effect in found.effects:
-    print(effect.effect.label(), {name: p.value for name, p in effect.parameters.items()})
+    print(
+        effect.effect.label(), {name: np.round(p.value, 2).tolist() for name, p in effect.parameters.items()}
+    )
