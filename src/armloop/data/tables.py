@@ -4,9 +4,12 @@ pyarrow reads; only when it refuses a CSV is the text walked through again, slow
 Rows are counted from 1 without the header; for a CSV the line of the file is named as well.
 """
 
+from __future__ import annotations
+
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +17,15 @@ from numpy.typing import NDArray
 from armloop.util.errors import LogError
 from armloop.util.files import replacing
 
+if TYPE_CHECKING:
+    from pyarrow import Table
+    from pyarrow.parquet import ParquetFile
+
 CSV, PARQUET = ".csv", ".parquet"
 #: Rows that a Parquet file keeps together: a reader of some rows has to decode no more than these.
 ROW_GROUP = 1 << 16
+#: Bytes of each column that a reader of some rows takes from the disk at a time.
+_BUFFER = 1 << 18
 # No time, position or force in SI units is as large; squares and products of what is smaller do not overflow.
 _LARGEST = 1e12
 
@@ -161,16 +170,9 @@ def _read_parquet(
     import pyarrow.parquet
 
     try:
-        with pyarrow.parquet.ParquetFile(path, memory_map=True) as file:
-            if rows is None:
-                table = file.read(columns=list(names))
-            else:
-                ends = np.cumsum([file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)])
-                first, last = np.searchsorted(ends, [rows[0], rows[1] - 1], side="right")
-                # In a worker's process more threads only hinder.
-                table = file.read_row_groups(range(first, last + 1), columns=list(names), use_threads=False)
-                before = int(ends[first - 1]) if first else 0
-                table = table.slice(rows[0] - before, rows[1] - rows[0])
+        how = {"memory_map": True} if rows is None else {"buffer_size": _BUFFER, "pre_buffer": False}
+        with pyarrow.parquet.ParquetFile(path, **how) as file:
+            table = file.read(columns=list(names)) if rows is None else _some_rows(file, names, *rows)
     except (pyarrow.ArrowException, OSError) as error:
         raise LogError(f"{path}: the Parquet data cannot be read; write the file anew") from error
     columns = {}
@@ -179,7 +181,29 @@ def _read_parquet(
         if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
             raise LogError(f"{path}: column {name} holds {kind}; it must hold floating-point numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
+    if rows is not None:  # every process that reads pieces would keep what one of them took
+        del table
+        pyarrow.default_memory_pool().release_unused()
     return columns
+
+
+def _some_rows(file: ParquetFile, names: Sequence[str], first: int, last: int) -> Table:
+    """Rows of a file, batch by batch: others' files keep a million rows together, which are not to lie in memory at once."""
+    import pyarrow
+
+    ends = np.cumsum([file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)])
+    low, high = np.searchsorted(ends, [first, last - 1], side="right").tolist()
+    groups, before = list(range(low, high + 1)), int(ends[low - 1]) if low else 0
+    kept = []
+    # In a worker's process more threads only hinder.
+    for batch in file.iter_batches(ROW_GROUP, groups, list(names), use_threads=False):
+        own = batch.slice(max(0, first - before), max(0, last - max(first, before)))
+        before += batch.num_rows
+        if own.num_rows:
+            kept.append(own)
+        if before >= last:
+            break
+    return pyarrow.Table.from_batches(kept)
 
 
 def _read_csv(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
