@@ -11,7 +11,7 @@ from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, three_axis
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
-from armloop.export.consistent import pseudo_inertias
+from armloop.dynamics.consistent import pseudo_inertias
 from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.features.lagrangian import candidates
 from armloop.features.rigid_body import BaseParameters

@@ -73,6 +73,7 @@ MOVED = {
     "armloop.effects": "armloop.laws.effects",
     "armloop.errors": "armloop.util.errors",
     "armloop.excitation": "armloop.experiment.excitation",
+    "armloop.export.consistent": "armloop.dynamics.consistent",
     "armloop.export.rereading": "armloop.export.round_trip",
     "armloop.export.said": "armloop.export.expressible",
     "armloop.files": "armloop.util.files",

@@ -9,15 +9,18 @@ need it to, and over all postures that the arm can take, not only those of the t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from armloop.data.motion import Motion
+from armloop.dynamics.consistent import are_bodies, scales
 from armloop.features.lagrangian import gravity_sees_first_joint
 from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
 from armloop.util.arrays import Array
 
 #: Postures drawn over the limits, and from how many of the worst a lower eigenvalue is searched.
@@ -30,6 +33,10 @@ _MOTIONS, _SPEEDS = 400, 60
 _NOTABLE = 0.01
 #: Power that friction may give, relative to that of all torques: round-off.
 _ROUND_OFF = 1e-9
+#: A mass matrix beside the links' that is the same at so many postures is the same at all.
+_FEW = 20
+#: What proves M(q) positive definite.
+BODIES = "links and rotors that can exist (positive definite pseudo-inertias)"
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ class PhysicsChecks:
         driving_at: per joint, that speed.
         yaw: root mean square change of the torques by a turn of the first joint, relative to the torques'; None
             where the first axis is not vertical.
+        certificate: why M(q) is positive definite at every posture; empty where that is not proven, only tried.
     """
 
     least: float
@@ -56,6 +64,7 @@ class PhysicsChecks:
     driving: tuple[float, ...]
     driving_at: tuple[float, ...]
     yaw: float | None
+    certificate: str = ""
 
     @property
     def definite(self) -> bool:
@@ -109,6 +118,7 @@ class PhysicsChecks:
             "mass_matrix": {
                 "least_eigenvalue": self.least,
                 "at": list(self.least_at),
+                "certificate": self.certificate or None,
                 "share_not_positive": self.negative,
                 "asymmetry": self.asymmetry,
                 "asymmetry_at": list(self.asymmetry_at),
@@ -146,6 +156,7 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
         asymmetry_at=_tuple(q[int(np.argmax(tilt))]),
         driving=_tuple(driving),
         driving_at=_tuple(speeds),
+        certificate=_certificate(model, q[:_FEW], M[:_FEW]),
         yaw=None if gravity_sees_first_joint(arm) or not arm.revolute[0] else _yaw(model, low, high, rng),
     )
 
@@ -213,6 +224,24 @@ def lowest(
         reach = 0.5 * reach
     order = np.argsort(values)
     return values[order], q[order]
+
+
+def _certificate(model: ReconstructedModel, q: Array, M: Array) -> str:
+    """Why M(q) is positive definite at every posture, by what the links are; empty if they do not show it.
+
+    Kinetic energies add up: of links and rotors that can exist, and of what else has an inertia, the same everywhere.
+    """
+    n = model.arm.n
+    if len(model.components) != 1 or not isinstance(model.components[0], RigidBody):
+        return ""
+    full = model.components[0].parameters
+    own = scales(model.arm, full[: 10 * n], nominal_parameters(model.arm))
+    if not are_bodies(np.concatenate([full[: 10 * n] / own, full[10 * n :]]), n):
+        return ""
+    rest = M - mass_matrix(replace(model, effects=()), q)
+    size = _ROUND_OFF * float(np.abs(M).max())
+    constant = np.abs(rest - rest[0]).max() <= size
+    return BODIES if constant and _least(rest[:1])[0] >= -size else ""
 
 
 def _least(M: Array) -> Array:

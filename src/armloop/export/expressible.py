@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 
 from armloop.data.motion import Motion
 from armloop.dynamics import ModelEquations, training_range
-from armloop.export.consistent import ConsistentInertia, consistent_inertia
+from armloop.dynamics.consistent import ConsistentInertia, consistent_inertia
 from armloop.features.rigid_body import full_columns
 from armloop.laws.effects.base import number
 from armloop.laws.effects.gravity_tilt import tilted_gravity

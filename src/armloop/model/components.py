@@ -141,8 +141,8 @@ class RigidBody:
     """Inertial parameters of all links (and rotors), as far as the data reveal them.
 
     Attributes:
-        parameters: (10 n,) or, with rotor inertias, (11 n,): full parameters nearest to the nominal ones
-            that have the identified base parameters.
+        parameters: (10 n,) or, with rotor inertias, (11 n,): full parameters that have the identified base
+            parameters: of links that can exist, unless the data contradict those; near the nominal ones.
         names, values: the base parameters, readable.
     """
 

@@ -149,7 +149,7 @@ def libraries_table(libraries: Sequence[Contender], title: str | None = "Librari
                 name,
                 percent(one.error),
                 one.coefficients,
-                checks.least,
+                f"{checks.least:.3g} (proven positive)" if checks.certificate else checks.least,
                 percent(checks.asymmetry),
                 f"drives joint {', '.join(drives)}" if drives else "passive",
                 MISSING if checks.yaw is None else percent(checks.yaw),

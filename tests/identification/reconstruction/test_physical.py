@@ -11,6 +11,7 @@ from armloop.identification.reconstruction.physical import (
     physics_notes,
 )
 from armloop.identification.reconstruction.pooled import Solution
+from armloop.util.errors import ExcitationError
 
 
 def columns(q: np.ndarray) -> np.ndarray:
@@ -52,3 +53,12 @@ def test_where_searches_end_too_early_the_best_so_far_is_kept_and_the_place_is_s
     kept = solved(1.0, 1.5)
     assert kept.left is not None and columns(kept.left[None])[0, 0, 0] @ kept.theta < 0
     assert any(f"but for q = ({kept.left[0]:.2f})" in note for note in physics_notes(kept.to_dict()))
+
+
+def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.MonkeyPatch):
+    def fail(*_):
+        raise ArithmeticError("nnls: maximum iterations reached")
+
+    monkeypatch.setattr(physical, "constrained_least_squares", fail)
+    with pytest.raises(ExcitationError, match="the motion tells too little"):
+        solved(1.0, 1.5)

@@ -129,6 +129,10 @@ class Laws:
             parts.append(added.transpose(0, 2, 1, 3))
         return np.concatenate(parts, axis=3)
 
+    def inertial(self, arm: Arm, q: Array) -> list[bool]:
+        """Whether each coefficient adds inertia, which is negative for no arm, to M(q) at postures q (P, n)."""
+        return [bool(own.any()) for own in np.moveaxis(self.mass(arm, q), 3, 0)]
+
     def split(self, theta: Array) -> list[Array]:
         """Each law's coefficients."""
         return list(np.split(theta, np.cumsum([law.size for law in self.chosen])[:-1])) if self.chosen else []

@@ -34,8 +34,9 @@ _ALIKE = 0.05
 _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
 _CHANCE = 0.999
-#: Where M(q) was kept positive definite: over the joint limits, at the postures of the motion alone, nowhere.
-LIMITS, TRAINED, FREE = "limits", "trained", "free"
+#: Where M(q) was kept positive definite: at every posture, for its links are bodies; over the joint limits; at the
+#: postures of the motion alone; nowhere.
+EVERYWHERE, LIMITS, TRAINED, FREE = "everywhere", "limits", "trained", "free"
 
 
 def postures(motion: Motion) -> Array:
@@ -70,8 +71,9 @@ class PhysicalSolution:
     Attributes:
         theta: the coefficients.
         binding: conditions on M(q), independent of each other, that hold the coefficients.
-        where: :data:`LIMITS`, :data:`TRAINED` where the data contradict a positive definite M(q) over all of them by
-            more than noise, or :data:`FREE` where they contradict it at the postures of the motion, too.
+        where: :data:`EVERYWHERE` where the links are bodies, :data:`LIMITS`, :data:`TRAINED` where the data contradict a
+            positive definite M(q) over all of them by more than noise, or :data:`FREE` where they contradict it at the
+            postures of the motion, too.
         left: (n,) a posture within the limits at which M(q) is negative nevertheless: the searches ended there.
     """
 
@@ -281,6 +283,14 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
         below = ", ".join(history.get("negative", {}))
         return [free + (f"; negative, as for no arm: {below}" if below else "")]
     notes = []
+    if history.get("bodies"):
+        cost, chance, name, off = (
+            history["bodies"][k] for k in ("chi_square", "by_chance", "farthest", "std_errors")
+        )
+        notes.append(
+            "the data contradict links that can exist: the nearest bodies cost a chi-square of "
+            f"{cost:.3g}, by chance {chance:.3g} (most at {name}: {off:.2g} standard errors)"
+        )
     if history.get("left"):
         posture = ", ".join(f"{x:.2f}" for x in history["left"])
         notes.append(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -23,8 +23,16 @@ from armloop.identification.reconstruction.fitting import Fitting
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.library import Find, Library
 from armloop.identification.reconstruction.options import Options, StepReport
-from armloop.identification.reconstruction.physical import Body, physical_solution, physics_notes, postures
-from armloop.identification.reconstruction.pooled import Prior
+from armloop.identification.reconstruction.physical import (
+    EVERYWHERE,
+    Body,
+    PhysicalSolution,
+    physical_solution,
+    physics_notes,
+    postures,
+)
+from armloop.identification.reconstruction.pooled import Prior, Solution
+from armloop.identification.reconstruction.realizable import realizable_solution
 from armloop.identification.reconstruction.shared import (
     SHARED_CONDITIONING,
     check_moves,
@@ -33,6 +41,7 @@ from armloop.identification.reconstruction.shared import (
     undetermined_notes,
 )
 from armloop.identification.reconstruction.training import Training
+from armloop.laws.friction import FrictionTerm
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
@@ -49,7 +58,8 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
 
     Which friction each joint has is chosen on a ladder (:mod:`reconstruction.friction_selection`). The torque
     that passes a joint, on which its friction may depend, is known after a first pass with plain friction.
-    What physics demands (M(q) positive definite, friction that never drives) is kept as constraints.
+    What physics demands (links that can exist or, where the data contradict those, M(q) positive definite; friction that
+    never drives) is kept as constraints.
 
     Raises:
         ExcitationError: a joint does not move.
@@ -77,13 +87,25 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
     )
 
+    def physical(
+        solution: Solution, friction: list[list[FrictionTerm]]
+    ) -> tuple[Array, Array, dict[str, Any]]:
+        """Coefficients of bodies that can exist, or, if the data contradict those, with M positive where it matters."""
+        passive = [term.kind != "offset" for law in friction for term in law]
+        positive = np.array([*laws.inertial(arm, shape.seen), *passive], dtype=bool)
+        bodies = realizable_solution(solution, arm, base, nominal, positive, training.memory)
+        if bodies.accepted:
+            return bodies.theta, bodies.full, PhysicalSolution(bodies.theta, 0, EVERYWHERE).to_dict()
+        found = physical_solution(solution, shape, friction, options.insist, training.memory)
+        said = {"bodies": bodies.to_dict(base.names)}
+        return found.theta, base.to_full(found.theta[: base.count], nominal), {**found.to_dict(), **said}
+
     def regressed(held_out: bool) -> Found:
         solution = ladder.solved(held_out)
-        theta, physics = solution.theta, {}
+        theta, physics = solution.theta, dict[str, Any]()
+        full = base.to_full(theta[: base.count], nominal)
         if options.physical:
-            physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
-            theta = physical.theta
-            physics = physical.to_dict()
+            theta, full, physics = physical(solution, ladder.laws)
             held = np.flatnonzero(
                 base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
             )
@@ -91,7 +113,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
             below = np.flatnonzero(base.positive & (theta[: base.count] < 0))
             physics["negative"] = {base.names[k]: float(theta[k]) for k in below}
         values = theta[: base.count]
-        body = RigidBody(base.to_full(values, nominal), tuple(base.names), values)
+        body = RigidBody(full, tuple(base.names), values)
         inertial = body.parameters[: 10 * arm.n].tolist()
         history = {
             "inertial": inertial,

@@ -77,7 +77,7 @@ def consistent_inertia(
     """
     n = arm.n
     prior = nominal_parameters(arm) if prior is None else prior
-    scale = _scales(arm, links, prior)
+    scale = scales(arm, links, prior)
     with_rotor = np.flatnonzero(np.abs(rotors) > _ROUNDING * scale[9::10])
     units = np.concatenate([scale, scale[9::10][with_rotor]])
     wanted = np.concatenate([links, rotors[with_rotor]]) / units
@@ -85,19 +85,37 @@ def consistent_inertia(
     # Directions that change no torque are to change none by rounding either.
     _, singular, Vt = np.linalg.svd(R)
     fixed = Vt[singular > _RANK * singular[0]]
-    R = R @ fixed.T @ fixed
-    bodies = _bodies((prior / scale).reshape(n, 10))
-    drives = np.maximum(wanted[10 * n :], _THICKNESS)
-    x = np.concatenate([_parameters_of(bodies).ravel(), drives])
-    for weight in _WEIGHTS:
-        x = _nearest(R / np.sqrt(weight), wanted, bodies, drives, x)
-    # What it still lacks of the base parameters wanted, put right by the least change if it stays a body.
-    moved = x + fixed.T @ (fixed @ (wanted - x))
-    exact = bool(_smallest(moved, n) > _FEASIBLE and (moved[10 * n :] >= 0).all())
-    x = moved if exact else x
+    x, exact = nearest_bodies(R @ fixed.T @ fixed, fixed, wanted, prior / scale, _WEIGHTS)
     found = np.zeros(n)
     found[with_rotor] = x[10 * n :] * units[10 * n :]
     return ConsistentInertia(x[: 10 * n] * scale, found, exact, _smallest(x, n))
+
+
+def nearest_bodies(R: Array, fixed: Array, wanted: Array, prior: Array, weights: Array) -> tuple[Array, bool]:
+    """The x of bodies that minimises |R (x - wanted)|², and whether ``fixed @ x`` is what was wanted to the last digit.
+
+    Args:
+        R: (m, P) what a change costs; P are 10 n link parameters, and then numbers that are negative for no arm.
+        fixed: (k, P) orthonormal rows: what is to be as wanted, if any bodies have that.
+        wanted: (P,), and ``prior`` (10 n,), in each link's own scale.
+        weights: of the divergence from the prior beside the cost; one after the other, each search begins where the one
+            before ended.
+    """
+    size, n = len(prior), len(prior) // 10
+    bodies = _bodies(prior.reshape(n, 10))
+    drives = np.maximum(wanted[size:], _THICKNESS)
+    x = np.concatenate([_parameters_of(bodies).ravel(), drives])
+    for weight in weights:
+        x = _nearest(R / np.sqrt(weight), wanted, bodies, drives, x)
+    # What it still lacks of what is wanted, put right by the least change if it stays a body.
+    moved = x + fixed.T @ (fixed @ (wanted - x))
+    exact = are_bodies(moved, n)
+    return (moved if exact else x), exact
+
+
+def are_bodies(x: Array, n: int) -> bool:
+    """Whether 10 n link parameters, in each link's own scale, are of bodies, and what follows is not negative."""
+    return bool(_smallest(x, n) > _FEASIBLE and (x[10 * n :] >= 0).all())
 
 
 def pseudo_inertias(parameters: Array) -> Array:
@@ -138,10 +156,7 @@ def _nearest(R: Array, wanted: Array, bodies: Array, drives: Array, x: Array) ->
     n = len(bodies)
     prior = np.linalg.inv(bodies)
     for _ in range(_STEPS):
-        L = np.linalg.cholesky(pseudo_inertias(x[: 10 * n].reshape(n, 10)))
-        inverse = np.linalg.inv(L)[:, None]
-        turned = inverse @ _UNITS @ inverse.swapaxes(2, 3)  # (n, 10, 4, 4): L^-1 E L^-T
-        barrier = block_diag(*turned.reshape(n, 10, 16).swapaxes(1, 2), np.diag(1 / x[10 * n :]))
+        L, barrier = _root(x, n), barrier_factor(x, n)
         towards = np.concatenate([(L.swapaxes(1, 2) @ prior @ L).ravel(), x[10 * n :] / drives])
         off = R @ (x - wanted)
         least = np.linalg.lstsq(
@@ -155,6 +170,18 @@ def _nearest(R: Array, wanted: Array, bodies: Array, drives: Array, x: Array) ->
         if np.hypot(np.linalg.norm(far), np.linalg.norm(near)) < _CONVERGED:
             break
     return x
+
+
+def barrier_factor(x: Array, n: int) -> Array:
+    """B (16 n + rest, P) with Bᵀ B the Hessian of what keeps x in the cone, -Σ log det J_i - Σ log x_k."""
+    inverse = np.linalg.inv(_root(x, n))[:, None]
+    turned = inverse @ _UNITS @ inverse.swapaxes(2, 3)  # (n, 10, 4, 4): L^-1 E L^-T
+    return np.asarray(block_diag(*turned.reshape(n, 10, 16).swapaxes(1, 2), np.diag(1 / x[10 * n :])))
+
+
+def _root(x: Array, n: int) -> Array:
+    """(n, 4, 4) L with J = L L^T."""
+    return np.asarray(np.linalg.cholesky(pseudo_inertias(x[: 10 * n].reshape(n, 10))))
 
 
 def _ones(n: int, drives: int) -> Array:
@@ -172,7 +199,7 @@ def _exact_length(slope: float, curvature: float, growth: Array) -> float:
     return end if rate(end) <= 0 else float(brentq(rate, 0.0, end)) if rate(0.0) < 0 else 1.0
 
 
-def _scales(arm: Arm, links: Array, prior: Array) -> Array:
+def scales(arm: Arm, links: Array, prior: Array) -> Array:
     """(10 n,) a size for every parameter: of a mass, of a mass at the arm's lengths, of its inertia there."""
     lengths = np.linalg.norm(arm.X_PF[:, :3, 3], axis=1)
     reach = float(lengths.sum()) + float(np.abs(arm.com).max(initial=0.0))

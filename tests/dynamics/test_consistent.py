@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from exact_parts import ARMS, disguised, energies, model_of, random_motion
 
+from armloop.dynamics.consistent import ConsistentInertia, consistent_inertia, pseudo_inertias
 from armloop.export import export
-from armloop.export.consistent import ConsistentInertia, consistent_inertia, pseudo_inertias
 from armloop.export.expressible import rigid_parameters, said
 from armloop.features.rigid_body import full_columns
 from armloop.laws.friction import FrictionLaw, FrictionTerm
