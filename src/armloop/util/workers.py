@@ -7,6 +7,7 @@ for any number of workers.
 from __future__ import annotations
 
 import ctypes
+import gc
 import logging
 import os
 import re
@@ -98,6 +99,7 @@ class Pool(ProcessPoolExecutor):
 def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
     global _forked
     _forked = True
+    gc.freeze()  # what was inherited is not looked through for garbage, which would copy all of it
     # Ctrl-C reaches every process of a terminal; the parent answers it, and ends these.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
