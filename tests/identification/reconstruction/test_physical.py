@@ -37,7 +37,7 @@ def test_m_is_kept_positive_over_all_limits():
     kept = solved(1.0, 1.5)
     assert kept.where == "limits" and kept.binding == 1 and kept.left is None
     assert (columns(np.linspace(-1, 1, 500)[:, None]) @ kept.theta > 0).all()
-    assert physics_notes(kept.to_dict()) == ["1 conditions bind that keep M(q) positive definite"]
+    assert physics_notes(kept.to_dict()) == ["conditions that keep M(q) positive definite and bind: 1"]
 
 
 def test_coefficients_that_are_positive_already_are_left_alone():

@@ -302,5 +302,5 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
             "at the postures of the motion alone"
         )
     if history.get("constraints"):
-        notes.append(f"{history['constraints']} conditions bind that keep M(q) positive definite")
+        notes.append(f"conditions that keep M(q) positive definite and bind: {history['constraints']}")
     return notes
