@@ -62,7 +62,11 @@ def test_what_shows_a_little_on_every_joint_adds_up(sizes: tuple[float, float], 
 
 
 def accounted(
-    by_effects: float, looks: list[Any], monkeypatch: pytest.MonkeyPatch, of_event: float = 0.7
+    by_effects: float,
+    looks: list[Any],
+    monkeypatch: pytest.MonkeyPatch,
+    of_event: float = 0.7,
+    law: Any = None,
 ) -> accounts.Account:
     """The account of a run of 1000 of which effects leave so much without an event, and 100 beside what each look shows.
 
@@ -72,7 +76,7 @@ def accounted(
     def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
         outcome: Any = SimpleNamespace(added=list)
-        return accounts.Account(whole, contacts, evidence, outcome, None)
+        return accounts.Account(whole, contacts, evidence, outcome, law)
 
     tau = np.zeros((4, 1))
     samples = SimpleNamespace(tau=tau, motion=None)
@@ -101,6 +105,16 @@ def test_an_event_gives_way_to_effects_that_leave_less_of_the_whole_run(
     """Fast for once, a joint's drag looks like a push there; the push leaves what the drag does elsewhere."""
     event = SimpleNamespace(share=0.9)
     assert len(accounted(by_effects, [event, event], monkeypatch).contacts) == kept
+
+
+@pytest.mark.parametrize(("parameters", "kept"), [({"law": 1.0}, 0), ({}, 1)])
+def test_an_event_gives_way_to_an_unlisted_law_but_not_to_a_residual_without_one(
+    parameters: dict[str, float], kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the event and without it a joint has an unlisted residual: the event is a burst of its law, if there is one."""
+    event = SimpleNamespace(share=0.9)
+    law = SimpleNamespace(joint=1, parameters=parameters, added=list)
+    assert len(accounted(150.0, [event, event], monkeypatch, 0.1, law).contacts) == kept
 
 
 @pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (800.0, 1)])

@@ -87,7 +87,7 @@ class TestTrialOfAPush:
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
         kind = pushes._Kind(effect("external_torque", 1))
         return pushes._trial(
-            evidence, residual, np.ones((len(residual), 3)) / evidence.scale, slice(20, 60), kind
+            evidence, residual, np.ones((len(residual), 3)) / evidence.scale, slice(20, 60), kind, [0]
         )
 
     def test_a_torque_is_found_with_its_interval_and_what_it_removes(
@@ -104,6 +104,8 @@ class TestTrialOfAPush:
         np.testing.assert_allclose(found.after, [0.0, 0.0, 0.4], atol=1e-12)
         # weighted by their baselines, 4 of joint 1 against 0.2 of joint 3
         assert found.share == pytest.approx(1 - 0.2**2 / (4.0**2 + 0.2**2))
+        # what a joint that showed no event leaves there is not to be explained by one
+        assert found.own == pytest.approx(1.0)
         assert self.trial(residual, monkeypatch, reach=0.0).added.parameters["end"].std_error == 0.01
         assert self.trial(0 * residual, monkeypatch) is None
 

@@ -13,8 +13,9 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import contacts, diagnose
 from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.innovations import contradiction, deviations
+from armloop.diagnosis.innovations import contradiction, deviations, innovations
 from armloop.diagnosis.pushes import Contact
+from armloop.diagnosis.reversals import turning
 from armloop.features.double_feature_set import Factors
 from armloop.identification.scoring import score
 from armloop.laws.effects import Estimate, effect
@@ -148,6 +149,23 @@ def test_what_friction_holds_meanwhile_does_not_hide_an_event(model: Reconstruct
     assert found.added.parameters["torque"].value == pytest.approx(0.25, abs=0.05)
 
 
+def test_what_friction_may_do_where_a_joint_turns_round_tells_nothing_of_an_event(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    samples = preprocess([run(17, 30.0, event=(2, 12.0, 16.0, 0.5))], model.conditioning)
+    evidence = Evidence.of(model, samples, [])
+    innovation, _ = innovations(evidence, evidence.residual([]))
+    asked = []
+    monkeypatch.setattr(contacts, "push", lambda *given: asked.append(given[2:]))
+    assert find_contacts(evidence, evidence.residual([])) == []
+    ((burst, counted, shown),) = asked
+    assert shown == [1]
+    silent = (innovation[burst, 1] == 0.0) & turning(samples.motion, samples.moving)[burst, 1]
+    assert silent.any()  # it turns round meanwhile
+    np.testing.assert_array_equal(counted[burst, 1], ~silent)
+    np.testing.assert_array_equal(counted[burst, 0], innovation[burst, 0] != 0.0)
+
+
 def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
     motion = fourier_motion(10.0, 25.0, 14)
 
@@ -155,7 +173,7 @@ def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
         values = {"start": Estimate(start, None, "s"), "end": Estimate(end, None, "s")}
         added = AddedEffect(effect("external_torque", 2), values)
         nothing = np.zeros(3)
-        return Contact(added, np.zeros(motion.samples, dtype=bool), nothing, nothing, share)
+        return Contact(added, np.zeros(motion.samples, dtype=bool), nothing, nothing, share, share)
 
     first, same, later = contact(2.0, 3.0, 0.7), contact(2.2, 3.1, 0.9), contact(5.0, 6.0, 0.6)
     assert _distinct(motion, [first, same, later]) == [same, later]

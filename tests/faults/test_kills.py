@@ -32,7 +32,7 @@ COMMANDS = {
 #: Commands that keep what they have finished.
 KEEPING = ("crossvalidate", "track with wear", "reproduce")
 #: What carries seconds, or pictures of them.
-TIMED = ("loop.json", "report.html", "reproduction.json", "replay.html", ".armloop")
+TIMED = ("loop.json", "loop.png", "report.html", "reproduction.json", "replay.html", ".armloop")
 # What is imported is imported once, and each call is a fork of that, so that the kill falls into the work. No thread may
 # run before a fork: that is why this is a process of its own.
 DRIVER = """

@@ -155,7 +155,9 @@ def best_account(
     if contacts:
         plain = Account.of(whole, [], progress, panel)
     enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
-    same = account.unlisted and plain.unlisted and account.unlisted.joint == plain.unlisted.joint
+    # A law of which these are the bursts; a residual without a law explains none of them.
+    law = plain.unlisted if plain.unlisted is not None and plain.unlisted.parameters else None
+    same = law is not None and account.unlisted is not None and account.unlisted.joint == law.joint
     bare, plain_left, left = (
         float(((whole.residual([]) / whole.scale)[whole.rows] ** 2).sum()),
         *(each.left(residual) for each in (plain, account)),

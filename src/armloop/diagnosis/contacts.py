@@ -17,6 +17,7 @@ from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
+from armloop.diagnosis.reversals import turning
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect
@@ -87,6 +88,7 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
+    turns = turning(motion, evidence.samples.moving)
     length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
     total = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
     if length > _LONGEST * total:
@@ -97,10 +99,11 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         others = {
             j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints
         } - burst.joints
-        counted = tells.copy()
-        counted[:, sorted(burst.joints)] = True
+        # A joint that turns round meanwhile leaves there what friction may do, and that may be far more than the event.
+        counted, own = tells.copy(), sorted(burst.joints)
+        counted[:, own] |= ~turns[:, own]
         counted[:, sorted(others)] = False
-        found.append(push(evidence, residual, burst.rows, counted, sorted(burst.joints)))
+        found.append(push(evidence, residual, burst.rows, counted, own))
     return _distinct(motion, [contact for contact in found if contact and _seen_whole(motion, contact)])
 
 

@@ -40,6 +40,7 @@ class Contact:
         before, after: (n,) RMS residual within the interval without and with it, N·m (N); the latter in samples that
             it was not fitted on.
         share: part of the event's energy that it removes on samples it was not fitted on.
+        own: the same of the joints that the event was noticed at; the others leave what they always do.
         rivals: what explains the samples as well, with its share.
     """
 
@@ -48,6 +49,7 @@ class Contact:
     before: Array
     after: Array
     share: float
+    own: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
 
 
@@ -74,7 +76,7 @@ def around(motion: Motion, burst: slice) -> Mask:
 
 
 def push(
-    evidence: Evidence, residual: Array, burst: slice, counted: Mask, shown: Sequence[int]
+    evidence: Evidence, residual: Array, burst: slice, counted: Mask, shown: list[int]
 ) -> Contact | None:
     """The event in a stretch of samples; None where neither a force nor a torque explains it.
 
@@ -90,7 +92,7 @@ def push(
     tried = [
         (trial, kind)
         for kind in kinds
-        if (trial := _trial(evidence, residual, weight, burst, kind)) is not None
+        if (trial := _trial(evidence, residual, weight, burst, kind, shown)) is not None
     ]
     if not tried:
         return None
@@ -104,14 +106,18 @@ def push(
         return forceful and kind.effect.joint is not None, kind.effect.complexity, kind.link > 0, -trial.share
 
     best, chosen = min(equals, key=order)
-    if best.share < _EXPLAINED:
+    if best.own < _EXPLAINED:
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
     rivals.pop(chosen.effect.place, None)
-    return Contact(best.added, best.rows, best.before, best.after, best.share, list(rivals.values()))
+    return Contact(
+        best.added, best.rows, best.before, best.after, best.share, best.own, list(rivals.values())
+    )
 
 
-def _trial(evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind) -> Contact | None:
+def _trial(
+    evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind, shown: list[int]
+) -> Contact | None:
     motion = evidence.samples.motion
     for _ in range(_REFINEMENTS):
         burst = _interval(evidence, residual, weight, burst, kind)
@@ -141,8 +147,10 @@ def _trial(evidence: Evidence, residual: Array, weight: Array, burst: slice, kin
         if kind.link:
             parameters["link"] = Estimate(float(kind.link), 0.0, "1")
     before, after = (np.sqrt(np.mean(z**2, axis=0)) * evidence.scale for z in (y, left))
+    noticed = float((y[:, shown] ** 2).sum())
+    own = 1 - float((left[:, shown] ** 2).sum()) / noticed if noticed > 0 else 0.0
     share = 1 - float((left**2).sum()) / energy
-    return Contact(AddedEffect(kind.effect, parameters), around(motion, burst), before, after, share)
+    return Contact(AddedEffect(kind.effect, parameters), around(motion, burst), before, after, share, own)
 
 
 def _burst(
