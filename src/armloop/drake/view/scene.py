@@ -19,8 +19,16 @@ from armloop.drake.plant.plant import add_links
 from armloop.robot.arm import Arm
 from armloop.util.quiet import quiet
 
-COLOURS = ((0.93, 0.70, 0.13), (0.20, 0.45, 0.80), (0.85, 0.30, 0.55), (0.25, 0.65, 0.40), (0.55, 0.40, 0.75))
-"""One per controller: yellow, blue and pink as in Fig. 15, then more."""
+COLOURS = (
+    (0.93, 0.70, 0.13),
+    (0.20, 0.45, 0.80),
+    (0.85, 0.30, 0.55),
+    (0.25, 0.65, 0.40),
+    (0.55, 0.40, 0.75),
+    (0.50, 0.32, 0.20),
+    (0.10, 0.70, 0.75),
+)
+"""One per controller: yellow, blue and pink as in Fig. 15, then more, as many as controllers are listed."""
 GHOST = (0.6, 0.6, 0.6, 0.35)
 LOOPBACK = "127.0.0.1"
 _SPACING = 2.4  # times the arm's half reach, between two controllers' arms
