@@ -7,7 +7,8 @@ nearly nothing is a bias that the stated errors do not contain.
     python benchmarks/coverage_mixed_logs.py [--arms 10]
 
 One minute. Of ten arms: 231 base parameters 79, 98 and 99 % within one, two and three; 40 Coulomb levels 60, 98 and 100 %,
-mean +0.6; 40 viscous coefficients 52, 82 and 100 %, mean -0.8: half of that bias is that of accelerations differentiated from v.
+mean +0.6; 40 viscous coefficients 52, 82 and 100 %, mean -0.8: half of that bias
+comes of accelerations that are differentiated from v.
 """
 
 from __future__ import annotations
