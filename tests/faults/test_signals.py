@@ -17,8 +17,10 @@ from armloop.data.log import read_log
 from armloop.util.files import replacing
 
 #: A command whose two workers are at work for a minute; what it imports itself takes no time.
+# Whoever runs the tests in the background has Ctrl-C ignored, and children inherit that.
 WORKING = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from armloop import cli
 from armloop.util.files import replacing
 from armloop.util.workers import Processes

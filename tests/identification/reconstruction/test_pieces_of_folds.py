@@ -279,7 +279,7 @@ class TestPhysics:
         assert (
             posture.endswith("but for q = (0.50, 1.00)")
             and "motion alone" in trained
-            and bind.startswith("3 ")
+            and bind.endswith(" bind: 3")
         )
 
 
