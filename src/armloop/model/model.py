@@ -102,7 +102,8 @@ class ReconstructedModel:
         friction: friction law of all joints.
         conditioning: how the training logs were filtered; later logs are treated alike.
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
-        baseline: what the model leaves on data of its own training runs that were not fitted:
+        baseline: what the model leaves on data of its own training runs that were not fitted; where those are
+            too short for that, at least what it leaves on all of them:
             ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, and ``joints``,
             the parts of the torque that are explained, predictable but not explained, and noise.
         effects: laws of the catalogue that a reconstruction found beside the components, and what a diagnosis added.

@@ -29,3 +29,7 @@ def test_easy_data_do_not_make_the_baseline_look_better():
     assert sorted_out.baseline()["rmse"] == pytest.approx([0.5] * 3)
     together = Tally.of(chunk, model, None).baseline()["rmse"]
     assert together == pytest.approx([np.sqrt((0.5**2 + 0.01**2) / 2)] * 3)
+    # of all samples, those fitted to included, whichever were held out
+    some = Chunk.of(samples, Options(), held_out=labels == 1)
+    whole = Tally.fitted(some, model, None, 10.0)
+    assert whole.samples == 400 and whole.baseline()["rmse"] == pytest.approx(together)

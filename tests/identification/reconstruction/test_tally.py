@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armloop.identification.reconstruction.tally import Tally
+from armloop.identification.reconstruction.tally import Tally, at_least
 
 
 def tally(counts: list[list[int]], errors: list[list[float]]) -> Tally:
@@ -57,3 +57,15 @@ def test_one_block_in_ten_exceeds_the_worst_of_those_with_samples_enough() -> No
 def test_blocks_are_relative_to_the_torque_of_the_joints_that_move_in_them() -> None:
     found = tally([[20, 20], [40, 19], [0, 5]], [[2.0, 6.0], [3.0, 99.0], [0.0, 1.0]]).relative_blocks()
     np.testing.assert_allclose(found, [(2.0 + 6.0) / 4 / 2, 3.0 / 4, np.nan])
+
+
+def test_a_baseline_is_no_better_than_what_is_left_of_all_data() -> None:
+    held = tally([[30, 20, 0]], [[1.0, 4.0, 0.0]]).baseline()
+    whole = tally([[20, 20, 20]] * 10, [[4.0, 1.0, 9.0]] * 10)
+    found = at_least(held, whole)
+    assert found["rmse"] == pytest.approx([2.0, 2.0, 3.0])  # joint 3 moves in no held-out block
+    assert found["nrmse"] == pytest.approx([1.0, 1.0, 1.5]) and found["rms"] == pytest.approx([2.0, 2.0, 2.0])
+    assert found["worst"] == pytest.approx([2.0, 1.0, 3.0]) and found["samples"] == held["samples"]
+    assert at_least(whole.baseline(), tally([[30, 20, 0]], [[1.0, 0.25, 0.0]]))["worst"] == pytest.approx(
+        [2.0, 1.0, 3.0]
+    )

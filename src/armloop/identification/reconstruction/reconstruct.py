@@ -40,7 +40,7 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range
-from armloop.identification.reconstruction.tally import Part
+from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
@@ -300,6 +300,9 @@ def _finished(
         model = replace(
             model, components=components, friction=last.law, effects=last.effects, history=history
         )
+    if apart.too_short:
+        whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
+        model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -85,6 +85,12 @@ class Tally:
             np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
         return Tally(sums, blocks, int(held.sum()))
 
+    @staticmethod
+    def fitted(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None, seconds: float) -> Tally:
+        """Sums of one chunk over all its samples, those that the model was fitted to included."""
+        every = replace(chunk, held_out=np.ones_like(chunk.held_out))
+        return Tally.of(every, model, sorter, seconds=seconds)
+
     def score(self) -> Score:
         """Score of all held-out samples."""
         rest, moving = np.sum(list(self.sums.values()), axis=0)
@@ -141,3 +147,22 @@ def _errors(sums: Array) -> dict[str, Any]:
 
 def _root(total: float, count: float) -> float | None:
     return float(np.sqrt(total / count)) if count else None
+
+
+def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
+    """A baseline, joint by joint no better than what the model leaves of all its data.
+
+    Of a log that is too short for held-out blocks that tell, few may miss the rarer motion.
+
+    Args:
+        baseline: of held-out samples, with ``worst``.
+        fitted: of the model, over all samples.
+    """
+    pair = [baseline, fitted.baseline()]
+    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst")}
+    for j in range(len(more["rmse"])):
+        own = max(pair, key=lambda one: one["rmse"][j] or 0.0)
+        for key in ("rmse", "rms", "nrmse"):
+            more[key][j] = own[key][j]
+        more["worst"][j] = max((one["worst"][j] for one in pair if one["worst"][j] is not None), default=None)
+    return {**baseline, **more}
