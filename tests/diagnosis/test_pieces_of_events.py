@@ -166,6 +166,15 @@ class TestBurstsOfTheResidual:
         for height, seen in ((2.5, 0), (3.5, 1)):
             assert len(outliers.outlying(evidence, 6.0 + steps(400, (150, 200, height))[:, None])) == seen
 
+    def test_what_stands_out_from_the_first_sample_on_is_no_yardstick_for_the_rest(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.zeros((400, 1)))
+        for begins in (0, 200):  # of the first run and of the second
+            residual = steps(400, (begins, begins + 30, 6.0), (120, 150, 6.0))[:, None]
+            (burst,) = outliers.outlying(self.evidence(motion([200, 200], 0.02)), residual)
+            assert abs(burst.start - 120) <= 4 and abs(burst.stop - 151) <= 4
+
 
 class TestJoints:
     """Bursts of several joints, and what surrounds them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -250,3 +251,20 @@ def test_each_joint_alone_must_be_as_good_as_the_best() -> None:
     # of what the best removes by far, three parts in a thousand are nothing
     now = both(40.0, 40.0)
     assert not is_behind(now, both(2.3, 2.3), best) and is_behind(now, both(2.6, 1.0), best)
+
+
+def test_like_places_and_speeds_share_a_cell_and_joints_never_do() -> None:
+    # every place of nine with every speed of nine: low, middle and high, back, slow and forth
+    place, speed = (x.ravel().astype(float) for x in np.meshgrid(np.arange(9), np.arange(9)))
+    q, v = np.column_stack([place, speed]), np.column_stack([speed, place])
+    motion = Motion(np.arange(81.0), q, v, 0 * v, np.array([0]))
+    rows = np.ones((81, 2), dtype=bool)
+    given = replace(an_evidence(), samples=Samples(motion, q, rows, 1.0), rows=rows)
+    cells = given._cells
+    of_place: dict[int, set[tuple[int, int]]] = {}
+    for cell, x, y in zip(cells[:, 0].tolist(), place, speed, strict=True):
+        of_place.setdefault(cell, set()).add((round(x), round(y)))
+    thirds = [set(range(3 * k, 3 * k + 3)) for k in range(3)]
+    expected = [{(x, y) for x in low for y in slow} for low in thirds for slow in thirds]
+    assert sorted(map(sorted, of_place.values())) == sorted(map(sorted, expected))
+    assert len(np.unique(cells)) == 18 and not set(cells[:, 0]) & set(cells[:, 1])

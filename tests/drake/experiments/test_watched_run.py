@@ -111,7 +111,10 @@ def test_what_does_not_help_is_given_back_and_not_taken_again(model) -> None:
 
 def test_times_that_do_not_fit_are_refused(model) -> None:
     with pytest.raises(ValueError, match="a block needs ten samples"):
-        ResidualMonitor(model, period=0.1, block=0.5)
+        ResidualMonitor(model, period=0.1, block=0.9, learn=9.0)
+    with pytest.raises(ValueError, match="learning four blocks"):
+        ResidualMonitor(model, period=0.1, block=1.0, learn=3.0)
+    ResidualMonitor(model, period=0.1, block=1.0, learn=4.0)
     with pytest.raises(ValueError, match="must be above 0"):
         AdaptiveFeedforward(model, bound=0.0)
 

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.plant.friction import JointFriction
-from armloop.drake.tuning.loop_analysis import loop_margins, model_posture, posture_model
+from armloop.drake.tuning.loop_analysis import _margins, loop_margins, model_posture, posture_model
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import load_arm
 
@@ -24,6 +24,16 @@ def flywheel(tmp_path):
         1"/></joint> </robot>"""
     )
     return load_arm(path)
+
+
+def test_the_nearest_crossing_on_either_side_bounds_a_gain():
+    """Crossings of the negative real axis at -4, -2, -0.5 and -0.2: stable between a half and two times the gain."""
+    w = np.linspace(0.1, 8.0, 4000)
+    phase = -np.pi + 0.5 * np.sin(np.pi * w)
+    size = np.exp(np.interp(w, [0, 1, 2, 3, 4, 8], np.log([8.0, 4.0, 2.0, 0.5, 0.2, 0.01])))
+    margins = _margins(size * np.exp(1j * phase), w)
+    assert margins.gain_reduction == pytest.approx(0.5, rel=1e-2)
+    assert margins.gain_margin == pytest.approx(2.0, rel=1e-2)
 
 
 def test_flywheel_against_the_transfer_function(flywheel):

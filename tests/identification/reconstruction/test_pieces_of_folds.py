@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion, Samples
-from armloop.identification.reconstruction import block_length, physical, ripple, torque_checks
+from armloop.identification.reconstruction import (
+    Options,
+    block_length,
+    physical,
+    ripple,
+    stepwise,
+    torque_checks,
+)
 from armloop.identification.reconstruction.block_length import Apart
 from armloop.identification.reconstruction.inner_folds import InnerFolds
 from armloop.identification.reconstruction.physical import Body, physical_cuts, physics_notes
@@ -75,6 +82,13 @@ class TestInnerFolds:
         assert folds.deal(given, used)[0][[0, 10, 20]].tolist() == [1, 1, 0]
         assert folds.deal(replace(given, cutoff_hz=0.0), used)[1].all()
 
+    def test_within_the_filters_reach_of_a_border_the_ends_of_the_data_judge_no_more_than_others(
+        self,
+    ) -> None:
+        given = samples((6,), cutoff=1.0)
+        assert given.reach / given.period > 3
+        assert not InnerFolds(2, 0.3).deal(given, np.ones(6, dtype=bool))[1].any()
+
 
 class TestBlockLength:
     def test_blocks_of_another_length_keep_their_margins_as_far_as_they_go_in(self) -> None:
@@ -86,6 +100,21 @@ class TestBlockLength:
         given = samples((11,))
         assert block_length._middle(given, 4).motion.time == pytest.approx([0.3, 0.4, 0.5, 0.6])
         assert block_length._middle(given, 40).motion.samples == 11
+
+    def test_the_joint_whose_residual_remembers_longest_decides(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        rng = np.random.default_rng(0)
+        v = rng.normal(size=(1000, 2))
+        motion = Motion(np.arange(1000) * 0.1, v, v, v, np.array([0]))
+        part = Samples(motion, v, np.ones((1000, 2), dtype=bool), 0.1, 0.0)
+        base: Any = SimpleNamespace(columns=lambda arm, motion: np.zeros((1000, 2, 0)))
+        monkeypatch.setattr(block_length, "BaseParameters", SimpleNamespace(of_arm=lambda arm, rotors: base))
+        arm: Any = SimpleNamespace(n=2)
+        for times in ([0.7, 0.2], [0.2, 0.7]):
+            of_joint = iter(times)
+            monkeypatch.setattr(block_length, "correlation_time", lambda *_, of=of_joint: next(of))
+            assert block_length._correlation(arm, [part]) == 0.7
 
     @pytest.mark.parametrize(
         ("seconds", "correlation", "logs", "expected"),
@@ -306,3 +335,14 @@ class TestCandidates:
         larger = steps(2, orders=((1, 1), (2, 2)))
         assert len(larger.subset((1, 2))) == speeds.size < larger.size
         assert (larger.second[larger.subset((2, 1))] == 1).all()
+
+    def test_the_papers_three_steps(self) -> None:
+        first, second, third = stepwise.steps((True,), Options(max_order=2))
+        assert [set(plan.orders) for plan in (first, second, third)] == [
+            {(1, 0), (2, 0)},  # of positions alone
+            {(1, 1), (1, 2), (2, 1), (2, 2)},
+            {(1, 1), (2, 1)},  # linear in acceleration
+        ]
+        assert [plan.parts for plan in (first, second, third)] == [(part,) for part in PARTS]
+        assert [plan.conditions for plan in (first, second, third)] == [(1,), (2,), (3,)]
+        assert [plan.friction for plan in (first, second, third)] == [("sign",), ("viscous", "stribeck"), ()]

@@ -135,7 +135,7 @@ def run_watched(
 
     end = scenario.reference.duration
     full = moments["named"] + 1.0 + 0.05
-    during = scored(at, min(full, end)) if np.isfinite(full) and full > at else None
+    during = scored(at, min(full, end)) if full > at else None
     given = adaptive.GetOutputPort("given_back").Eval(adaptive.GetMyContextFromRoot(context))
     return WatchedRun(
         before=scored(0.0, at),
