@@ -109,6 +109,22 @@ class TestTrialOfAPush:
         assert self.trial(residual, monkeypatch, reach=0.0).added.parameters["end"].std_error == 0.01
         assert self.trial(0 * residual, monkeypatch) is None
 
+    @pytest.mark.parametrize(("shown", "is_one"), [([0], True), ([0, 2], False)])
+    def test_it_must_explain_the_joints_that_show_it(
+        self, shown: list[int], is_one: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        given = motion((100,), 3)
+        samples = SimpleNamespace(motion=given, period=0.01, reach=0.02)
+        evidence: Any = SimpleNamespace(
+            samples=samples, scale=np.ones(3), model=SimpleNamespace(arm=three_axis())
+        )
+        monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
+        residual = np.zeros((100, 3))
+        residual[20:60, 0] = 2.0
+        residual[20:60, 2] = np.where(np.arange(40) % 2, -3.0, 3.0)  # which no push is
+        found = pushes.push(evidence, residual, slice(20, 60), np.ones((100, 3), dtype=bool), shown)
+        assert (found is not None) == is_one
+
     def test_what_it_removes_is_counted_where_it_was_not_fitted(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
