@@ -1,13 +1,15 @@
 """The baseline a later run is weighed by comes from the condition that the model explains worst."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import rigid_torque, three_axis
+from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion, Samples
-from armloop.identification.reconstruction import Options
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.identification.reconstruction.block_length import Apart
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.tally import Tally
 from armloop.laws.friction import FrictionLaw
@@ -39,3 +41,22 @@ def test_easy_data_do_not_make_the_baseline_look_better():
     some = Chunk.of(samples, Options(), held_out=labels == 1)
     whole = Tally.fitted(some, model, None, 10.0)
     assert whole.samples == 400 and whole.baseline()["rmse"] == pytest.approx(together)
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_only_a_log_too_short_for_held_out_blocks_is_weighed_by_all_of_it(short, monkeypatch):
+    motion = fourier_motion(15.0, 125.0, 3)
+    log = measured(motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v, 3, 0.01)
+    asked = []
+    monkeypatch.setattr(Apart, "too_short", property(lambda self: short))
+    monkeypatch.setattr(
+        sys.modules[
+            "armloop.identification.reconstruction.reconstruct"
+        ],  # the function has its module's name
+        "at_least",
+        lambda baseline, fitted: asked.append(fitted) or {**baseline, "rmse": [9.9] * 3},
+    )
+    options = Options(parts=False, standard_errors=False)
+    model = reconstruct([log], three_axis(), library="rigid-body", options=options).model
+    assert (model.baseline["rmse"] == [9.9] * 3) == short
+    assert not short or asked[0].samples > 5 * model.baseline["samples"]
