@@ -1,0 +1,205 @@
+"""Isolability of rivals and the motion that tells them apart: pieces, by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.data.signals import independent_rows
+from armloop.diagnosis import isolability, planning
+from armloop.diagnosis.confounded import Law, Rivalry, _share_joints
+from armloop.diagnosis.isolability import Part, Stage, left
+from armloop.experiment.excitation import MotionRanges
+from armloop.model import AddedEffect
+from armloop.util.errors import InputError
+
+
+class TestIsolability:
+    def test_what_columns_leave_and_their_coefficients(self) -> None:
+        y = np.array([3.0, 4.0])
+        part, beta = isolability._fitted(y, [np.array([[2.0], [0.0]]), np.zeros((2, 1))])
+        assert part == pytest.approx(0.8) and beta.tolist() == pytest.approx([1.5, 0.0])
+        # two that round-off alone tells apart are one
+        near = np.array([[1.0, 1.0], [0.0, 1e-7]])
+        assert isolability._fitted(y, [near])[0] == pytest.approx(0.8, abs=1e-3)
+        near[1, 1] = 1e-5
+        assert isolability._fitted(y, [near])[0] == pytest.approx(0.0, abs=1e-3)
+
+    @staticmethod
+    def stage() -> Any:
+        """The law is [1, 2]; a rival's column [1, shape]; that of another effect [0, 1]."""
+
+        def columns(effect: Any, shape: float) -> np.ndarray:
+            return np.array([[0.0], [1.0]]) if effect is None else np.array([[1.0], [shape]])
+
+        return SimpleNamespace(torque=lambda law: np.array([1.0, 2.0]), columns=columns)
+
+    @staticmethod
+    def rival(refined: Any) -> Part:
+        rival: Any = SimpleNamespace(
+            start=lambda beta: beta, refined=lambda beta, shape: refined(beta, shape)
+        )
+        return Part(rival, (0.0, 1.0))
+
+    def test_the_part_that_a_rival_leaves_is_least_at_its_refined_shape(self) -> None:
+        law: Any = None
+        assert left([self.stage()], law, self.rival(lambda beta, shape: shape)) == (
+            pytest.approx(np.sqrt(0.5 / 5)),
+            1.0,
+        )
+        assert left([self.stage()], law, self.rival(lambda beta, shape: 2.0)) == (
+            pytest.approx(0.0, abs=1e-12),
+            2.0,
+        )
+        # one that is no better is not taken
+        assert left([self.stage()], law, self.rival(lambda beta, shape: 0.5))[1] == 1.0
+        # six steps, no more; the coefficient is that of the shape before
+        assert left([self.stage()], law, self.rival(lambda beta, shape: shape + 0.1))[1] == pytest.approx(1.6)
+        assert left([self.stage()], law, self.rival(lambda beta, shape: shape * beta[0]))[1] > 1.5
+
+    def test_others_are_fitted_beside_it_and_motions_taken_together(self) -> None:
+        law: Any = None
+        rival, other = self.rival(lambda beta, shape: shape), Part(None, (0.0,))  # type: ignore[arg-type]
+        assert left([self.stage()], law, rival, [other])[0] == pytest.approx(0.0, abs=1e-12)
+        opposite = self.stage()
+        opposite.torque = lambda law: np.array([-1.0, -2.0])
+        assert left([self.stage(), opposite], law, rival)[0] == pytest.approx(1.0)
+        opposite.torque = lambda law: np.zeros(2)
+        assert left([opposite], law, rival) == (0.0, 0.0)
+
+    def test_a_motion_to_be_made_as_it_would_be_logged(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(isolability, "context_of", lambda evidence, motion: None)
+        reference: Any = SimpleNamespace(
+            duration=10.0,
+            evaluate=lambda t: tuple(f(np.pi * t / 2)[:, None] for f in (np.cos, np.sin, np.cos)),
+        )
+        samples = SimpleNamespace(period=0.01, cutoff_hz=5.0, reach=0.05)
+        evidence: Any = SimpleNamespace(samples=samples, scale=np.ones(1))
+        stage = Stage.of_reference(evidence, reference)
+        # a tenth of the corner's period; at rest at whole multiples of 2 s, and three samples around
+        assert stage.samples.period == 0.02 and stage.samples.motion.samples == 500
+        still = np.flatnonzero(~stage.samples.moving[:, 0])
+        assert still.tolist() == [k for k in range(500) if min(k % 100, 100 - k % 100) <= 3 and k < 497]
+        assert np.array_equal(stage.rows, stage.samples.moving & independent_rows(stage.samples)[:, None])
+        samples.cutoff_hz = 0.0
+        assert Stage.of_reference(evidence, reference).samples.period == 0.01
+
+    def test_effects_share_a_joint_or_are_the_whole_arms(self) -> None:
+        def of(joint: int | None, other: int | None = None) -> Any:
+            return SimpleNamespace(joint=joint, other_joint=other)
+
+        assert (
+            _share_joints(of(1), of(1)) and _share_joints(of(None), of(1)) and _share_joints(of(2), of(1, 2))
+        )
+        assert not _share_joints(of(1), of(2)) and not _share_joints(of(3), of(1, 2))
+
+    def test_a_rival_is_tried_at_few_shapes_on_several_motions(self) -> None:
+        many = 20
+        rival: Any = SimpleNamespace(shapes=lambda context: range(many))
+        law = Law(AddedEffect(rival, {}), 7.0)
+        stage: Any = SimpleNamespace(context=None)
+        way = Rivalry(law, law, (law,))
+        assert way._rival(stage, 20).shapes == way._rival(stage).shapes == (7.0, *range(20))
+        many = 21
+        assert way._rival(stage, 20).shapes == (7.0,) and len(way._rival(stage).shapes) == 22
+        assert [part.shapes for part in way._beside()] == [(7.0,)]
+
+
+class TestDesign:
+    def test_a_wish_is_for_whole_periods_within_limits(self) -> None:
+        for asked, made in ((12.0, 20.0), (20.0, 20.0), (20.1, 40.0), (60.0, 60.0)):
+            wish = planning.Wish(duration=asked)
+            wish.check()
+            assert wish.whole_duration == made
+        planning.Wish(duration=3600.0, reserve=0.0).check()
+        for wrong in ({"duration": 11.9}, {"duration": 3601.0}, {"reserve": 1.0}, {"reserve": -0.1}):
+            with pytest.raises(InputError, match=r"^(next run of|reserve)"):
+                planning.Wish(**wrong).check()
+
+    def test_functions_of_which_a_law_may_be_made(self) -> None:
+        ends = np.array([1.0, 2.0])
+        ranges = MotionRanges(-ends + 1, ends + 1, np.array([2.0, 4.0]), np.array([5.0, 10.0]))
+        columns, names = planning._anything(ranges, 1)
+        motion = Motion(
+            np.zeros(2),
+            np.array([[1.5, 2.0], [9.0, -9.0]]),
+            np.array([[1.0, -2.0], [0.0, 0.0]]),
+            np.array([[2.5, 5.0]] * 2),
+            np.array([0]),
+        )
+        X = columns(motion)[:, 0]
+        assert X.shape == (2, len(names)) == (2, 23)
+        x, v = 0.5, -0.5  # of the second joint, in its range; the law's direction fades in at 0.02 * 4 rad/s
+        places, speeds = [1, x, 2 * x**2 - 1, 4 * x**3 - 3 * x], [1, v, v**2, np.tanh(-2 / 0.08)]
+        own = [a * b for a in places for b in speeds]
+        np.testing.assert_allclose(X[0], [*own, 0.5, 0.5, -0.5, 0.5, 0.25, -0.25, 0.5], atol=1e-12)
+        # no farther than 1.2 of the range
+        assert X[1, 4] == pytest.approx(-1.2) and X[1, 17] == pytest.approx(1.2)
+
+    def test_where_a_model_knows_its_arm(self) -> None:
+        arm = three_axis()
+        low, high, fastest = (
+            np.array([getattr(j, k) for j in arm.joints]) for k in ("lower", "upper", "velocity")
+        )
+        model: Any = SimpleNamespace(arm=arm, history={})
+        assert np.array_equal(planning.training_ranges(model).lower, MotionRanges.of(arm).lower)
+        model.history["range"] = [[0.1, 0.0, 99.0], [0.2, 0.0, 99.0], [0.3, 0.0, 4.0], [0.05, 0.0, 0.0]]
+        found = planning.training_ranges(model)
+        assert found.lower[0] == pytest.approx(-0.05) and found.upper[0] == pytest.approx(0.15)
+        assert found.velocity[0] == pytest.approx(0.2) and found.acceleration[[0, 2]] == pytest.approx(
+            [0.3, 4.0]
+        )
+        assert found.lower[2] == low[2] and found.upper[2] == high[2] and found.velocity[2] == fastest[2]
+        assert 0 < found.upper[1] - found.lower[1] < 1e-4 and 0 < found.velocity[1] < 1e-4
+
+    @pytest.mark.parametrize(
+        ("left", "known", "rounds", "made"),
+        [
+            ([(0.5, 0.1), (0.5, 0.2)], False, 2, 2),
+            ([(0.5, 0.1), (0.5, 0.05)], False, 2, 1),
+            ([(0.5, 0.1), (0.31, 0.1)], False, 2, 1),  # what is far enough already counts no more
+            ([(0.5, 0.1), (0.29, 0.2)], False, 2, 2),
+            ([(0.5, 0.31)], False, 1, 1),
+            ([(0.5, 0.1)], True, 1, 1),  # the rival comes no nearer elsewhere
+        ],
+    )
+    def test_a_motion_is_designed_anew_with_what_rivals_turn_out_to_be_able_to(
+        self, left: list[Any], known: bool, rounds: int, made: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        stages = iter(range(len(left)))
+        monkeypatch.setattr(Stage, "of_reference", staticmethod(lambda evidence, reference: next(stages)))
+        law: Any = SimpleNamespace()
+
+        def way(k: int, shape: float) -> Any:
+            rival = SimpleNamespace(effect=SimpleNamespace(place=("a", k, None)), shape=shape)
+            nearer = SimpleNamespace(
+                law=law, rival=SimpleNamespace(effect=rival.effect, shape=shape + (not known))
+            )
+            return SimpleNamespace(
+                law=law, rival=rival, left=lambda stage: left[stage][k], hardest=lambda stage: nearer
+            )
+
+        asked: list[int] = []
+
+        class Known(planning.Planner):
+            def __init__(self) -> None:
+                object.__setattr__(self, "progress", lambda text: None)
+                object.__setattr__(self, "evidence", None)
+
+            def _regression(self, ways: Any) -> Any:
+                asked.append(len(ways))
+                return None, []
+
+            def _optimised(self, regression: Any, criterion: Any) -> Any:
+                return len(asked)
+
+            def whole(self, design: Any) -> Any:
+                return design
+
+        design: Any = Known().alternatives([way(0, 0.0), way(1, 0.0)])
+        assert design == made and asked == [2, 3][:rounds]
