@@ -42,6 +42,10 @@ _NAMES = {
     "minimum": "maximum",
     "maximum": "minimum",
 }
+#: Keyword arguments that change no result: whether zip, which only a programmer's mistake makes unequal, and scipy's
+#: factorizations look at what they are given; whether a solver tells how it goes on; whether a field
+#: is shown by ``repr``.
+_NO_NUMERICS = ("strict", "check_finite", "verbose", "repr")
 
 
 @dataclass(frozen=True)
@@ -130,9 +134,10 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
+        """The operator alone goes: what stands between it and its operand may open a parenthesis."""
         if isinstance(node.op, ast.Not | ast.USub | ast.Invert):
             start = self._span(node)[0]
-            self._add(node, start, self._span(node.operand)[0], " " if isinstance(node.op, ast.Not) else "")
+            self._add(node, start, start + (3 if isinstance(node.op, ast.Not) else 1), "")
         self.generic_visit(node)
 
     def visit_Constant(self, node: ast.Constant) -> None:
@@ -179,8 +184,8 @@ class _Finder(ast.NodeVisitor):
             self.visit(each)
 
     def visit_keyword(self, node: ast.keyword) -> None:
-        """Neither does ``strict`` of zip, which only a programmer's mistake meets."""
-        if node.arg != "strict":
+        """Nor do arguments that no result depends on (:data:`_NO_NUMERICS`)."""
+        if node.arg not in _NO_NUMERICS:
             self.visit(node.value)
 
 
