@@ -11,7 +11,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.cli import main
-from armloop.data.log import MotionLog, read_log, require_different, write_log
+from armloop.data.log import MotionLog, read_log, write_log
 from armloop.data.signals import Conditioning, preprocess
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
@@ -198,16 +198,6 @@ def test_doubts_are_said_after_the_work_and_in_json(
     (warning,) = json.loads(out)["warnings"]
     assert "20 samples a second" in warning and str(tmp_path / "slow.csv") in warning
     assert err == f"armloop: warning: {warning}\n"
-
-
-def test_the_same_measurement_given_twice_is_refused(tmp_path: Path) -> None:
-    one, other = good(seed=1), replace(good(seed=2), name="other")
-    require_different([one, other])
-    later = replace(one, time=one.time + 100.0, name="copy")
-    part = replace(one.select(slice(100, 700)), name="part")
-    for twice in (later, part):
-        with pytest.raises(LogError, match=rf"{twice.name}: holds the measurement of run once more"):
-            require_different([one, other, twice])
 
 
 @pytest.mark.parametrize("command", ["crossvalidate", "reconstruct", "diagnose"])

@@ -10,7 +10,8 @@ from typing import Any
 
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
 from armloop.commands.options import Options
-from armloop.data.log import GAINS, MotionLog, read_log, same_measurement
+from armloop.data.log import GAINS, MotionLog, read_log
+from armloop.data.repeats import same_measurement
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm

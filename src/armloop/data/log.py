@@ -27,14 +27,12 @@ TAU_UNITS = ("N*m", "A")
 _UNIT = "tau_unit"
 GAP_PERIODS = 10.0
 """A pause longer than this many median sample periods starts a new run."""
+#: Fewer rows than this are no motion: filters and derivatives need more.
 FEWEST_SAMPLES = 20
 #: N*m/A (N/A): from below that of a watch to above that of a crane.
 GAINS = (1e-6, 1e6)
-"""Fewer rows than this are no motion: filters and derivatives need more."""
 
 _JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
-# Logs that share more of the shorter one's rows are one measurement: an arm at rest may repeat a row, a motion not.
-_SHARED_ROWS = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -231,7 +229,7 @@ def read_log(
     joints : how many joints the arm has; None takes what the file has
     tau_unit : what the columns `tau` hold, "N*m" or "A"
     drive_gains : (n,) N*m/A (N/A); `tau` is multiplied by them and the log's unit is "N*m"
-    rows : first row and the one after the last, counted from 0, of a Parquet file; None reads all
+    rows : first row and the one after the last, counted from 0; None reads all
     quiet : do not say what is doubtful (`armloop.util.errors.InputWarning`)
 
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
@@ -250,17 +248,20 @@ def read_log(
     header = read_header(path)
     kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
     names = ["time", *(f"{kind}{j}" for kind in kinds for j in range(1, n + 1))]
-    table = read_columns(path, names, rows)
-    stacked = {kind: np.stack([table[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in kinds}
-    time, first = table["time"], rows[0] if rows else 0
-    if len(time) < FEWEST_SAMPLES:
-        raise LogError(f"{path}: {len(time)} rows; a motion log has at least {FEWEST_SAMPLES}")
+    # The row before some is checked with them: what does not follow from it is a fault there, as in the whole.
+    first, before = (max(0, rows[0] - 1), min(1, rows[0])) if rows else (0, 0)
+    table = read_columns(path, names, (first, rows[1]) if rows else None)
+    stacked = {kind: np.stack([table.pop(f"{kind}{j}") for j in range(1, n + 1)], axis=1) for kind in kinds}
+    time = table["time"]
+    if len(time) - before < FEWEST_SAMPLES:
+        raise LogError(f"{path}: {len(time) - before} rows; a motion log has at least {FEWEST_SAMPLES}")
     derived = "v" not in kinds
     if derived:
         _check_time(time, str(path), lambda row: place(path, first + row))
         stacked["v"] = differentiated(time, stacked["q"], str(path))
     log = unchecked_log(time=time, **stacked, name=path.stem, tau_unit=tau_unit, v_derived=derived)
     check_log(path, log, first)
+    log = log.select(slice(before, None)) if before else log
     if not quiet:
         _say_doubts(log, str(path))
     if gains is None:
@@ -371,30 +372,6 @@ def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str)
         if run.stop - run.start > 1:
             v[run] = np.gradient(q[run], time[run], axis=0)
     return v
-
-
-def require_different(logs: Sequence[MotionLog]) -> None:
-    """Raise `LogError` where two logs hold the same measurement, whole or for the most part, whatever their times.
-
-    What is left out of a regression must not be in it under another name, and nothing counts twice.
-    """
-    digests = [np.unique(log.rows_digest()) for log in logs]
-    for k, log in enumerate(logs):
-        for j, other in enumerate(logs[:k]):
-            if _mostly_shared(digests[j], digests[k]):
-                raise LogError(
-                    f"{log.name}: holds the measurement of {other.name} once more; give each measurement once"
-                )
-
-
-def same_measurement(one: MotionLog, other: MotionLog) -> bool:
-    """Whether more than half of the shorter log's rows are in the other, to the last digit, whatever the times."""
-    return _mostly_shared(np.unique(one.rows_digest()), np.unique(other.rows_digest()))
-
-
-def _mostly_shared(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> bool:
-    shared = len(np.intersect1d(first, second, assume_unique=True))
-    return shared > _SHARED_ROWS * min(len(first), len(second))
 
 
 def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from armloop.data.log import MotionLog, check_header, read_log
-from armloop.data.tables import CSV, count_rows
+from armloop.data.tables import count_rows
 from armloop.util.errors import LogError
 
 #: Samples of all logs together up to which they are kept in memory.
@@ -40,7 +40,7 @@ class LogSource(Protocol):
 
     @property
     def samples(self) -> int:
-        """The number of samples, or about so many where only reading would tell."""
+        """The number of samples."""
         ...
 
     def read(self) -> MotionLog:
@@ -55,7 +55,7 @@ class LogPiece:
     Attributes:
         path: of the CSV or Parquet file.
         joints: the number of joints it must have.
-        samples: number of rows; for a CSV an estimate from its size.
+        samples: number of rows.
         rows: first row and the one after the last; None for the whole file.
         recorded: how the torque is recorded: ``{"unit": "N*m" | "A", "drive_gains": …}``.
     """
@@ -91,7 +91,7 @@ def log_sources(
 ) -> list[LogPiece]:
     """The files of a log, whole where all of them fit into memory, else in pieces of about :data:`PIECE` rows.
 
-    Only headers are read. A CSV, which has no index, is never cut.
+    Only headers are read, and the lines of a CSV counted.
 
     Raises:
         LogError: a file is missing, or its header is not that of a log of so many joints, or a file is given twice.
@@ -105,11 +105,7 @@ def log_sources(
 
 def _whole(path: Path, joints: int, recorded: dict[str, Any]) -> LogPiece:
     check_header(path, joints)
-    rows = count_rows(path)
-    if rows is None:
-        # A cell takes ten characters or more.
-        rows = path.stat().st_size // (10 * (3 * joints + 1))
-    return LogPiece(path, joints, rows, None, recorded)
+    return LogPiece(path, joints, count_rows(path), None, recorded)
 
 
 def _require_different_files(files: Sequence[LogPiece]) -> None:
@@ -127,7 +123,7 @@ def _require_different_files(files: Sequence[LogPiece]) -> None:
 
 
 def _cut(file: LogPiece) -> list[LogPiece]:
-    if file.path.suffix == CSV or file.samples <= PIECE:
+    if file.samples <= PIECE:
         return [file]
     edges = np.linspace(0, file.samples, -(-file.samples // PIECE) + 1).astype(int).tolist()
     return [replace(file, samples=last - first, rows=(first, last)) for first, last in pairwise(edges)]

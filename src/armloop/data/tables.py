@@ -9,11 +9,12 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.csv_rows import index_rows
 from armloop.util.errors import LogError
 from armloop.util.files import replacing
 
@@ -51,13 +52,13 @@ def read_header(path: Path) -> list[str]:
     return [name.strip() for name in names]
 
 
-def count_rows(path: Path) -> int | None:
-    """Return the number of rows of a Parquet file, which says it in its footer; None for a CSV.
+def count_rows(path: Path) -> int:
+    """Return the number of rows: a Parquet file says it in its footer, the lines of a CSV are counted.
 
-    The header must have been read. Raises `LogError` when the file is not Parquet.
+    The header must have been read.
     """
     if path.suffix == CSV:
-        return None
+        return index_rows(path).count
     import pyarrow.parquet
 
     return int(pyarrow.parquet.read_metadata(path).num_rows)
@@ -68,12 +69,12 @@ def read_columns(
 ) -> dict[str, NDArray[np.float64]]:
     """Return the columns `names` of a file whose header has been read and holds each of them once.
 
-    rows : first row and the one after the last, of a Parquet file only; None reads all
+    rows : first row and the one after the last, counted from 0; None reads all
 
     Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
     not a finite number, or the first row that has too few or too many cells.
     """
-    table = _read_parquet(path, names, rows) if path.suffix == PARQUET else _read_csv(path, names)
+    table = (_read_parquet if path.suffix == PARQUET else _read_csv)(path, names, rows)
     faults = {
         name: int(np.argmin(good))
         for name, cells in table.items()
@@ -81,12 +82,11 @@ def read_columns(
     }
     if faults:
         name = min(faults, key=lambda key: faults[key])
-        row = faults[name]
-        cell = _csv_cell(path, name, row) if path.suffix == CSV else str(table[name][row])
-        wrong = "too large a number" if np.isfinite(table[name][row]) else "not a finite number"
+        value, row = table[name][faults[name]], faults[name] + (rows[0] if rows else 0)
+        cell = _csv_cell(path, name, row) if path.suffix == CSV else str(value)
+        wrong = "too large a number" if np.isfinite(value) else "not a finite number"
         raise LogError(
-            f"{path}: column {name}, {place(path, row + (rows[0] if rows else 0))}: {cell!r} is {wrong}; "
-            "correct it or drop the row"
+            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
         )
     return table
 
@@ -206,26 +206,56 @@ def _some_rows(file: ParquetFile, names: Sequence[str], first: int, last: int) -
     return pyarrow.Table.from_batches(kept)
 
 
-def _read_csv(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def _read_csv(
+    path: Path, names: Sequence[str], rows: tuple[int, int] | None
+) -> dict[str, NDArray[np.float64]]:
     import pyarrow
-    import pyarrow.csv
 
     header = read_header(path)
     # own names for the columns, so that a name that stands twice among the columns not asked for does no harm
     wanted = {name: str(header.index(name)) for name in names}
     try:
-        table = pyarrow.csv.read_csv(
-            path,
-            pyarrow.csv.ReadOptions(column_names=[str(index) for index in range(len(header))], skip_rows=1),
-            convert_options=pyarrow.csv.ConvertOptions(
-                include_columns=list(wanted.values()),
-                column_types=dict.fromkeys(wanted.values(), pyarrow.float64()),
-                null_values=[""],
-            ),
-        )
+        if rows is None:
+            table = _csv_table(path, len(header), list(wanted.values()), skip_rows=1)
+        else:
+            table = _some_csv_rows(path, len(header), list(wanted.values()), *rows)
     except pyarrow.ArrowInvalid as error:
         raise _csv_fault(path, header, names, error) from error
-    return {name: table[key].to_numpy() for name, key in wanted.items()}
+    columns = {name: table[key].to_numpy() for name, key in wanted.items()}
+    if rows is not None:
+        del table
+        pyarrow.default_memory_pool().release_unused()
+    return columns
+
+
+def _csv_table(source: Any, width: int, wanted: list[str], **how: Any) -> Table:
+    import pyarrow
+    import pyarrow.csv
+
+    return pyarrow.csv.read_csv(
+        source,
+        pyarrow.csv.ReadOptions(column_names=[str(index) for index in range(width)], **how),
+        convert_options=pyarrow.csv.ConvertOptions(
+            include_columns=wanted,
+            column_types=dict.fromkeys(wanted, pyarrow.float64()),
+            null_values=[""],
+        ),
+    )
+
+
+def _some_csv_rows(path: Path, width: int, wanted: list[str], first: int, last: int) -> Table:
+    import pyarrow
+
+    low, high, begin, end = index_rows(path).span(first, last)
+    with path.open("rb") as file:
+        file.seek(begin)
+        text = pyarrow.BufferReader(file.read(end - begin))
+    table = _csv_table(text, width, wanted, use_threads=False)
+    if table.num_rows != high - low:
+        raise pyarrow.ArrowInvalid(
+            f"rows {low + 1} to {high} are {table.num_rows} where lines end as they do"
+        )
+    return table.slice(first - low, last - first)
 
 
 def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: Exception) -> LogError:

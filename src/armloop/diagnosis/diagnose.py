@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.log import MotionLog, require_different
+from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
+from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import best_account

@@ -32,6 +32,8 @@ from armloop.util.files import write_json
 from armloop.util.reading import read_json
 
 SCHEMA = "armloop/model/2"
+#: Samples whose rigid-body torque is computed at a time: it takes many arrays of them, which are to stay in the cache.
+_ROWS = 4096
 
 
 @dataclass(frozen=True)
@@ -125,8 +127,13 @@ class ReconstructedModel:
     def rigid_body(self, motion: Motion, step: int = 3) -> Array:
         """(N, n) torque of the components without friction and effects."""
         tau = np.zeros_like(motion.q)
-        for component in self.components:
-            tau += component.torque(self.arm, motion, step)
+        for start in range(0, motion.samples, _ROWS):
+            own = slice(start, start + _ROWS)
+            part = Motion(
+                motion.time[own], motion.q[own], motion.v[own], motion.vdot[own], np.zeros(1, dtype=np.intp)
+            )
+            for component in self.components:
+                tau[own] += component.torque(self.arm, part, step)
         return tau
 
     def predict(self, motion: Motion, step: int = 3, sensors: bool = True) -> Array:

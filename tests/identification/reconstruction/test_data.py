@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from armloop.identification.reconstruction import Options, Reconstruction, recon
 from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.regression.sparse import Sparse
-from armloop.util.workers import Processes, Workers
+from armloop.util.workers import Processes, Serial, Workers
 
 #: Terms chosen by least squares, as by default, but faster: what is asked is where the samples come from.
 OPTIONS = Options(max_order=1, sparse=Sparse("thresholded"))
@@ -73,6 +74,23 @@ def test_shared_coefficients_are_the_same_to_the_bit_wherever_logs_are_kept(
     assert streamed.to_dict() == kept.to_dict()
 
 
+def test_a_csv_in_pieces_gives_the_model_of_its_pieces_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each piece is a run of its own: the model is that of logs in memory that end where the pieces do."""
+    log = a_run(1, 12.0)
+    monkeypatch.setattr("armloop.data.pieces.PIECE", log.samples // 2)
+    write_log(tmp_path / "run.csv", log)
+    pieces = log_sources([tmp_path / "run.csv"], 3, {"unit": "N*m", "drive_gains": None}, in_memory=0)
+    edges = np.cumsum([0, *(piece.samples for piece in pieces)]).tolist()
+    parts = [replace(log.select(slice(a, b)), name="run") for a, b in pairwise(edges)]
+    assert len(parts) == 2 and edges[-1] == log.samples
+    options = Options(parts=False, standard_errors=False)
+    kept = reconstruct(parts, three_axis(), library="rigid-body", options=options)
+    streamed = reconstruct(pieces, three_axis(), library="rigid-body", options=options, in_memory=0)
+    assert streamed.model.to_dict() == kept.model.to_dict()
+
+
 def test_a_long_pass_tells_how_much_time_is_left(
     logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +112,20 @@ def test_a_window_is_of_consecutive_samples_of_all_parts(logs: list[MotionLog]) 
     kept = Data.kept(logs, Conditioning(), Options())
     np.testing.assert_array_equal(data.window(10**6).samples.tau, kept.window(10**6).samples.tau)
     assert data.window(10**6).samples.spans is not None and kept.window(500).samples.motion.samples <= 500
+
+
+def test_a_window_of_many_pieces_keeps_none_of_them(logs: list[MotionLog]) -> None:
+    class Watched(Serial):
+        def map(self, function, chunks):  # type: ignore[no-untyped-def]
+            for answer in super().map(function, chunks):
+                for part in answer:
+                    motion = part.samples.motion
+                    arrays = [motion.time, motion.q, motion.v, motion.vdot, part.samples.tau, part.blocks]
+                    assert len(part.blocks) < 100 and all(x.base is None for x in arrays), "views of a piece"
+                yield answer
+
+    data = replace(Data.streamed(logs, Conditioning(), Options()), workers=Watched())
+    assert data.window(500).samples.motion.samples <= 500
 
 
 def test_files_on_a_dask_cluster_give_the_same_model(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from math import gcd
@@ -319,7 +320,8 @@ def _stretches(chunk: Chunk, count: int, length: int) -> list[Chunk]:
         return [chunk]
     middles = (np.arange(count) + 0.5) * N / count
     starts = np.clip(middles - length / 2, 0, N - length).astype(int)
-    return [chunk.cut(low, low + length) for low in starts.tolist()]
+    # Copied: a view would keep the whole chunk, of every piece of a log that does not fit into memory.
+    return [deepcopy(chunk.cut(low, low + length)) for low in starts.tolist()]
 
 
 def _noise(cutoff_hz: float, log: LogSource) -> Array:

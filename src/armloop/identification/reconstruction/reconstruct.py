@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from armloop.data.log import require_different
 from armloop.data.pieces import IN_MEMORY, LogSource
+from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.log import MotionLog, require_different
+from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
+from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.scoring import Score, residual, score_errors

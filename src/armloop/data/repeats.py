@@ -1,0 +1,36 @@
+"""Logs of one measurement, found by the rows that they share to the last digit.
+
+What is left out of a regression must not be in it under another name, and nothing counts twice.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armloop.data.log import MotionLog
+from armloop.util.errors import LogError
+
+# Logs that share more of the shorter one's rows are one measurement: an arm at rest may repeat a row, a motion not.
+_SHARED_ROWS = 0.5
+
+
+def require_different(logs: Sequence[MotionLog]) -> None:
+    """Raise `LogError` where two logs hold the same measurement, whole or for the most part, whatever their times."""
+    digests = [np.unique(log.rows_digest()) for log in logs]
+    for k, log in enumerate(logs):
+        for j, other in enumerate(logs[:k]):
+            if _mostly_shared(digests[j], digests[k]):
+                raise LogError(
+                    f"{log.name}: holds the measurement of {other.name} once more; give each measurement once"
+                )
+
+
+def same_measurement(one: MotionLog, other: MotionLog) -> bool:
+    """Whether more than half of the shorter log's rows are in the other, to the last digit, whatever the times."""
+    return _mostly_shared(np.unique(one.rows_digest()), np.unique(other.rows_digest()))
+
+
+def _mostly_shared(first: NDArray[np.uint64], second: NDArray[np.uint64]) -> bool:
+    shared = len(np.intersect1d(first, second, assume_unique=True))
+    return shared > _SHARED_ROWS * min(len(first), len(second))
