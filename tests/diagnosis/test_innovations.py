@@ -1,9 +1,16 @@
 """Rest as event detection sees it: a joint that stands, and not one that turns round fast within the filter's reach."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
+import pytest
 
 from armloop.data.motion import Motion, Samples
+from armloop.diagnosis import innovations
 from armloop.diagnosis.innovations import CREEP, at_rest
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.util.errors import ModelError
 
 
 def samples(v: np.ndarray, moving: np.ndarray) -> Samples:
@@ -27,3 +34,189 @@ def test_a_fast_reversal_is_no_rest_and_a_standstill_is() -> None:
     rest = at_rest(samples(standing, ~still))[:, 0]
     assert rest[100:200].all() and not rest[:98].any() and not rest[202:].any()
     assert np.abs(standing[rest]).max() <= 2 * CREEP + 0.02
+
+
+def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
+    """Evidence of one joint of a baseline of 1 N·m, sampled every 0.04 s and not filtered."""
+    given = np.array(v)[:, None]
+    time = 0.04 * np.arange(len(v))
+    motion = Motion(time, 0 * given, given, 0 * given, np.array(starts))
+    samples = SimpleNamespace(motion=motion, cutoff_hz=0.0, period=0.04, reach=of.get("reach", 0.0))
+    model = SimpleNamespace(
+        history=of.get("history", {}), friction=of.get("friction"), predict=of.get("predict")
+    )
+    context = SimpleNamespace(load=of.get("load"), predicted=of.get("predicted"))
+    rows = np.ones(given.shape, dtype=bool)
+    return SimpleNamespace(
+        samples=samples, model=model, context=context, rows=rows, scale=np.ones(1), unknown=of.get("unknown")
+    )
+
+
+class TestInnovations:
+    """Dry friction of 1 N·m, residuals and friction as they are given."""
+
+    @staticmethod
+    def found(
+        monkeypatch: pytest.MonkeyPatch, v: list[float], residual: list[float], rest: list[bool], **of: Any
+    ) -> list[float]:
+        friction = SimpleNamespace(torque=lambda motion, step, load: np.array(of["held"])[:, None])
+        evidence = at_speeds(v, friction=friction, history=of.get("history", {}), unknown=of.get("unknown"))
+        evidence.rows[:, 0] = of.get("rows", True)
+        monkeypatch.setattr(innovations, "dry_level", lambda evidence: np.ones((len(v), 1)))
+        monkeypatch.setattr(innovations, "at_rest", lambda samples: np.array(rest)[:, None])
+        monkeypatch.setattr(innovations, "deviations", lambda evidence, residual: 0 * residual + 2.0)
+        values, rests = innovations.innovations(evidence, np.array(residual)[:, None])
+        assert rests[:, 0].tolist() == rest
+        return values[:, 0].tolist()
+
+    def test_a_joint_that_slides_has_its_whole_residual_and_one_that_creeps_what_friction_leaves(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        history = {"range": [[9.0], [2.0], [9.0], [9.0]]}  # creeping below 0.05 * 2 rad/s
+        v, residual = [5.0, -5.0, 0.1, -0.1, 0.0], [3.0, 3.0, 3.0, 3.0, 0.7]
+        found = self.found(
+            monkeypatch, v, residual, [False] * 5, held=[0.0] * 5, history=history, rows=np.eye(5)[4] > 0
+        )
+        near = (3 - 0.8 * np.exp(-1)) / 2
+        np.testing.assert_allclose(found, [1.5, 1.5, near, near, 0.0])
+        # of a model that does not tell its range: below 0.01 rad/s
+        found = self.found(
+            monkeypatch, [5.0, 0.01], [3.0, 3.0], [False] * 2, held=[0.0] * 2, rows=[False, False]
+        )
+        np.testing.assert_allclose(found, [1.5, near])
+        # a joint that never moved had no speed
+        history["range"][1] = [0.0]
+        found = self.found(
+            monkeypatch,
+            [5.0, 0.0],
+            [3.0, 3.0],
+            [False] * 2,
+            held=[0.0] * 2,
+            history=history,
+            rows=[False] * 2,
+        )
+        np.testing.assert_allclose(found, [1.5, 1.1])
+
+    def test_at_rest_friction_holds_a_fifth_more_with_the_models_own_or_without(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        none = np.zeros(4, dtype=bool)
+        residual, held = [3.0, 3.0, 3.0, 3.0], [0.0, -1.0, 5.0, -6.0]
+        found = self.found(monkeypatch, [0.0] * 4, residual, [True] * 4, held=held, rows=none)
+        # the smaller of 3 - 1 and |residual + friction| - 1.2, with the sign of the latter
+        np.testing.assert_allclose(found, [0.9, 0.4, 1.0, -0.9])
+        # what is within friction is nothing
+        found = self.found(
+            monkeypatch, [0.0] * 4, [0.9, -0.9, 1.1, 0.0], [True] * 4, held=[0.0] * 4, rows=none
+        )
+        assert np.abs(found).tolist() == [0.0] * 4
+
+    def test_where_sliding_takes_more_than_the_model_says_so_does_sticking(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        v, rest = [5.0, -5.0, 5.0, 0.0], [False] * 3 + [True]
+        for sign in (1.0, -1.0):
+            residual = [sign * 0.5, -sign * 0.5, sign * 0.5, 3.0]
+            found = self.found(monkeypatch, v, residual, rest, held=[0.0] * 4, rows=[True] * 3 + [False])
+            np.testing.assert_allclose(found[3], (3 - 1.2 * 1.5) / 2)
+
+    def test_what_is_not_known_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        unknown = np.array([[True], [False]])
+        found = self.found(
+            monkeypatch,
+            [5.0, 5.0],
+            [3.0, -3.0],
+            [False] * 2,
+            held=[0.0] * 2,
+            unknown=unknown,
+            rows=[False] * 2,
+        )
+        assert found == [0.0, -1.5]
+
+
+class TestDeviations:
+    @pytest.fixture(autouse=True)
+    def no_contradiction(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(innovations, "contradiction", lambda model, motion: np.zeros((1, 1)))
+
+    def test_torque_and_motion_may_be_half_a_sample_apart(self) -> None:
+        predicted = 30.0 * 0.04 * np.arange(12.0)[:, None]
+        predicted[8:] *= 2
+        evidence = at_speeds([1.0] * 12, (0, 8, 10), predicted=predicted)
+        found = innovations.deviations(evidence, 0 * predicted)[:, 0]
+        # of runs of two samples the slope is not asked
+        late = 30.0 * 0.5 * 0.04
+        np.testing.assert_allclose(found, [np.hypot(1.0, late)] * 8 + [1.0] * 4)
+        evidence = at_speeds([1.0] * 3, predict=lambda motion: predicted[:3])
+        np.testing.assert_allclose(
+            innovations.deviations(evidence, np.zeros((3, 1)))[:, 0], [np.hypot(1.0, late)] * 3
+        )
+        evidence.scale = np.array([1e-13])
+        evidence.model.predict = lambda motion: 0 * predicted[:3]
+        np.testing.assert_allclose(innovations.deviations(evidence, np.zeros((3, 1)))[:, 0], [1e-12] * 3)
+
+    def test_an_average_of_the_runs_own_noise_may_be_more_than_the_baseline(self) -> None:
+        # means over five of the samples, ±1 in turn, are ±1/5
+        residual = 10 * np.where(np.arange(100) % 2, -1.0, 1.0)[:, None]
+        evidence = at_speeds([1.0] * 100, predicted=0 * residual, reach=0.05)
+        assert innovations.deviations(evidence, residual)[50, 0] == 1.0  # no time series
+        evidence.samples.cutoff_hz = 1e-9
+        evidence.samples.motion = at_speeds([1.0] * 100, tuple(range(0, 100, 10))).samples.motion
+        noise = 1.4826 * 10 * (1 - 1 / 5)
+
+        def deviation() -> float:
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(innovations, "smooth", lambda samples, x: x)
+                return float(innovations.deviations(evidence, residual)[5, 0])
+
+        # four times the filter's reach in 0.2 s; never fewer than one
+        assert deviation() == pytest.approx(noise / 2)
+        evidence.samples.reach = 0.3
+        assert deviation() == pytest.approx(noise)
+        evidence.rows[:] = False
+        assert deviation() == 1.0
+        evidence.rows[5] = True
+        assert deviation() == pytest.approx(noise)
+
+
+def test_a_contradiction_is_the_skew_part_of_the_mass_times_the_acceleration(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    motion: Any = SimpleNamespace(q=np.zeros((1, 2)), vdot=np.array([[1.0, 10.0]]))
+    mass = np.array([[[1.0, 2.0], [4.0, 3.0]]])
+    model: Any = None
+    monkeypatch.setattr(innovations, "Dynamics", lambda model: SimpleNamespace(mass_matrix=lambda q: mass))
+    assert innovations.contradiction(model, motion).tolist() == [[-10.0, 1.0]]
+
+    def none(model: Any) -> Any:
+        raise ModelError("not linear in the acceleration")
+
+    monkeypatch.setattr(innovations, "Dynamics", none)
+    assert innovations.contradiction(model, motion).tolist() == [[0.0, 0.0]]
+
+
+def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() -> None:
+    terms = (
+        FrictionTerm("sign", 2.0),
+        FrictionTerm("offset", 5.0),
+        FrictionTerm("viscous", 30.0),
+        FrictionTerm("hysteresis", 0.5, 0.1),
+        FrictionTerm("load_hysteresis", 0.25, 0.1),
+    )
+    evidence = at_speeds([0.0, 0.0], friction=FrictionLaw((terms,)), load=np.array([[4.0], [-8.0]]))
+    np.testing.assert_allclose(
+        innovations.dry_level(evidence)[:, 0], [2 + 30 * CREEP + 0.5 + 1.0, 2 + 30 * CREEP + 0.5 + 2.0]
+    )
+    evidence = at_speeds([0.0], friction=FrictionLaw((terms[3:],)))
+    assert innovations.dry_level(evidence)[0, 0] == pytest.approx(0.75)
+
+
+def test_a_window_is_a_fifth_of_a_second_and_at_least_a_sample() -> None:
+    evidence = at_speeds([0.0] * 11)
+    values = np.eye(11)[:, [5]]
+    for period, width in ((0.04, 5), (0.06, 3), (1.0, 1)):
+        evidence.samples.period = period
+        mean = innovations.averaged(evidence.samples, values)[:, 0]
+        np.testing.assert_allclose(
+            mean, np.where(np.abs(np.arange(11) - 5) <= width // 2, 1 / width, 0), atol=1e-12
+        )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic import three_axis
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows
 from armloop.diagnosis import isolability, planning
 from armloop.diagnosis.confounded import Law, Rivalry, _share_joints
@@ -29,6 +29,17 @@ class TestIsolability:
         assert isolability._fitted(y, [near])[0] == pytest.approx(0.8, abs=1e-3)
         near[1, 1] = 1e-5
         assert isolability._fitted(y, [near])[0] == pytest.approx(0.0, abs=1e-3)
+        # unit columns at an angle: singular values in the ratio of tan(angle / 2), here 1.5e-6
+        near[1, 1] = 3e-6
+        assert isolability._fitted(y, [near])[0] == pytest.approx(0.0, abs=1e-3)
+        near[1, 1] = 1.6e-6
+        assert isolability._fitted(y, [near])[0] == pytest.approx(0.8, abs=1e-3)
+
+    def test_the_units_of_columns_do_not_matter(self) -> None:
+        y = np.array([3.0, 4.0])
+        part, beta = isolability._fitted(y, [np.array([[-1e-14, 0.0], [0.0, 0.5]])])
+        assert part == pytest.approx(0.0, abs=1e-12)
+        np.testing.assert_allclose(beta, [-3e14, 8.0])
 
     @staticmethod
     def stage() -> Any:
@@ -58,6 +69,13 @@ class TestIsolability:
         )
         # one that is no better is not taken
         assert left([self.stage()], law, self.rival(lambda beta, shape: 0.5))[1] == 1.0
+        # a step of more than a thousandth is one, of either sign
+        assert left([self.stage()], law, self.rival(lambda beta, shape: 1.0015 * shape))[1] == pytest.approx(
+            1.0015**6
+        )
+        below = self.stage()
+        below.torque = lambda law: np.array([1.0, -1.0])
+        assert left([below], law, Part(self.rival(lambda beta, shape: -1.0).effect, (1.0,)))[1] == -1.0
         # six steps, no more; the coefficient is that of the shape before
         assert left([self.stage()], law, self.rival(lambda beta, shape: shape + 0.1))[1] == pytest.approx(1.6)
         assert left([self.stage()], law, self.rival(lambda beta, shape: shape * beta[0]))[1] > 1.5
@@ -69,6 +87,8 @@ class TestIsolability:
         opposite = self.stage()
         opposite.torque = lambda law: np.array([-1.0, -2.0])
         assert left([self.stage(), opposite], law, rival)[0] == pytest.approx(1.0)
+        opposite.torque = lambda law: np.array([0.0, 1.0])
+        assert left([opposite], law, rival) == (pytest.approx(np.sqrt(0.5)), 1.0)
         opposite.torque = lambda law: np.zeros(2)
         assert left([opposite], law, rival) == (0.0, 0.0)
 
@@ -86,8 +106,77 @@ class TestIsolability:
         still = np.flatnonzero(~stage.samples.moving[:, 0])
         assert still.tolist() == [k for k in range(500) if min(k % 100, 100 - k % 100) <= 3 and k < 497]
         assert np.array_equal(stage.rows, stage.samples.moving & independent_rows(stage.samples)[:, None])
+        samples.cutoff_hz = 1.0
+        assert Stage.of_reference(evidence, reference).samples.period == 0.1
         samples.cutoff_hz = 0.0
         assert Stage.of_reference(evidence, reference).samples.period == 0.01
+
+    def test_a_joint_rests_below_a_hundredth_of_its_own_speed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(isolability, "context_of", lambda evidence, motion: None)
+        v = np.tile([0.0, 4.0], (100, 1))
+        v[:, 0] = np.where(np.arange(100) == 50, 0.0199, 0.0201)
+        v[90, 0] = 2.0
+        v = np.column_stack([v, np.zeros(100)])
+        reference: Any = SimpleNamespace(duration=1.0, evaluate=lambda t: (v, v, v))
+        samples = SimpleNamespace(period=0.01, cutoff_hz=0.0, reach=0.0)
+        evidence: Any = SimpleNamespace(samples=samples, scale=np.ones(3))
+        moving = Stage.of_reference(evidence, reference).samples.moving
+        # another joint's rest is not its own; one that never moves rests
+        assert np.flatnonzero(~moving[:, 0]).tolist() == [50]
+        assert moving[:, 1].all() and not moving[:, 2].any()
+
+    @staticmethod
+    def filtered(cutoff_hz: float) -> Any:
+        """Two joints, 100 Hz; of the second but three samples count."""
+        given = Motion(0.01 * np.arange(100), *np.zeros((3, 100, 2)), np.array([0]))
+        rows = np.ones((100, 2), dtype=bool)
+        rows[:, 1] = np.isin(np.arange(100), [0, 1, 20])
+        samples = Samples(given, given.q, rows, 0.01, cutoff_hz)
+        return SimpleNamespace(
+            samples=samples, rows=rows, scale=np.array([2.0, 4.0]), context="what is known"
+        )
+
+    def test_a_run_counts_where_it_is_evidence_and_independent(self) -> None:
+        evidence = self.filtered(5.0)
+        stage = Stage.of_run(evidence)
+        free = independent_rows(evidence.samples)
+        assert 1 < free.sum() < 100 and stage.context == "what is known"
+        assert stage.rows[:, 0].tolist() == free.tolist()
+        assert np.flatnonzero(stage.rows[:, 1]).tolist() == [k for k in (0, 1, 20) if free[k]]
+
+    def test_torques_are_in_baselines_and_the_nearest_shape_leaves_least(self) -> None:
+        stage = Stage.of_run(self.filtered(0.0))
+        time = np.arange(100.0)
+        law: Any = SimpleNamespace(torque=lambda context: np.stack([time, 8 + time], axis=1))
+        torque = stage.torque(law)
+        # instant by instant, joint 1 first
+        assert torque[:5].tolist() == [0.0, 2.0, 0.5, 2.25, 1.0] and len(torque) == 103
+        columns = {0.0: np.ones((100, 2)), 1.0: np.stack([time, time], axis=1), 2.0: -np.eye(100, 2)}
+        shapes = [0.0, 1.0, 2.0]
+        rival: Any = SimpleNamespace(
+            full_columns=lambda context, shape: columns[shape][:, :, None], shapes=lambda context: shapes
+        )
+        assert stage.columns(rival, 0.0).tolist()[:3] == [[0.5], [0.25], [0.5]]
+        assert stage.best_shape(law, rival) == 1.0
+        shapes.clear()
+        assert stage.best_shape(law, rival) is None
+
+    def test_a_model_is_asked_only_where_an_effect_needs_it(self) -> None:
+        known = SimpleNamespace(inertial="kept", period=0.02)
+        asked = isolability.Context("arm", "motion")  # type: ignore[arg-type]
+        evidence: Any = SimpleNamespace(
+            context=known, model=SimpleNamespace(arm="arm", context=lambda motion, effects: asked)
+        )
+        asked = isolability.replace(asked, predicted="asked")  # type: ignore[arg-type]
+        plain, needy = SimpleNamespace(needs_model=False), SimpleNamespace(needs_model=True)
+        for effects, predicted in (
+            (None, "asked"),
+            ([], None),
+            ([plain], None),
+            ([plain, needy], "asked"),
+        ):
+            found = isolability.context_of(evidence, "motion", effects)  # type: ignore[arg-type]
+            assert (found.predicted, found.inertial, found.period) == (predicted, "kept", 0.02)
 
     def test_effects_share_a_joint_or_are_the_whole_arms(self) -> None:
         def of(joint: int | None, other: int | None = None) -> Any:
