@@ -59,7 +59,7 @@ class TestInnovations:
     def found(
         monkeypatch: pytest.MonkeyPatch, v: list[float], residual: list[float], rest: list[bool], **of: Any
     ) -> list[float]:
-        friction = SimpleNamespace(torque=lambda motion, step, load: np.array(of["held"])[:, None])
+        friction = SimpleNamespace(torque=lambda motion, load: np.array(of["held"])[:, None])
         evidence = at_speeds(v, friction=friction, history=of.get("history", {}), unknown=of.get("unknown"))
         evidence.rows[:, 0] = of.get("rows", True)
         monkeypatch.setattr(innovations, "dry_level", lambda evidence: np.ones((len(v), 1)))

@@ -11,7 +11,7 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows
-from armloop.diagnosis import isolability, planning
+from armloop.diagnosis import confounded, isolability, next_run, planning
 from armloop.diagnosis.confounded import Law, Rivalry, _share_joints
 from armloop.diagnosis.isolability import Part, Stage, left
 from armloop.experiment.excitation import MotionRanges
@@ -197,6 +197,143 @@ class TestIsolability:
         many = 21
         assert way._rival(stage, 20).shapes == (7.0,) and len(way._rival(stage).shapes) == 22
         assert [part.shapes for part in way._beside()] == [(7.0,)]
+
+    @staticmethod
+    def of(name: str, joint: int | None = 1, shape: float | None = 5.0) -> Any:
+        return SimpleNamespace(place=(name, joint, None), joint=joint, other_joint=None, shape=shape)
+
+    @staticmethod
+    def law(effect: Any) -> Law:
+        return Law(AddedEffect(effect, {}), 1.0)
+
+    def test_what_leaves_little_and_is_not_listed_is_a_lookalike(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        laws = [self.law(self.of("found")), self.law(self.of("other", 2))]
+        rivals = {
+            "found": (self.of("found"), 0.0),
+            "listed": (self.of("listed"), 0.0),
+            "like": (self.of("like", None), 0.24),
+            "unlike": (self.of("unlike"), 0.26),
+            "elsewhere": (self.of("elsewhere", 3), 0.0),
+            "nothing": (self.of("nothing", 1, None), 0.0),
+        }
+        monkeypatch.setattr(confounded, "hypotheses", lambda arm: [effect for effect, _ in rivals.values()])
+        monkeypatch.setattr(
+            Rivalry, "left_on_all", lambda self, stages: rivals[self.rival.effect.place[0]][1]
+        )
+        run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
+        diagnosis: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
+        listed = confounded.Pair(laws[0], self.law(rivals["listed"][0]), ())
+        found = confounded.lookalikes(diagnosis, laws, [listed], run)
+        names = [(way.law, way.rival.effect.place[0], way.rival.shape, way.others) for way in found]
+        assert names == [(laws[0], "like", 5.0, (laws[1],)), (laws[1], "like", 5.0, (laws[0],))]
+
+    def test_a_rival_is_fitted_last_beside_the_others(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        asked: list[Any] = []
+
+        def fit(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
+            asked.append(([e.place[0] for e in effects], [shape.final for shape in shapes], residual))
+            return SimpleNamespace(parameters=["of the first", "of the rival"][-len(effects) :])
+
+        monkeypatch.setattr(confounded, "fit", fit)
+        effects = [self.of("first"), self.of("second", 2)]
+        laws = [self.law(effect) for effect in effects]
+        rivals = [[(self.of("rival"), 0.1), (self.of("second", 2), 0.1), (self.of("none", 1, None), 0.1)], []]
+        outcome = SimpleNamespace(found=[SimpleNamespace(rivals=each) for each in rivals])
+        evidence = SimpleNamespace(residual=lambda known: "all of it")
+        diagnosis: Any = SimpleNamespace(outcome=outcome, evidence=evidence)
+        run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
+        (pair,) = confounded.pairs(diagnosis, laws, run)
+        assert asked == [(["second", "rival"], [1.0, 5.0], "all of it")]
+        assert (pair.found, pair.others) == (laws[0], (laws[1],))
+        assert (pair.rival.effect.place[0], pair.rival.shape) == ("rival", 5.0)
+        assert pair.rival.added.parameters == "of the rival"
+
+
+class TestNextRun:
+    def test_standard_errors_fall_with_size_and_with_what_tells_columns_apart(self) -> None:
+        def stage(*columns: Any) -> Any:
+            return SimpleNamespace(columns=lambda effect, shape: np.array(columns[effect]).T)
+
+        laws: Any = [SimpleNamespace(effect=k, shape=0.0) for k in (0, 1)]
+        run = stage([[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]], [[0.0, 0.0, -2.0]])
+        then = stage([[12.0, 0.0, 0.0], [0.0, 4.0, 0.0]], [[0.0, 0.0, 6.0]])
+        # the geometric mean of 1/4 and 1 of the first; a third
+        assert next_run._sharper(run, then, laws) == [(0, pytest.approx(0.5)), (1, pytest.approx(1 / 3))]
+        # columns with the correlation c have the errors of 1 / sqrt(1 - c^2)
+        run, then = stage([[1.0, 0.0]], [[0.6, 0.8]]), stage([[1.0, 0.0]], [[0.0, 1.0]])
+        assert [x for _, x in next_run._sharper(run, then, laws)] == pytest.approx([0.8, 0.8])
+        # eigenvalues 1 ± c in a ratio of more than 1e-9 still tell them apart
+        for gap, told in ((1.5e-9, True), (0.7e-9, False)):
+            angle = np.sqrt(4 * gap)
+            then = stage([[1.0, 0.0]], [[np.cos(angle), np.sin(angle)]])
+            expected = 0.8 / angle if told else 0.8 / 2
+            assert [x for _, x in next_run._sharper(run, then, laws)] == pytest.approx(
+                [expected] * 2, rel=1e-3
+            )
+
+    @staticmethod
+    def designed(
+        monkeypatch: pytest.MonkeyPatch,
+        ways: list[list[Any]],
+        possible: bool = True,
+        joint: int | None = None,
+    ) -> Any:
+        """Pairs with so much left on the run and on the motion then, each way."""
+        names = iter("abc")
+        pairs = []
+        for both in ways:
+            made = tuple(SimpleNamespace(left=lambda stage, of=of: of[stage]) for of in both)
+            name = next(names)
+            side: Any = SimpleNamespace(effect=name)
+            pairs.append(SimpleNamespace(found=side, rival=side, rivalries=lambda made=made: made))
+        design = SimpleNamespace(reference="made")
+        planner = SimpleNamespace(
+            possible=lambda ways: [way for way in ways if possible and way.left(1) is not None],
+            alternatives=lambda ways: design,
+            unlisted=lambda joint: design,
+            precision=lambda laws: design,
+            whole=lambda made: "whole",
+            limits=SimpleNamespace(use=lambda sampled: sampled),
+            fine_step=0.5,
+        )
+        monkeypatch.setattr(next_run.Planner, "of", staticmethod(lambda *_: planner))
+        monkeypatch.setattr(next_run, "found_laws", lambda diagnosis: [])
+        monkeypatch.setattr(next_run, "pairs", lambda *_: pairs)
+        monkeypatch.setattr(next_run, "lookalikes", lambda *_: [])
+        monkeypatch.setattr(next_run, "_sharper", lambda *_: ["sharper"])
+        monkeypatch.setattr(next_run, "sampled", lambda reference, step: (reference, step))
+        monkeypatch.setattr(Stage, "of_run", staticmethod(lambda evidence: 0))
+        monkeypatch.setattr(Stage, "of_reference", staticmethod(lambda evidence, reference: 1))
+        unlisted = None if joint is None else SimpleNamespace(joint=joint)
+        diagnosis: Any = SimpleNamespace(
+            outcome=SimpleNamespace(found=["a"]), unlisted=unlisted, evidence=None
+        )
+        made = next_run.next_run(diagnosis)
+        assert made is not None and made.reference == "whole" and made.use == ("made", 0.5)  # type: ignore[comparison-overlap]
+        return made
+
+    def test_the_worst_told_alternative_comes_first_and_those_never_told_last(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        ways = [[(0.1, None), (0.2, None)], [(0.4, 0.9), (0.3, 0.8)], [(0.05, None), (0.2, 0.7)]]
+        made = self.designed(monkeypatch, ways)
+        # of a way that no motion opens nothing is said where another is open
+        assert [(t.found, t.now, t.then) for t in made.told] == [
+            ("c", 0.2, 0.7),
+            ("b", 0.3, 0.8),
+            ("a", 0.1, None),
+        ]
+        assert (made.purpose, made.sharper, made.joint) == ("alternatives", [], None)
+
+    def test_without_alternatives_it_is_for_the_residual_or_for_precision(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made = self.designed(monkeypatch, [[(0.1, 0.2)]], possible=False, joint=2)
+        assert (made.purpose, made.sharper, made.joint, made.told[0].then) == ("unlisted", [], 2, None)
+        made = self.designed(monkeypatch, [])
+        assert (made.purpose, made.sharper, made.joint) == ("precision", ["sharper"], None)
 
 
 class TestDesign:

@@ -227,6 +227,60 @@ class TestReasons:
         evidence.rows[:, 0] = False
         assert "joints at rest: [1, 2]" in reasons.too_still(evidence)
 
+    @staticmethod
+    def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:
+        """Three joints with baselines of 0.5 N·m of which twenty samples slide; all samples 1 N·m, 0.25 predicted."""
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None),
+            model=SimpleNamespace(history={}, baseline={"nrmse": [of.get("poor"), None]}),
+            context=SimpleNamespace(load=None),
+            rows=np.repeat(np.arange(50) < 20, 3).reshape(50, 3),
+            scale=np.full(3, 0.5),
+        )
+        evidence.rows[of.get("slides", 20) :, 1] = False
+        far = np.zeros((50, 3), dtype=bool)
+        far[: of.get("far", 0), 2] = True
+        seen: list[Any] = []
+        monkeypatch.setattr(reasons, "smooth", lambda samples, x: x)
+        monkeypatch.setattr(reasons, "witness", lambda left, samples, load: seen.append(left))
+        monkeypatch.setattr(reasons, "parts_of", lambda of: [Parts(j) for j in (1, 2, 3)])
+        monkeypatch.setattr(reasons, "outside_trained_range", lambda motion, ranges: far.mean(axis=0))
+        monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
+        monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
+        monkeypatch.setattr(reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", j == 1))
+        augmented: Any = SimpleNamespace(predict=lambda motion: np.full((50, 3), 0.25))
+        found = reasons.standing(evidence, augmented, after, of.get("explained", []))
+        assert (seen[0] == 0.75).all()
+        return found.reasons, found.unknown
+
+    def test_twice_the_baseline_is_no_baseline(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.standing(monkeypatch, [1.0, None, 0.99]) == (["1 2"], False)
+        assert self.standing(monkeypatch, [0.0, 2.0, np.nan]) == (["2 4"], True)
+        assert self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3]) == (["1 18"], False)
+
+    def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        still = "joint 2 does not slide in this run: nothing can be said of it"
+        assert self.standing(monkeypatch, [0.5, 9.0, 0.5], slides=19) == ([still], False)
+        for far, unknown in ((40, False), (41, True)):
+            words, found = self.standing(monkeypatch, [0.5, None, 0.5], far=far)
+            assert len(words) == 1 and words[0].startswith("joint 3: 8") and found is unknown
+
+    def test_a_model_that_leaves_half_of_a_torque_judges_nothing_there(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        words, unknown = self.standing(monkeypatch, [9.0, None, None], poor=0.5)
+        assert len(words) == 1 and "leaves 50% of the torque on its own training logs" in words[0] and unknown
+        assert self.standing(monkeypatch, [9.0, None, None], poor=0.49) == (["1 18"], False)
+        # one that knows what it leaves says that
+        own = {"joint": 1, "explained": 0.5, "predictable_left": 0.4, "std_error": 0.1, "noise": 0.1}
+        model: Any = SimpleNamespace(baseline={"nrmse": [0.7, 0.7], "joints": [own]})
+        assert "a law is missing" in reasons._too_poor(model, 0)
+        assert reasons._too_poor(model, 1).startswith("joint 2: the model leaves 70%")
+        model.baseline["nrmse"] = [0.7]
+        assert reasons._too_poor(model, 1) == ""
+
 
 class TestReversals:
     def test_a_mean_beyond_chance(self) -> None:

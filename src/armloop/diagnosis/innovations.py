@@ -55,7 +55,7 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, dry * np.where(rest, 1.0, creeping)), 0.0)
     # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
-    bare = residual + smooth(samples, model.friction.torque(motion, 3, evidence.context.load))
+    bare = residual + smooth(samples, model.friction.torque(motion, load=evidence.context.load))
     size = np.abs(residual) - unsure
     size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - _STICTION * unsure), size), 0.0)
     if evidence.unknown is not None:

@@ -66,9 +66,10 @@ def standing(
         if poor:
             reasons.append(poor)
             unknown = True
-        of = np.nan if after[j] is None else float(after[j] or 0.0)
-        if j + 1 not in explained and not poor and of >= MULTIPLE * evidence.scale[j]:
-            words, real = _multiple(part, j, of / float(evidence.scale[j]))
+        of = after[j]
+        ratio = np.nan if of is None else of / float(evidence.scale[j])
+        if j + 1 not in explained and not poor and ratio >= MULTIPLE:
+            words, real = _multiple(part, j, ratio)
             reasons.append(words)
             unknown |= real
     return Standing(reasons, merged(parts, outside), unknown)
