@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from armloop.data.motion import Motion
 from armloop.identification.reconstruction import physical
 from armloop.identification.reconstruction.physical import (
     Body,
@@ -11,6 +12,7 @@ from armloop.identification.reconstruction.physical import (
     physics_notes,
 )
 from armloop.identification.reconstruction.pooled import Solution
+from armloop.laws.friction import FrictionTerm
 from armloop.util.errors import ExcitationError
 
 
@@ -62,3 +64,108 @@ def test_no_physical_solution_is_a_fault_of_the_motion(monkeypatch: pytest.Monke
     monkeypatch.setattr(physical, "constrained_least_squares", fail)
     with pytest.raises(ExcitationError, match="the motion tells too little"):
         solved(1.0, 1.5)
+
+
+def arm_of_one(seen: list[float], positive: tuple[bool, ...] = (False, False)) -> Body:
+    return Body(
+        columns,
+        lambda theta, q: columns(q) @ theta,
+        np.array(seen)[:, None],
+        -np.ones(1),
+        np.ones(1),
+        np.array(positive),
+    )
+
+
+def test_postures_are_spread_over_the_whole_motion() -> None:
+    q = np.arange(237.0)[:, None]
+    motion = Motion(q[:, 0], q, q, q, np.array([0]))
+    found = physical.postures(motion)[:, 0]
+    assert len(found) == 60 and found[0] == 0 and found[-1] == 236 and (np.diff(found) == 4).all()
+
+
+def test_conditions_are_rows_that_violate_them() -> None:
+    mass = columns(np.array([[0.0], [np.pi / 3]]))  # a + b and a - b
+    laws = [[FrictionTerm("offset"), FrictionTerm("viscous")]]
+    cuts = physical.physical_cuts(mass, np.array([[0.25, 0.0]]), laws, np.array([False, True]))
+    assert cuts(np.array([1.0, 0.5, -9.0, 0.0])).shape == (0, 4)
+    np.testing.assert_allclose(cuts(np.array([1.0, 0.8, 0.0, 0.0])), [[0.75, -1.0, 0.0, 0.0]], atol=1e-12)
+    # signs are kept all together: of b and the viscous coefficient, not of the offset
+    np.testing.assert_allclose(cuts(np.array([9.0, 0.0, -1.0, -2e-9])), [[0, 1, 0, 0], [0, 0, 0, 1]])
+    assert len(cuts(np.array([9.0, 0.0, -1.0, -0.9e-9]))) == 0
+    # what round-off makes of a condition that is met violates nothing
+    for below, violated in ((0.9e-9, 0), (1.1e-9, 1)):
+        assert len(cuts(np.array([1.0, 0.75 + below, 0.0, 0.0]))) == violated
+    free = physical.physical_cuts(mass, np.zeros((1, 2)), [])
+    np.testing.assert_allclose(free(np.array([0.0, -1.0])), [[1.0, 1.0]])
+
+
+def test_the_cost_of_coefficients_is_the_squared_error_but_for_a_constant() -> None:
+    G, b = np.array([[2.0, 1.0], [1.0, 3.0]]), np.array([1.0, -1.0])
+    solution = Solution(np.zeros(2), G, b, np.ones(1))
+    assert physical._cost(solution, np.array([1.0, 2.0])) == 18 - 2 * (1 - 2)
+
+
+def test_held_and_bound_coefficients_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.6, 0.8, 1e-4], [0.0, 0.6, 0.8]])
+    theta = np.array([0.9e-9, 0.0, 1.0])
+    monkeypatch.setattr(physical, "_within", lambda *_: (theta, rows))
+    solution = Solution(theta, np.eye(3), theta, np.ones(1))
+    body = arm_of_one([0.0], (True, False))
+
+    def binding() -> int:
+        return physical._kept_positive(
+            solution, body, [[FrictionTerm("viscous")]], np.zeros((1, 1)), None, 1.0
+        )[1]
+
+    # two rows of several coefficients, for the third is one of them but for round-off, and a held coefficient
+    assert binding() == 3
+    theta[0] = 1.1e-9
+    assert binding() == 2
+    rows[2, 2] = 4e-3
+    assert binding() == 3
+
+
+def test_what_is_contradicted_by_more_than_chance_is_kept_at_the_motions_postures_or_not_at_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    theta = np.array([1.0, 2.0])
+    solution = Solution(theta, np.eye(2), theta, np.ones(1))
+    asked: list[int] = []
+
+    def kept(insist: bool = False, memory: float = 1.0, **cost: float) -> str:
+        """So much more squared error over the limits and at the motion's postures, with two conditions."""
+
+        def moved(_: object, body: object, laws: object, q: np.ndarray, rng: object, most: float) -> object:
+            where = "trained" if rng is None else "limits"
+            asked.append(len(q))
+            return theta + np.array([np.sqrt(cost[where]), 0.0]), 2, None
+
+        monkeypatch.setattr(physical, "_kept_positive", moved)
+        return physical_solution(solution, arm_of_one([0.0] * 7), [[]], insist, memory).where
+
+    # by chance in one of a thousand cases more than 13.8 (two degrees of freedom)
+    assert kept(limits=13.7, trained=0.0) == "limits" and asked == [247]
+    assert kept(limits=13.9, trained=13.7) == "trained" and asked[1:] == [247, 7]
+    assert kept(limits=13.9, trained=13.9) == "free"
+    assert kept(insist=True, limits=99.0, trained=99.0) == "limits"
+    # what is said again by samples that are correlated counts once
+    assert kept(memory=10.0, limits=137.0, trained=0.0) == "limits"
+    assert kept(memory=10.0, limits=139.0, trained=0.0) == "trained"
+
+
+def test_postures_that_are_alike_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    places = np.array([[-0.9], [-0.81], [-0.79], [0.5], [0.6]])
+    values = np.array([-2.0, -1.0, -0.5, 0.0, 0.1])
+    monkeypatch.setattr(physical, "lowest", lambda mass, low, high, q, v, rng, starts: (values, places))
+    found = physical._violated(arm_of_one([0.0]), np.ones(2), np.zeros((1, 2)), np.random.default_rng(0))
+    # nearer than a twentieth of the range, 2 rad; M = 0 is no mass matrix either
+    assert found[:, 0].tolist() == [-0.9, -0.79, 0.5]
+    values += 1.0
+    assert physical._violated(
+        arm_of_one([0.0]), np.ones(2), np.zeros((1, 2)), np.random.default_rng(0)
+    ).tolist() == [[-0.9]]
+    values += 1.5
+    assert physical._violated(
+        arm_of_one([0.0]), np.ones(2), np.zeros((1, 2)), np.random.default_rng(0)
+    ).shape == (0, 1)
