@@ -1,8 +1,13 @@
 """Laws that an arm had all along are found in its training data, with their parameters; a bare arm has none."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +17,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.cli import main
 from armloop.data.log import MotionLog, write_log
 from armloop.data.motion import Motion
-from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
+from armloop.identification.reconstruction import Options, Reconstruction, catalogue, reconstruct
 from armloop.model import load_model
 
 Array = NDArray[np.float64]
@@ -106,8 +111,6 @@ def test_the_residual_alone_does_not_show_what_base_parameters_soak_up(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What a search of the residual would take the coupling for is a part of what it is."""
-    from armloop.identification.reconstruction import catalogue
-
     whole = made([coupled]).held_out.moving["nrmse"]
     monkeypatch.setattr(catalogue, "permanent", lambda arm: [])
     without = made([coupled])
@@ -142,3 +145,154 @@ def test_the_model_with_a_law_is_a_model(tmp_path: Path, capsys: pytest.CaptureF
     np.testing.assert_allclose(
         extra, model.effects[0].torque(model.context(motion))[100], rtol=1e-9, atol=1e-9
     )
+
+
+class TestSearch:
+    """Effects whose trials are given: by name, shape and what is chosen already."""
+
+    @staticmethod
+    def effect(
+        name: str, complexity: int = 1, shapes: tuple[float, ...] = (0.0,), plausible: bool = True
+    ) -> Any:
+        return SimpleNamespace(
+            place=(name, 1, None),
+            complexity=complexity,
+            needs_model=False,
+            shapes=lambda context: shapes,
+            estimates=lambda arm, coefficients, covariance, shape: (coefficients, shape),
+            plausible=lambda arm, estimates: plausible and estimates == ("of it", shapes[-1]),
+            label=lambda: name,
+        )
+
+    @staticmethod
+    def trial(removed: float, share: float = 0.5, **of: Any) -> Any:
+        judged = {"score": 99.0, "blocks": 9, "everywhere": True} | of
+        return SimpleNamespace(removed=removed, share=share, coefficients="of it", covariance=None, **judged)
+
+    def found(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        effects: list[Any],
+        trials: Callable[[str, float, list[str]], Any],
+    ) -> list[tuple[str, float, float]]:
+        class Columns:
+            def __init__(self, arm: Any, samples: Any) -> None:
+                self.context = None
+
+            def raw(self, effect: Any, shape: float) -> np.ndarray:
+                return np.ones((1, 1, 2))
+
+            def smoothed(self, effect: Any, shape: float) -> Any:
+                return effect.place[0], shape
+
+        def bench(laws: Any) -> Any:
+            taken = [law.effect.place[0] for law in laws]
+            return SimpleNamespace(trial=lambda columns, new, worth: trials(*columns, taken))
+
+        monkeypatch.setattr(catalogue, "permanent", lambda arm: effects)
+        monkeypatch.setattr(catalogue, "_Columns", Columns)
+        nothing: Any = None
+        laws = catalogue.search(nothing, nothing, bench, nothing, lambda text: None)
+        assert laws.tried == len([e for e in effects if not e.needs_model])
+        return [(law.effect.place[0], law.shape, law.gain) for law in laws.chosen]
+
+    def test_the_simplest_of_those_that_remove_nine_tenths_of_the_most(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made = [self.effect("rich", 3), self.effect("plain", 1), self.effect("even", 1)]
+        for plain, best in ((90.0, "even"), (89.0, "even"), (92.0, "plain")):
+            removed = {"rich": 100.0, "plain": plain, "even": 91.0}
+            found = self.found(
+                monkeypatch,
+                made,
+                lambda name, shape, taken, of=removed: None if taken else self.trial(of[name]),
+            )
+            assert found == [(best, 0.0, 0.5)]
+        removed = {"rich": 100.0, "plain": 90.0, "even": 80.0}
+        first = self.found(
+            monkeypatch, made, lambda name, shape, taken: None if taken else self.trial(removed[name])
+        )
+        assert first == [("plain", 0.0, 0.5)]
+        removed["plain"] = 89.0
+        first = self.found(
+            monkeypatch, made, lambda name, shape, taken: None if taken else self.trial(removed[name])
+        )
+        assert first == [("rich", 0.0, 0.5)]
+
+    def test_one_after_the_other_at_most_six_each_once(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        made = [self.effect(name) for name in "abcdefgh"]
+        found = self.found(
+            monkeypatch, made, lambda name, shape, taken: self.trial(ord(name), len(taken) + 1.0)
+        )
+        assert found == [(name, 0.0, k + 1.0) for k, name in enumerate("hgfedc")]
+
+    def test_the_shape_that_removes_most_of_at_most_eight(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        eight = tuple(float(k) for k in range(8))
+        made = [self.effect("eight", 1, eight), self.effect("nine", 1, (*eight, 8.0))]
+        trials = lambda name, shape, taken: None if shape == 0 else self.trial(shape)  # noqa: E731
+        assert self.found(monkeypatch, made, trials) == [("eight", 7.0, 0.5)]
+
+    def test_it_must_be_plausible_and_its_coefficients_its_parameters(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made = [self.effect("impossible", plausible=False), self.effect("asks")]
+        made[1].needs_model = True
+        assert self.found(monkeypatch, made, lambda name, shape, taken: self.trial(1.0)) == []
+
+    def test_it_must_remove_more_than_chance_among_so_many_everywhere(self) -> None:
+        # Student's t of four degrees of freedom exceeds 13.0337 in one of ten thousand cases, of eight 4.5008 in a thousand
+        worth = catalogue.is_worth
+        assert worth(self.trial(1.0, score=13.04, blocks=5), 10) and worth(self.trial(1.0, score=4.51), 1)
+        assert not worth(self.trial(1.0, score=13.03, blocks=5), 10) and not worth(
+            self.trial(1.0, score=4.5), 1
+        )
+        assert worth(self.trial(1.0, 0.051), 10) and not worth(self.trial(1.0, 0.05), 10)
+        assert not worth(self.trial(1.0, everywhere=False), 10)
+        assert not worth(self.trial(1.0, score=0.0, blocks=1), 10)  # one block tells nothing
+
+    def test_what_the_others_leave_nothing_to_goes_the_last_first(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(
+            catalogue.Laws, "columns", lambda self, arm, samples: self.chosen[0].effect.place[0]
+        )
+        chosen = [catalogue.Law(self.effect(name), 0.0, 1) for name in "abc"]
+        nothing: Any = None
+
+        def left(of: Callable[[str, list[str]], Any]) -> str:
+            def bench(laws: Any) -> Any:
+                return SimpleNamespace(trial=lambda name: of(name, [law.effect.place[0] for law in laws]))
+
+            return "".join(
+                law.effect.place[0]
+                for law in catalogue.pruned(catalogue.Laws(chosen, 10), bench, nothing, nothing).chosen
+            )
+
+        assert left(lambda name, others: self.trial(1.0)) == "abc"
+        assert left(lambda name, others: None if name == "b" else self.trial(1.0)) == "ac"
+        # b and c stand for each other: the later goes
+        assert (
+            left(lambda name, others: None if {"b", "c"} & set(others) and name in "bc" else self.trial(1.0))
+            == "ab"
+        )
+        assert left(lambda name, others: self.trial(1.0, 0.05 if name == "a" else 0.5)) == "bc"
+        assert left(lambda name, others: None) == ""
+
+    def test_what_acts_alike_on_several_joints_is_filtered_once(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        x = np.arange(6.0).reshape(3, 2)
+        raw = np.stack([0 * x, x, -x, 2 * x, x], axis=1)
+        filtered: list[int] = []
+
+        def smooth(samples: Any, columns: np.ndarray) -> np.ndarray:
+            filtered.append(len(columns))
+            return columns + 1
+
+        monkeypatch.setattr(catalogue, "smooth", smooth)
+        samples: Any = SimpleNamespace(motion=None, period=0.01)
+        effect: Any = SimpleNamespace(full_columns=lambda context, shape: raw)
+        nothing: Any = None
+        made = catalogue._Columns(nothing, samples).smoothed(effect, 0.0)
+        np.testing.assert_array_equal(made, np.stack([0 * x, x + 1, -x - 1, 2 * x + 1, x + 1], axis=1))
+        assert len(filtered) == 2

@@ -214,7 +214,7 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
 
 def is_worth(trial: Trial, tried: int) -> bool:
     """Whether a law removes enough, and more than chance would for the best of so many, by blocks and in every fold."""
-    enough = float(student.isf(_CHANCE / max(tried, 1), max(trial.blocks - 1, 1)))
+    enough = float(student.isf(_CHANCE / tried, trial.blocks - 1))  # no number of one block: nothing exceeds it
     return trial.share > WORTH and trial.score > enough and trial.everywhere
 
 
