@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from synthetic import three_axis
 
+from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
 
 
@@ -66,10 +67,17 @@ class TestLawThatIsNotListed:
     def test_of_fewer_parameters_a_law_that_leaves_significantly_less_is_enough(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        leads = iter((3.1, 2.9))
-        monkeypatch.setattr(unlisted, "lead_of", lambda *sums: next(leads))
+        leads, seen = iter((3.1, 3.0)), []
+
+        def lead_of(*sums: np.ndarray) -> float:
+            seen.append([each.tolist() for each in sums])
+            return next(leads)
+
+        monkeypatch.setattr(unlisted, "lead_of", lead_of)
         assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "bare"
         assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "effects"
+        # squares of what is left, by blocks of two rows each, and how many rows those are
+        np.testing.assert_allclose(seen[0], [[50, 50], [45, 45], [2, 2]])
 
     def test_what_was_named_at_a_joint_is_asked_even_if_it_leaves_what_the_baseline_does(
         self, monkeypatch: pytest.MonkeyPatch
@@ -116,6 +124,7 @@ class TestLawThatIsNotListed:
         assert verdict(111.0, named, []) == "law at joint 2" and asked == [1]
         assert verdict(109.0, named, []) == "effects" and asked == [1]  # not half of what they leave
         assert verdict(99.0, named, []) == "effects" and asked == []  # less than the baseline
+        assert verdict(100.0, named, []) == "effects" and asked == []
         assert verdict(111.0, named, [], "v2") == "effects"  # dry and viscous friction are listed
         # an effect of the whole arm goes with them: a law of one joint cannot take its place
         assert verdict(111.0, [*named, arm], []) == "effects" and asked == []
@@ -137,3 +146,119 @@ class TestLawThatIsNotListed:
         after = SimpleNamespace(stacked=SimpleNamespace(joint=np.zeros(0)))
         nothing: Any = SimpleNamespace(found=[], after=after)
         assert unlisted.find_law(evidence, nothing, lambda text: None) == (None, nothing)
+
+    def test_a_richer_library_for_fewer_joints(self) -> None:
+        """Waves of so many times an angle in all, of so many joints at most, and products of two speeds."""
+        chosen = [unlisted._library((True,) * n) for n in range(1, 9)]
+        assert [(each.N1, each.together) for each in chosen] == [
+            *[(3, None)] * 3,
+            (3, 2),
+            *[(3, 1)] * 2,
+            *[(2, 1)] * 2,
+        ]
+        assert {(each.N2, each.second) for each in chosen} == {(2, "velocity")}
+
+    @staticmethod
+    def moving(N: int = 3000) -> tuple[Any, Any, np.ndarray]:
+        """Evidence of two joints of which every other sample of joint 2 counts; its rows, weighed by 1/4 N·m."""
+        rng = np.random.default_rng(3)
+        given = Motion(np.arange(float(N)), *rng.uniform(-2, 2, (3, N, 2)), np.array([0]))
+        rows = np.ones((N, 2), dtype=bool)
+        rows[1::2, 1] = False
+        arm = SimpleNamespace(revolute=np.array([True, True]))
+        evidence = SimpleNamespace(
+            rows=rows,
+            samples=SimpleNamespace(motion=given),
+            model=SimpleNamespace(arm=arm),
+            scale=np.full(2, 0.25),
+        )
+        joint = np.nonzero(rows)[1]
+        sample = np.nonzero(rows)[0]
+        block = sample // 30
+        stacked = SimpleNamespace(joint=joint, fold=block % unlisted.FOLDS, block=block, cell=block)
+        after = SimpleNamespace(stacked=stacked, held_out=np.full(len(joint), 99.0))
+        return evidence, after, rng.standard_normal(N // 2)
+
+    def test_a_law_is_what_every_fold_chooses_with_what_it_leaves_on_the_others(self) -> None:
+        evidence, after, noise = self.moving()
+        motion, mine = evidence.samples.motion, after.stacked.joint == 1
+        q, v = motion.q[::2].T, motion.v[::2].T
+        told = 3.0 * v[1] ** 3 - 2.0 * np.cos(q[0]) * np.sign(v[1])
+        after.held_out[mine] = told + 0.1 * noise
+        law = unlisted._law(evidence, after, 1)
+        found = {name: (b, error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
+        assert set(found) == {"v2^3", "cos(q1)*sign(v2)"}
+        X = np.stack([v[1] ** 3, np.cos(q[0]) * np.sign(v[1])], axis=1)
+        # blocks and cells, which are the same here, count for what each shows
+        errors = 0.1 * np.sqrt(2 * np.diag(np.linalg.inv(X.T @ X)))
+        for name, value, error in zip(("v2^3", "cos(q1)*sign(v2)"), (3.0, -2.0), errors, strict=True):
+            assert abs(found[name][0] - value) < 4 * error
+            assert found[name][1] == pytest.approx(error, rel=0.2)
+        # what is left is what was not fitted there: more than if it had been, and hardly more
+        fitted = float(np.linalg.lstsq(X, after.held_out[mine], rcond=None)[1][0])
+        assert fitted < law.energy < 1.01 * fitted
+        assert unlisted._law(evidence, after, 1).form(0.25).count("*v2^3") == 1
+        # half of the energy must go
+        for part, is_law in ((0.9, True), (1.1, False)):
+            after.held_out[mine] = told + part * np.sqrt(np.mean(told**2) / np.mean(noise**2)) * noise
+            law = unlisted._law(evidence, after, 1)
+            assert bool(law.terms) == is_law
+        assert law.left.tolist() == after.held_out[mine].tolist() and len(law.errors) == 0
+
+    def test_at_most_four_functions_make_a_law(self) -> None:
+        evidence, after, noise = self.moving()
+        motion, mine = evidence.samples.motion, after.stacked.joint == 1
+        q, v = motion.q[::2].T, motion.v[::2].T
+        five = [4 * v[1], 4 * v[0], 4 * np.sin(q[0]), 4 * np.cos(2 * q[1]), 0.3 * v[0] * v[1]]
+        after.held_out[mine] = sum(five) + 0.01 * noise
+        law = unlisted._law(evidence, after, 1)
+        assert {name for _, name in law.terms} == {"v1", "v2", "sin(q1)", "cos(2*q2)"}
+
+    @pytest.mark.parametrize(
+        ("before", "left", "lead", "follows"),
+        [(2.0, 0.999, 3.1, True), (2.0, 0.9, 3.0, False), (2.0, 1.001, 3.1, False), (0.999, 0.0, 3.1, False)],
+    )
+    def test_a_residual_follows_a_law_that_explains_enough_significantly(
+        self, before: float, left: float, lead: float, follows: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of ten rows in five blocks; enough are ten."""
+        seen: list[Any] = []
+
+        def lead_of(*sums: np.ndarray) -> float:
+            seen.extend(each.tolist() for each in sums)
+            return lead
+
+        monkeypatch.setattr(unlisted, "lead_of", lead_of)
+        monkeypatch.setattr(unlisted, "enough", lambda evidence, score: np.array([0.0, 10.0]))
+        law = unlisted._Law([], np.full(10, np.sqrt(left)))
+        monkeypatch.setattr(unlisted, "_law", lambda evidence, after, j: law)
+        stacked = SimpleNamespace(joint=np.repeat([0, 1], 10), block=np.arange(20) // 2)
+        held_out = np.repeat([9.0, np.sqrt(before)], 10)
+        after: Any = SimpleNamespace(stacked=stacked, held_out=held_out, score=None)
+        nothing: Any = None
+        assert unlisted._follows_a_law(nothing, after, 1) == follows
+        if seen:
+            np.testing.assert_allclose(seen, [[2 * before] * 5, [2 * left] * 5, [2] * 5])
+
+    def test_it_is_stated_in_torques_with_the_range_of_its_samples_and_of_others(self) -> None:
+        ends = np.zeros(2), np.ones(2)
+        given = Motion(np.arange(3.0), *np.zeros((3, 3, 2)), np.array([0]))
+        given.q[:] = [[1.0, -5.0], [9.0, 9.0], [2.0, -7.0]]
+        given.v[:] = [[0.1, 0.3], [9.0, 9.0], [-0.1, 0.2]]
+        arm: Any = SimpleNamespace(n=2, joints=[SimpleNamespace(position_unit="rad", torque_unit="N*m")] * 2)
+        law = unlisted.found_law(arm, 2, {"v2": (2.0, 0.1)}, *zip(ends, ends, strict=True))
+        rows = np.array([[True, True], [True, False], [True, True]])
+        evidence: Any = SimpleNamespace(
+            rows=rows,
+            samples=SimpleNamespace(motion=given),
+            model=SimpleNamespace(arm=arm),
+            scale=np.array([9.0, 4.0]),
+        )
+        mine = unlisted._Law([(0.5, "v2")], np.zeros(0), np.array([0.25]))
+        stated = unlisted._parameters(evidence, mine, 1)
+        assert (stated["v2"].value, stated["v2"].std_error, stated["v2"].unit) == (2.0, 1.0, "N*m*s/rad")
+        wider = unlisted.Unlisted(2, 1.0, 1.0, "", 1.0, law).over(evidence).parameters
+        assert wider["v2"] == law["v2"]
+        ends_of = {"q_low": [1.0, -7.0], "q_high": [2.0, -5.0], "v_low": [-0.1, 0.2], "v_high": [0.1, 0.3]}
+        assert {key: wider[key].value for key in ends_of} == ends_of
+        assert {key: stated[key].value for key in ends_of} == ends_of

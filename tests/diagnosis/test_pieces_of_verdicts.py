@@ -410,6 +410,17 @@ class TestWhatIsLeft:
         assert left(fit(np.full(50, 2.01), np.full(50, 1.99))) == 0
         assert left(fit(np.full(50, 1.99), np.full(50, 2.5))) == 1
         assert left(fit(np.full(50, 2.1), np.full(50, 2.5))) == 1
+        # as large as the baseline's limit is not beyond it; in the units of its spread
+        assert left(fit(np.full(50, 2.0), np.full(50, 2.0))) is None
+        evidence.variation[:] = 4.0, 0.5
+        assert left(fit(np.full(50, 3.9), np.full(50, 1.42)), 5.0) == 1
+        assert left(fit(np.full(50, 4.1), np.full(50, 1.41)), 5.0) == 0
+        evidence.variation[:] = 1.0
+        # what has no memory is noise
+        monkeypatch.setattr(unlisted, "_lasting", lambda *_: 0.5)
+        assert left(fit(np.full(50, 2.7), np.full(50, 2.7))) is None
+        assert left(fit(np.full(50, 2.9), np.full(50, 2.7))) == 0
+        monkeypatch.setattr(unlisted, "_lasting", lambda *_: 1.0)
         assert left(fit(np.full(49, 3.0), np.full(50, 1.0))) is None
         # less than three hundredths of what there was is what effects leave
         assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.031)) == 0

@@ -1,17 +1,22 @@
 """The corner of the low-pass follows the noise and the speed of the data, judged on one torque for all corners."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.cli import main
+from armloop.data.filters import LowPass, filter_reach
 from armloop.data.log import MotionLog, read_log, write_log
-from armloop.data.signals import Conditioning
+from armloop.data.signals import Conditioning, preprocess
+from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import bandwidth, reconstruct
-from armloop.identification.reconstruction.bandwidth import Table, choose_bandwidth
+from armloop.identification.reconstruction.bandwidth import Bandwidth, Table, choose_bandwidth
 from armloop.identification.reconstruction.options import Options
 from armloop.model import load_model
 from armloop.robot.arm import load_arm
@@ -132,3 +137,163 @@ def test_a_block_is_judged_with_what_the_blocks_beside_it_showed_alone() -> None
     left = bandwidth._held_out(table)
     rows = instants * joints / 2
     np.testing.assert_allclose(left**2, 1 + columns / (rows - columns - 1), rtol=0.25)
+
+
+class TestPieces:
+    @pytest.fixture
+    def compared(self, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+        """What is chosen where the regressions at the corners leave so much of 2 N·m (joints 1 and 2) and 4 (joint 3)."""
+
+        def chosen(
+            left: list[list[float]], counted: tuple[int, ...] = (100, 100, 100), seconds: float = 40
+        ) -> Any:
+            moving = np.arange(100)[:, None] < np.array(counted)
+            tables = iter(range(len(left)))
+            asked: list[float] = []
+
+            def table_at(
+                logs: Any, arm: Any, base: Any, how: Any, corner: float, corners: Any, aside: Any
+            ) -> Any:
+                asked.append(corner)
+                k = next(tables)
+                return replace(
+                    Table(
+                        np.full(1, k), np.tile([2.0, 2.0, 4.0], (100, 1)), np.zeros(100, dtype=int), moving
+                    ),
+                    moving=moving if k == 0 else ~moving,
+                )
+
+            def held_out(table: Table) -> Any:
+                assert (table.moving == moving).all()  # the same samples at every corner
+                return np.array(left[int(table.columns[0])])
+
+            monkeypatch.setattr(bandwidth, "table_at", table_at)
+            monkeypatch.setattr(bandwidth, "_held_out", held_out)
+            found = choose_bandwidth([run(seconds=seconds)], three_axis(), TEN_HZ)
+            assert asked in ([10.0, 7.1, 5.0, 3.5, 2.5], [])
+            return found
+
+        return chosen
+
+    def test_the_highest_corner_whose_error_is_within_two_hundredths_of_the_least(
+        self, compared: Callable[..., Any]
+    ) -> None:
+        even = [[0.2, 0.2, 0.4]] * 4
+        for excess, corner in ((1.019, 10.0), (1.021, 7.1)):
+            assert compared([[0.2 * excess, 0.2 * excess, 0.4 * excess], *even]).cutoff_hz == corner
+        # the geometric mean over joints, each by its own torque
+        found = compared([[0.2, 0.8, 0.4], *even])
+        assert [error for _, error in found.trials] == pytest.approx([0.1 * 4 ** (1 / 3), *[0.1] * 4])
+        assert [corner for corner, _ in found.trials] == [10.0, 7.1, 5.0, 3.5, 2.5]
+        # a joint without error has one of round-off
+        found = compared([[0.0, 0.2, 0.4], *even])
+        assert found.trials[0][1] == pytest.approx((1e-12 * 0.1 * 0.1) ** (1 / 3))
+
+    def test_joints_of_fewer_than_a_hundred_samples_do_not_count(self, compared: Callable[..., Any]) -> None:
+        worse = [[0.4, 0.2, 0.4], *[[0.2, 0.2, 0.4]] * 4]
+        assert compared(worse).cutoff_hz == 7.1
+        assert compared(worse, (99, 100, 100)).cutoff_hz == 10.0
+        assert compared(worse, (99, 99, 99)) == Bandwidth(10.0)
+
+    def test_a_log_lasts_more_than_four_periods_of_the_lowest_corner(
+        self, compared: Callable[..., Any]
+    ) -> None:
+        # 4 / 2.5 Hz
+        even = [[0.2, 0.2, 0.4]] * 5
+        assert compared(even, seconds=1.61).trials == () and len(compared(even, seconds=1.62).trials) == 5
+
+    def test_a_library_keeps_a_lower_corner_of_its_own(self) -> None:
+        assert Bandwidth(5.0).suited(TEN_HZ).cutoff_hz == 5.0
+        assert Bandwidth(5.0).suited(replace(TEN_HZ, cutoff_hz=4.0)).cutoff_hz == 4.0
+        assert Bandwidth(5.0).notes() == []
+
+    def test_some_of_many_logs_are_looked_at_and_of_each_its_longest_run(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
+        nothing: Any = [SimpleNamespace(samples=0)] * 2
+        assert bandwidth._selected(nothing) == [0, 1]
+        for each, picked in (
+            (60, [0]),
+            (59, [0, 9]),
+            (30, [0, 9]),
+            (10, [0, 1, 3, 5, 7, 9]),
+            (6, list(range(10))),
+        ):
+            logs: Any = [SimpleNamespace(samples=each)] * 10
+            assert bandwidth._selected(logs) == picked
+        q = 0.01 * np.arange(100.0)[:, None]
+        time = np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0)
+        log = MotionLog(time, q, q, q)
+        assert len(log.runs()) == 2
+        (one,) = bandwidth.even_selection([log])
+        assert one.q.tolist() == q[30:90].tolist()
+        several = bandwidth.even_selection([log] * 3)
+        assert [len(part.q) for part in several] == [60 // len(several)] * len(several)
+
+    def test_a_corner_stays_below_half_of_the_sample_rate(self) -> None:
+        log = run(seconds=2.0)
+        bandwidth.check_nyquist([log], 49.99)
+        with pytest.raises(LogError):
+            bandwidth.check_nyquist([log], 50 - 1e-5)
+        assert bandwidth.highest_corner([log, run(seconds=2.0, rate=20.0)], TEN_HZ) == 8.0
+        assert bandwidth.highest_corner([log], TEN_HZ) == 10.0
+
+    def test_the_root_mean_square_of_nothing_is_none(self) -> None:
+        assert bandwidth.root_mean_square(np.zeros(0)) == 0.0
+        assert bandwidth.root_mean_square(np.array([3.0, -4.0])) == pytest.approx(np.sqrt(12.5))
+
+
+def test_what_is_regressed_at_a_corner() -> None:
+    log, arm = run(seconds=10.0), three_axis()
+    base = BaseParameters.of_arm(arm, rotors=True)
+    aside = [np.array([[4.0, 5.0]])]
+    table = bandwidth.table_at([log], arm, base, TEN_HZ, 10.0, [10.0, 2.5], aside)
+    samples = preprocess([log], replace(TEN_HZ, oversampling=1e9))
+    motion = samples.motion
+    # from where the lowest corner smears nothing in that is not there, by a sample more
+    margin = filter_reach(2.5) + 0.01
+    elapsed = motion.time - log.time[0]
+    used = (
+        (elapsed > margin)
+        & (elapsed < 9.99 - margin)
+        & ((motion.time < 4 - margin) | (motion.time > 5 + margin))
+    )
+    assert table is not None
+    np.testing.assert_array_equal(table.tau, samples.tau[used])
+    v, N = motion.v[used], int(used.sum())
+    assert table.columns.shape == (N, 3, base.count + 9)
+    faded = np.sign(motion.v) * (1 - np.exp(-((motion.v / 0.01) ** 2)))
+    for j in range(3):
+        own = base.count + 3 * j
+        np.testing.assert_allclose(
+            table.columns[:, j, own], LowPass(10.0, samples.period)(faded)[used, j], atol=1e-9
+        )
+        np.testing.assert_array_equal(table.columns[:, j, own + 1], v[:, j])
+        assert (table.columns[:, j, own + 2] == 1).all()
+        others = np.delete(table.columns[:, j, base.count :], slice(3 * j, 3 * j + 3), axis=1)
+        assert not others.any()
+    blocks = (motion.time[used] - motion.time[used][0]).astype(int)
+    np.testing.assert_array_equal(table.blocks, blocks)
+    np.testing.assert_array_equal(table.moving, np.abs(v) > 0.05 * np.abs(v).max(axis=0))
+    twice = bandwidth.table_at([log, log], arm, base, TEN_HZ, 10.0, [10.0, 2.5], aside * 2)
+    assert twice is not None
+    np.testing.assert_array_equal(twice.blocks, np.concatenate([blocks, blocks + blocks[-1] + 1]))
+
+
+def test_many_samples_are_thinned_to_the_same_instants_at_every_corner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, arm = run(seconds=10.0), three_axis()
+    base = BaseParameters.of_arm(arm, rotors=True)
+    whole = bandwidth.table_at([log], arm, base, TEN_HZ, 10.0, [10.0])
+    # 1000 samples of three joints: every third instant
+    monkeypatch.setattr(bandwidth, "_ROWS", 1000)
+    thin = [bandwidth.table_at([log], arm, base, TEN_HZ, corner, [10.0, 5.0]) for corner in (10.0, 5.0)]
+    assert whole is not None and thin[0] is not None and thin[1] is not None
+    offset = np.flatnonzero((whole.tau == thin[0].tau[0]).all(axis=1))[0]
+    np.testing.assert_array_equal(thin[0].tau, whole.tau[offset::3][: len(thin[0].tau)])
+    assert len(thin[0].tau) == len(thin[1].tau)
+    np.testing.assert_allclose(
+        thin[0].columns[:, 0, base.count + 1], thin[1].columns[:, 0, base.count + 1], atol=0.2
+    )

@@ -1,0 +1,71 @@
+"""Events of one run: what a push adds while it lasts, per unit of its size, and when it cannot have been."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.laws.effects import Context, effect
+from armloop.laws.effects.events import during
+from armloop.robot.kinematics import tool_jacobian
+
+
+def context(seconds: int = 5) -> Context:
+    q = np.random.default_rng(0).uniform(-1, 1, (seconds, 3))
+    return Context(three_axis(), Motion(np.arange(float(seconds)), q, 0 * q, 0 * q, np.array([0])))
+
+
+def test_a_torque_acts_on_its_joint_while_it_lasts() -> None:
+    torque, given = effect("external_torque", 2), context()
+    tau = torque.torque(given, {"start": 1.0, "end": 3.0, "torque": -2.0})
+    assert np.array_equal(tau, np.outer([0, -2, -2, -2, 0], [0, 1, 0]))
+    assert np.array_equal(torque.full_columns(given, 0.0)[:, :, 0], np.outer(np.ones(5), [0, 1, 0]))
+    found = torque.estimates(given.arm, np.array([3.0, 4.0]), np.diag([0.25, 9.0]), 0.0)["torque"]
+    assert (found.value, found.std_error, found.unit) == (3.0, 0.5, "N*m")
+    assert torque.estimates(given.arm, np.ones(1), np.array([[-1e-20]]), 0.0)["torque"].std_error == 0.0
+
+
+def test_a_force_on_a_link_acts_on_the_joints_before_it() -> None:
+    contact, given = effect("external_contact", None), context()
+    for link in (0, 2):
+        columns = contact.columns(given, float(link))
+        jacobian = tool_jacobian(given.arm, given.motion.q, link or None)
+        for axis in range(3):
+            np.testing.assert_array_equal(columns[:, :, axis], -jacobian[:, axis])
+        force = {"start": 1.0, "end": 2.0, "force": [1.0, -2.0, 3.0], **({"link": link} if link else {})}
+        tau = contact.torque(given, force)
+        np.testing.assert_allclose(tau[1:3], columns[1:3] @ [1.0, -2.0, 3.0], atol=1e-12)
+        assert not tau[[0, 3, 4]].any() and tau[1:3].any()
+    assert not contact.columns(given, 2.0)[:, 2].any()
+    found = contact.estimates(given.arm, np.arange(3.0), np.diag([4.0, 9.0, -1e-20]), 0.0)["force"]
+    assert (found.value, found.std_error, found.unit) == ([0.0, 1.0, 2.0], [2.0, 3.0, 0.0], "N")
+
+
+@pytest.mark.parametrize("name", ["external_torque", "external_contact"])
+def test_an_event_ends_after_it_began(name: str) -> None:
+    fault = effect(name, 1 if name == "external_torque" else None).fault
+    assert (
+        fault({"start": 1.0, "end": 1.0}) == fault({"start": 2.0, "end": 1.0}) == "end must come after start"
+    )
+    assert fault({"start": 1.0, "end": 1.1}) == ""
+
+
+def test_an_event_is_of_the_log_that_stood_there_when_it_began() -> None:
+    """Two runs with the same clock; the second's postures are a millionth and a half away."""
+    time, q = np.array([0.0, 1.0, 2.0] * 2), np.zeros((6, 2))
+    q[:, 1] = [0.0, 0.5, 1.0, 1.5e-6, 0.5 + 1.5e-6, 1.0 + 1.5e-6]
+    given = Motion(time, q, 0 * q, 0 * q, np.array([0, 3]))
+
+    def rows(start: float, end: float, *posture: float) -> list[int]:
+        value: dict = {"start": start, "end": end} | ({"posture": list(posture)} if posture else {})
+        return np.flatnonzero(during(given, value)).tolist()
+
+    assert rows(1.0, 2.0) == [1, 2, 4, 5] and rows(0.1, 1.9) == [1, 4]
+    assert rows(1.0, 2.0, 0.0, 0.5) == [1, 2] and rows(1.0, 1.0, 0.0, 0.5 + 2e-6) == [4]
+    assert rows(1.2, 2.0, 0.0, 0.5) == [2]  # the posture is that of the nearest sample
+    assert rows(1.0, 2.0, 0.9, 0.5) == []
+    # a start within a millionth of a second of the log's first or last instant
+    assert rows(-0.9e-6, 1.0, 0.0, 0.0) == [0, 1] and rows(-1.1e-6, 1.0, 0.0, 0.0) == []
+    assert rows(2.0 + 0.9e-6, 3.0, 0.0, 1.0) == [] and rows(2.0 - 0.9e-6, 3.0, 0.0, 1.0) == [2]
