@@ -224,7 +224,7 @@ class TestPieces:
             assert bandwidth._selected(logs) == picked
         q = 0.01 * np.arange(100.0)[:, None]
         time = np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0)
-        log = MotionLog(time, q, q, q)
+        log = MotionLog(time, q, np.full_like(q, 0.01), q)
         assert len(log.runs()) == 2
         (one,) = bandwidth.even_selection([log])
         assert one.q.tolist() == q[30:90].tolist()

@@ -214,7 +214,8 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
 
 def is_worth(trial: Trial, tried: int) -> bool:
     """Whether a law removes enough, and more than chance would for the best of so many, by blocks and in every fold."""
-    enough = float(student.isf(_CHANCE / tried, trial.blocks - 1))  # no number of one block: nothing exceeds it
+    # of a single block it is no number, which nothing exceeds
+    enough = float(student.isf(_CHANCE / tried, trial.blocks - 1))
     return trial.share > WORTH and trial.score > enough and trial.everywhere
 
 
