@@ -1,6 +1,7 @@
 """Motions and torques within limits, judged by Drake's inverse dynamics."""
 
 import dataclasses
+import types
 
 import numpy as np
 import pytest
@@ -8,14 +9,15 @@ from exact_model import ExactModel
 from exact_parts import model_of
 from numpy.testing import assert_allclose
 
+from armloop.drake.control import bounded_feedforward
 from armloop.drake.control.bounded_feedforward import bounded_reference
 from armloop.drake.control.bounded_program import TOLERANCE
 from armloop.drake.experiments.scenarios import load_plant, load_tracking
 from armloop.drake.experiments.tracking import run_tracking
 from armloop.drake.plant.exact import exact_model
 from armloop.dynamics import Dynamics
-from armloop.experiment.excitation import MotionRanges, fourier_reference, places_reference
-from armloop.laws.friction import FrictionTerm
+from armloop.experiment.excitation import MotionRanges, TableReference, fourier_reference, places_reference
+from armloop.laws.friction import Direction, FrictionTerm
 from armloop.robot.arm import load_arm
 from armloop.util.errors import InputError, ScenarioError
 
@@ -168,3 +170,76 @@ def test_friction_that_is_not_linear_in_the_speed_is_in_the_torques(kind):
     slides = (np.abs(state[1]) > 0.1) & (np.abs(reference.evaluate(knots)[1]) > 0.1)
     error = np.abs(bounded.torques - dynamics.torque(*state))[slides]
     assert error.max() < 2e-3 * asked.max()
+
+
+class TestLinearised:
+    """Torques, their derivatives and friction, of equations that are written down here."""
+
+    @staticmethod
+    def equations(**of):
+        def rigid(q, v, vdot):
+            return [q[0] ** 2 + 3 * v[1] + 2 * vdot[0], q[0] * q[1] - v[0] * v[1] + 5 * vdot[1]]
+
+        given = {"rigid": rigid, "load_matters": False, "load": None, "dry_and_smooth": lambda *_: []}
+        return types.SimpleNamespace(**(given | of))
+
+    def test_derivatives_by_position_velocity_and_acceleration(self):
+        q, v, vdot = np.array([[1.0, 2.0]]), np.array([[3.0, 4.0]]), np.array([[5.0, 6.0]])
+        tau, J = bounded_feedforward._derivatives(self.equations(), q, v, vdot)
+        assert tau.tolist() == [[1 + 12 + 10, 2 - 12 + 30]]
+        assert_allclose(J[0], [[[2.0, 0.0], [2.0, 1.0]]], atol=1e-8)
+        assert_allclose(J[1], [[[0.0, 3.0], [-4.0, -3.0]]], atol=1e-8)
+        assert_allclose(J[2], [[[2.0, 0.0], [0.0, 5.0]]], atol=1e-8)
+
+    def test_dry_friction_its_level_and_where_its_sign_is_open(self):
+        def laws(q, v, load):
+            first = Direction(0, 1, -0.5), np.array([2.0, 2.0, 2.0, 2.0]), 0.0
+            return [first, (Direction(1), np.abs(load[1]), 0.0)]
+
+        equations = self.equations(
+            load_matters=True, load=lambda q, v, vdot: [q[0], v[0] + vdot[1]], dry_and_smooth=laws
+        )
+        v = np.array([[1.0, 0.1], [0.1, 1.0], [0.52, 0.93], [0.0, -0.049]])
+        dry, level, slow = bounded_feedforward._dry_friction(equations, 0 * v, v, 0 * v + 1.0)
+        load = v[:, 0] + 1
+        # v1 - v2 / 2 is 0.95, -0.4, 0.055 and 0.0245
+        sign = np.array([1, -1, 1, 1])
+        assert_allclose(dry, np.stack([2 * sign, -sign + load * [1, 1, 1, -1]], axis=1))
+        assert_allclose(level, np.stack([0 * load + 2, 1 + load], axis=1))
+        assert slow.tolist() == [[False, False], [False, False], [False, False], [True, True]]
+
+    def test_smooth_friction_is_a_straight_line_where_it_is_slow(self):
+        along = Direction(0, 1, -0.5)
+        equations = self.equations(dry_and_smooth=lambda q, v, load=None: [(along, None, along.of(v) ** 3)])
+        v = np.array([[1.0, 0.4], [0.02, 0.4], [0.05, 0.4]])
+        tau, slope = bounded_feedforward._smooth_friction(equations, 0 * v, v)
+        w = 1.0 - 0.2
+        assert_allclose(tau[0], [w**3, -0.5 * w**3], atol=1e-8)
+        rate = 3 * w**2
+        assert_allclose(slope[0], [[rate, -0.5 * rate], [-0.5 * rate, 0.25 * rate]], atol=1e-6)
+        # between -0.05 and 0.05 rad/s of the first joint: w from -0.25 to -0.15
+        rate = ((-0.15) ** 3 - (-0.25) ** 3) / 0.1
+        line = (-0.25) ** 3 + rate * (-0.18 + 0.25)
+        assert_allclose(tau[1], [line, -0.5 * line], atol=1e-12)
+        assert_allclose(slope[1], [[rate, -0.5 * rate], [-0.5 * rate, 0.25 * rate]], atol=1e-12)
+        assert slope[2, 0, 0] == pytest.approx(3 * 0.15**2, abs=1e-6)
+
+
+def test_friction_that_alone_takes_the_limit_is_refused():
+    arm = load_arm("three_axis")
+    model = model_of(arm, friction=(FrictionTerm("sign", 0.5),))
+    reference = fourier_reference(MotionRanges.of(arm), 1.0, 2)
+    for effort, told in ((0.5, "dry friction alone takes them"), (0.501, "limits")):
+        with pytest.raises(InputError, match=told) as error:
+            bounded_reference(reference, model, np.array([500.0, 500.0, effort]))
+        assert ("alone" in str(error.value)) == (effort == 0.5)
+        assert f"limits [500.0, 500.0, {effort}]" in str(error.value)
+
+
+def test_between_knots_torques_are_linear():
+    time = np.array([0.0, 1.0, 2.0])
+    still = np.zeros((3, 2))
+    deviation = TableReference(time, still, still, still)
+    torques = np.array([[0.0, 4.0], [2.0, 0.0], [4.0, 8.0]])
+    bounded = bounded_feedforward.BoundedReference(deviation, deviation, torques)
+    assert bounded.torque([0.5, 1.25]).tolist() == [[1.0, 2.0], [2.5, 2.0]]
