@@ -346,6 +346,12 @@ class TestReversals:
         assert (best.effect.name, best.rivals) == (rich, [])
         assert self.best((rich, 1, 0.80), (rich, 2, 0.9)).effect.joint == 2
 
+    def test_a_kind_is_sure_at_one_joint_alone_only_there(self) -> None:
+        gains, chance = _Gains({}, {}, set()), np.array([1.0, -1.0, 1.0, -1.0, 0.5])
+        spring = effect("joint_spring", 1)
+        gains.take(spring, {0: _Gain(0.9, self.SURE), 1: _Gain(0.9, chance)})
+        assert gains._sure(spring, 0) and not gains._sure(spring, 1)
+
     def test_drives_are_alike(self) -> None:
         # few reversals of one joint tell little, those of two together tell enough
         few = np.array([0.6, 1.0, 1.4])

@@ -177,6 +177,11 @@ def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
 
     first, same, later = contact(2.0, 3.0, 0.7), contact(2.2, 3.1, 0.9), contact(5.0, 6.0, 0.6)
     assert _distinct(motion, [first, same, later]) == [same, later]
+    # what lies within a long one is it, however short; what shares half of the shorter is another
+    within, half = contact(2.4, 2.6, 0.5), contact(3.04, 4.0, 0.5)
+    assert _distinct(motion, [same, within]) == [same]
+    assert _distinct(motion, [half, contact(2.56, 3.48, 0.9)])[1:] == [half]
+    assert _distinct(motion, [half, contact(2.56, 3.52, 0.9)])[1:] == []
 
 
 def test_a_model_is_unsure_where_its_mass_matrix_is_not_symmetric(model: ReconstructedModel) -> None:

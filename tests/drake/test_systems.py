@@ -6,8 +6,10 @@ from exact_parts import model_of
 from numpy.testing import assert_allclose
 from pydrake.systems.framework import DiagramBuilder
 
+from armloop.drake.control.computed_torque import ComputedTorque
 from armloop.drake.control.feedforward import Feedforward
 from armloop.drake.control.pid import PidController, PidGains
+from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceSource
 from armloop.drake.experiments.closed_loop import add_arm_with_controller
 from armloop.drake.plant.nearest_friction import nearest_friction
@@ -102,3 +104,17 @@ def test_a_controlled_arm_of_a_urdf_has_the_friction_of_its_model(repository):
     true = 0.4 + 0.3 * np.exp(-((v / 0.1) ** 2)) + 0.2 * np.sqrt(v) + v
     for near in nearest_friction(model_of(load_arm(urdf), friction=other)):
         assert np.abs(near.force(v) - true).max() < 0.05 * true.max()
+
+
+def test_what_is_sampled_is_sampled_from_the_start():
+    model, gains = model_of(load_arm("three_axis")), PidGains([80.0] * 3, [8.0] * 3, [2.0] * 3)
+    systems = [
+        PidController(gains, 0.5),
+        ComputedTorque(model, gains, period=0.5),
+        RateLimiter(np.ones(3), np.ones(3), 0.5),
+        ReferenceSource(paper_reference(), 0.5),
+    ]
+    for system in systems:
+        timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
+        if timing is not None:
+            assert (timing.period_sec(), timing.offset_sec()) == (0.5, 0.0), type(system)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armloop.regression.moments import Moments, total
+from armloop.regression.moments import Moments, total, unit_length
 
 SIZES = np.array([1.0, 1e3, 1e-3, 5.0, 0.2, 40.0])
 
@@ -102,3 +102,8 @@ def test_an_error_of_nothing_is_not_negative():
         ]
         assert min(found) >= 0.0
         assert max(found) < 1e-9 * moments.yy
+
+
+def test_columns_of_given_squares_are_made_one_long():
+    assert unit_length(np.array([4.0, 0.01, 1e-300])).tolist() == pytest.approx([0.5, 10.0, 1e150])
+    assert np.isfinite(unit_length(np.zeros(1))).all()

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
+from armloop.regression.moments import unit_length
 from armloop.util.arrays import Array
 
 #: Rows c of new constraints c·θ ≥ 0 that θ violates; empty if there is none.
@@ -52,7 +53,7 @@ def constrained_least_squares(
     """
     # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
     # In coordinates z = Lᵀθ with G = LLᵀ the cost is ‖z − z₀‖²: as well conditioned as it can be.
-    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+    scale = unit_length(np.diag(G))
     L = np.linalg.cholesky(G * np.outer(scale, scale) + 1e-12 * np.eye(len(b)))
     target = solve_triangular(L, scale * b, lower=True)
     free = float(np.sum((L.T @ (start / scale) - target) ** 2))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import LinAlgError, eigh
 
+from armloop.regression.moments import unit_length
 from armloop.util.arrays import Array
 
 #: Least share of signal in any direction of the columns.
@@ -28,7 +29,7 @@ def corrected(G: Array, G_exact: Array, b_exact: Array) -> Array | None:
     """
     if len(b_exact) == 0:
         return np.zeros(0)
-    scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+    scale = unit_length(np.diag(G))
     size = np.outer(scale, scale)
     try:
         shares = eigh(G_exact * size, G * size, eigvals_only=True)

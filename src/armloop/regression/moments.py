@@ -52,7 +52,7 @@ class Moments:
         sub = self if columns is None else self.take(columns)
         if len(sub.b) == 0:
             return np.zeros(0)
-        scale = 1 / np.sqrt(np.maximum(np.diag(sub.G), 1e-300))
+        scale = unit_length(np.diag(sub.G))
         G = sub.G * np.outer(scale, scale)
         ridge = 1e-13 * len(G)
         factor = cho_factor(G + ridge * np.eye(len(G)), check_finite=False)
@@ -69,7 +69,7 @@ class Moments:
         size, b = np.diag(self.G)[others], self.b[others]
         if len(support) == 0:
             return self.yy, b**2 / np.maximum(size, 1e-300)
-        scale = 1 / np.sqrt(np.maximum(np.diag(self.G)[support], 1e-300))
+        scale = unit_length(np.diag(self.G)[support])
         S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
         L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
         # One small inverse and a product: a search asks thousands of times, and solving takes several times longer.
@@ -82,7 +82,7 @@ class Moments:
 
     def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
         """Squared error of a support, and by how much dropping each of its columns alone would raise it."""
-        scale = 1 / np.sqrt(np.maximum(np.diag(self.G)[support], 1e-300))
+        scale = unit_length(np.diag(self.G)[support])
         S = self.G[np.ix_(support, support)] * np.outer(scale, scale) + 1e-12 * np.eye(len(support))
         inverse = np.linalg.inv(S)
         beta = inverse @ (scale * self.b[support])
@@ -92,6 +92,11 @@ class Moments:
         """Σ (y − x β)² for given coefficients; round-off can make it slightly negative, so it is clipped."""
         sub = self if columns is None else self.take(columns)
         return max(0.0, sub.yy - 2 * float(beta @ sub.b) + float(beta @ sub.G @ beta))
+
+
+def unit_length(squares: Array) -> Array:
+    """(p,) factors that make columns of these squared lengths (p,) one long; finite for a column of nothing."""
+    return np.asarray(1 / np.sqrt(np.maximum(squares, 1e-300)))
 
 
 def total(parts: Iterable[Moments]) -> Moments:

@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from armloop.identification.reconstruction.joint_sums import JointSums
 from armloop.laws.friction import FrictionTerm
-from armloop.regression.moments import Moments, total
+from armloop.regression.moments import Moments, total, unit_length
 from armloop.util.arrays import Array
 
 #: For every joint the candidates of its friction that are used, by their place.
@@ -198,7 +198,7 @@ class Pooled:
         return G, b
 
     def _solved(self, G: Array, b: Array, choice: Choice) -> Array:
-        scale = 1 / np.sqrt(np.maximum(np.diag(G), 1e-300))
+        scale = unit_length(np.diag(G))
         G, b = G * np.outer(scale, scale), scale * b
         G[np.diag_indices(len(b))] += _ROUND_OFF
         bound = np.zeros(len(b), dtype=bool)

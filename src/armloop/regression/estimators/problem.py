@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from armloop.regression.moments import DEPENDENT, Moments, total
+from armloop.regression.moments import DEPENDENT, Moments, total, unit_length
 from armloop.util.arrays import Array, Index
 
 
@@ -91,7 +91,7 @@ class Reduction:
         size, onto = np.diag(G).copy(), np.zeros((len(forced), len(free)))
         if len(forced):
             F = moments.G[np.ix_(forced, forced)]
-            d = 1 / np.sqrt(np.maximum(np.diag(F), 1e-300))
+            d = unit_length(np.diag(F))
             L = np.linalg.cholesky(F * np.outer(d, d) + 1e-12 * np.eye(len(F)))
             H = solve_triangular(L, d[:, None] * moments.G[np.ix_(forced, free)], lower=True)
             h = solve_triangular(L, d * moments.b[forced], lower=True)
