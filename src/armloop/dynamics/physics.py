@@ -16,9 +16,10 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.dynamics.consistent import are_bodies, scales
+from armloop.dynamics.definite import MassTerms, Proof, prove_definite
 from armloop.features.lagrangian import gravity_sees_first_joint
 from armloop.model import ReconstructedModel
-from armloop.model.components import RigidBody
+from armloop.model.components import Lagrangian, RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
 from armloop.util.arrays import Array
@@ -35,8 +36,9 @@ _NOTABLE = 0.01
 _ROUND_OFF = 1e-9
 #: A mass matrix beside the links' that is the same at so many postures is the same at all.
 _FEW = 20
-#: What proves M(q) positive definite.
+#: What proves M(q) positive definite: of a rigid body, and of the terms of a Lagrangian.
 BODIES = "links and rotors that can exist (positive definite pseudo-inertias)"
+BOXES = "bounds on boxes of postures that cover the joint limits (branch and bound)"
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class PhysicsChecks:
         yaw: root mean square change of the torques by a turn of the first joint, relative to the torques'; None
             where the first axis is not vertical.
         certificate: why M(q) is positive definite at every posture; empty where that is not proven, only tried.
+        proven: part of the volume of postures on which it is proven; 1 with a certificate.
     """
 
     least: float
@@ -65,6 +68,7 @@ class PhysicsChecks:
     driving_at: tuple[float, ...]
     yaw: float | None
     certificate: str = ""
+    proven: float = 0.0
 
     @property
     def definite(self) -> bool:
@@ -119,6 +123,7 @@ class PhysicsChecks:
                 "least_eigenvalue": self.least,
                 "at": list(self.least_at),
                 "certificate": self.certificate or None,
+                "share_proven": self.proven,
                 "share_not_positive": self.negative,
                 "asymmetry": self.asymmetry,
                 "asymmetry_at": list(self.asymmetry_at),
@@ -132,8 +137,10 @@ class PhysicsChecks:
 def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     """Try a model's mass matrix, friction and yaw at random postures within the joint limits.
 
-    The smallest eigenvalue is searched from the worst postures on, too (:func:`lowest`). Friction is tried up to the
-    speeds that the model was fitted on (one rad/s if it does not say): joint after joint alone, and all joints at once.
+    The smallest eigenvalue is searched from the worst postures on, too (:func:`lowest`); where none is found that is not
+    positive, it is proven that there is none, if the model is of a kind that lets it
+    (:mod:`armloop.dynamics.consistent`, :mod:`armloop.dynamics.definite`). Friction is tried up to the speeds that the
+    model was fitted on (one rad/s if it does not say): joint after joint alone, and all joints at once.
 
     Args:
         seed: of the postures and motions.
@@ -146,7 +153,19 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     tilt = np.linalg.norm(M - M.transpose(0, 2, 1), axis=(1, 2)) / np.maximum(
         np.linalg.norm(M, axis=(1, 2)), 1e-300
     )
-    values, postures = lowest(lambda q: mass_matrix(model, q), low, high, q, least, rng)
+
+    def mass(q: Array) -> Array:
+        return mass_matrix(model, q)
+
+    values, postures = lowest(mass, low, high, q, least, rng)
+    certificate, proof = _certificate(model, q[:_FEW], M[:_FEW]), None
+    if values[0] > 0 and not certificate:
+        proof = _proof(model, q[:_FEW], M[:_FEW], low, high)
+    if proof is not None and proof.indefinite is not None:
+        met = proof.indefinite[None]
+        values, postures = lowest(mass, low, high, met, _least(mass(met)), rng)
+    elif proof is not None and proof.complete:
+        certificate = BOXES
     driving, speeds = _driving(model, low, high, rng)
     return PhysicsChecks(
         least=float(values[0]),
@@ -156,7 +175,8 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
         asymmetry_at=_tuple(q[int(np.argmax(tilt))]),
         driving=_tuple(driving),
         driving_at=_tuple(speeds),
-        certificate=_certificate(model, q[:_FEW], M[:_FEW]),
+        certificate=certificate,
+        proven=1.0 if certificate else proof.share if proof is not None else 0.0,
         yaw=None if gravity_sees_first_joint(arm) or not arm.revolute[0] else _yaw(model, low, high, rng),
     )
 
@@ -238,10 +258,26 @@ def _certificate(model: ReconstructedModel, q: Array, M: Array) -> str:
     own = scales(model.arm, full[: 10 * n], nominal_parameters(model.arm))
     if not are_bodies(np.concatenate([full[: 10 * n] / own, full[10 * n :]]), n):
         return ""
-    rest = M - mass_matrix(replace(model, effects=()), q)
-    size = _ROUND_OFF * float(np.abs(M).max())
-    constant = np.abs(rest - rest[0]).max() <= size
-    return BODIES if constant and _least(rest[:1])[0] >= -size else ""
+    rest = _same_everywhere(M - mass_matrix(replace(model, effects=()), q), M)
+    return BODIES if rest is not None and _least(rest[None])[0] >= -_ROUND_OFF * np.abs(M).max() else ""
+
+
+def _proof(model: ReconstructedModel, q: Array, M: Array, low: Array, high: Array) -> Proof | None:
+    """How much of the limits has a positive definite M(q); None where it is no sum of few functions of the posture."""
+    if len(model.components) != 1 or not isinstance(model.components[0], Lagrangian):
+        return None
+    body = model.components[0]
+    rest = _same_everywhere(M - body.mass_matrix(q), M)
+    return (
+        None
+        if rest is None
+        else prove_definite(MassTerms.of(body.energy, body.coefficients, rest), low, high)
+    )
+
+
+def _same_everywhere(rest: Array, M: Array) -> Array | None:
+    """(n, n) what is in M (P, n, n) beside the links, if that is the same at all postures."""
+    return rest[0] if np.abs(rest - rest[0]).max() <= _ROUND_OFF * np.abs(M).max() else None
 
 
 def _least(M: Array) -> Array:

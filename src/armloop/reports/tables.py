@@ -20,6 +20,7 @@ from armloop.reports.words import (
 
 if TYPE_CHECKING:  # what makes the results need not be loaded to print them
     from armloop.drake.experiments.tracking import TrackingResult
+    from armloop.dynamics import PhysicsChecks
     from armloop.identification.goodness import Parts
     from armloop.identification.reconstruction import StepReport
     from armloop.identification.reconstruction.libraries import Contender
@@ -149,7 +150,7 @@ def libraries_table(libraries: Sequence[Contender], title: str | None = "Librari
                 name,
                 percent(one.error),
                 one.coefficients,
-                f"{checks.least:.3g} (proven positive)" if checks.certificate else checks.least,
+                _least(checks),
                 percent(checks.asymmetry),
                 f"drives joint {', '.join(drives)}" if drives else "passive",
                 MISSING if checks.yaw is None else percent(checks.yaw),
@@ -165,6 +166,15 @@ def libraries_table(libraries: Sequence[Contender], title: str | None = "Librari
         "torque by yaw",
     ]
     return make_table(headers, rows, title)
+
+
+def _least(checks: PhysicsChecks) -> str | float:
+    """The smallest eigenvalue of M that was found, and how far it is proven that none is negative."""
+    if checks.certificate:
+        return f"{checks.least:.3g} (proven positive)"
+    if checks.definite and checks.proven:
+        return f"{checks.least:.3g} (searched; proven positive on {checks.proven:.0%} of the postures)"
+    return checks.least
 
 
 def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") -> Table:

@@ -28,6 +28,7 @@ from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
 from armloop.identification.reconstruction.stepwise import stepwise
 from armloop.model import ReconstructedModel
 from armloop.regression.sparse import Sparse
+from armloop.reports.tables import libraries_table
 from armloop.robot.arm import Arm
 from armloop.util.errors import ExcitationError, InputError
 from armloop.util.progress import silent
@@ -82,6 +83,18 @@ def test_all_three_are_compared_and_the_report_says_so(result: Reconstruction) -
         assert one["coefficients"] > 10 and len(one["selection_nrmse"]) == 3
         assert {"passed", "mass_matrix", "friction", "yaw", "faults"} <= set(one["physics"])
     assert check_physics(result.model).passed and answer[1]["physics"]["passed"]
+
+
+def test_the_table_says_how_far_a_positive_mass_matrix_is_proven() -> None:
+    found = {
+        0.0: "0.0300",
+        0.937: "0.03 (searched; proven positive on 94% of the postures)",
+        1.0: "0.03 (proven positive)",
+    }
+    for share, said in found.items():
+        checks = replace(GOOD, least=0.03, certificate="why" if share == 1 else "", proven=share)
+        rows = str(libraries_table([entry("a", 0.01, 9, checks)])).splitlines()
+        assert any(f"  {said}  " in row for row in rows), rows
 
 
 def test_what_is_no_arm_is_not_taken_however_little_it_leaves() -> None:
