@@ -107,14 +107,15 @@ def _deviation(x: Array, snr: float, noise: str, whole: Array) -> Array:
 
 
 def _along_trajectories(experiment: Experiment, seed: int, trajectories: int = 10) -> MotionLog:
+    """One run after the other, each stamped with its own time: v is to be the rate of q, as in any log."""
     count = experiment.counts[STEPS.index("step3")]
     parts = []
     for k in range(trajectories):
         reference = fourier_reference(experiment.ranges, 20.0, 1000 * seed + k)
         share = count // trajectories + (k < count % trajectories)
-        parts.append(reference.evaluate(np.linspace(2.0, 20.0, share)))
-    q, v, vdot = (np.concatenate(column) for column in zip(*parts, strict=True))
-    time = np.arange(float(count))
+        instants = np.linspace(2.0, 20.0, share)
+        parts.append((100.0 * k + instants, *reference.evaluate(instants)))
+    time, q, v, vdot = (np.concatenate(column) for column in zip(*parts, strict=True))
     tau = experiment.torque(Motion(time, q, v, vdot, np.array([0])))
     return MotionLog(time, q, v, tau, vdot, name="varying")
 

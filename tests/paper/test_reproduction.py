@@ -18,6 +18,7 @@ from armloop_paper.lasso import TOLERANCE, duality_gap, lasso
 from armloop_paper.methods import one_shot, stepwise
 from armloop_paper.noise_study import least_counts
 from armloop_paper.outcome import Outcome
+from armloop_paper.paper import SCARA_SNR, THREE_AXIS_SNR
 from armloop_paper.readings import READINGS, Reading, collected
 from armloop_paper.sorting_motion import sorting_motion
 from armloop_paper.spread import in_words, spread
@@ -113,6 +114,18 @@ def test_noise_has_the_stated_ratio():
         np.testing.assert_allclose(np.mean(noise**2, axis=0), reference / 100, rtol=0.1)
         assert noisy["static"].v.any() == (how == "record")
         np.testing.assert_array_equal(noisy["varying"].tau, exact["varying"].tau)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "snr"), [(SCARA, SCARA_SNR), *((THREE_AXIS, snr) for snr in THREE_AXIS_SNR.values())]
+)
+def test_every_reading_draws_logs_that_an_arm_can_have_made(experiment, snr):
+    """The checks of a log hold for them, too: an item that tries all readings must not end at one of them."""
+    for reading in {(one.noise, one.sampling): one for one in READINGS}.values():
+        logs = collected(experiment, snr, 0, reading)
+        assert [log.samples for log in logs.values()] == list(experiment.counts)
+    apart = next(one for one in READINGS if one.sampling == "trajectories")
+    assert len(collected(experiment, None, 0, apart)["varying"].runs()) == 10
 
 
 def test_stepwise_is_exact_without_noise_and_penalty():
