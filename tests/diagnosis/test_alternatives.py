@@ -14,7 +14,9 @@ from armloop.laws.effects import effect
         (("torque_offset", 2), ("friction_asymmetry", 2), "no motion tells them apart"),
         # a joint that rubs harder one way needs a constant torque, and is mistaken for what a constant is mistaken for
         (("friction_asymmetry", 2), ("joint_spring", 2), "a larger range of the joint"),
+        (("joint_spring", 2), ("friction_asymmetry", 2), "a larger range of the joint"),
         (("gravity_tilt", None), ("friction_asymmetry", 1), "a tilt is a constant"),
+        (("friction_asymmetry", 1), ("gravity_tilt", None), "a tilt is a constant"),
         (("torque_gain", 3), ("torque_offset", 3), "different loads"),
         (("torque_ripple", 1), ("joint_spring", 1), "several periods"),
         # of two joints nothing is known

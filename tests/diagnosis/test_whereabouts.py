@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
+from armloop.diagnosis import whereabouts as places
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.whereabouts import Whereabouts, whereabouts
@@ -49,6 +52,40 @@ def test_what_is_everywhere_is_said_to_be_everywhere(seed: int) -> None:
     assert everywhere.time is None and everywhere.condition == ""
     assert everywhere.words() == "it is found all over the run, under no condition above all"
     assert everywhere.to_dict() == {"time": None, "condition": "", "share": None}
+
+
+@pytest.mark.parametrize(("low", "share"), [(1.99, 0.801), (2.01, 0.799)])
+def test_energy_beyond_the_baselines_is_what_is_localised(
+    low: float, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of joint 2, ten rows: 3 and -3 baselines, of less than one, and of as much as leaves about a fifth."""
+    left = np.zeros(12)
+    left[1:11] = [3.0, -3.0, 0.9, -0.9, 0.0, 0.0, 0.0, 0.0, 1.0, low]
+    left[[0, 11]] = 99.0
+    joint = np.array([0, *[1] * 10, 2])
+    stacked = SimpleNamespace(joint=joint, block=np.arange(12))
+    first, second = np.arange(10) < 4, np.arange(10) >= 4
+    conditions = [("none", np.zeros(10, dtype=bool)), ("first", first), ("second", second)]
+    monkeypatch.setattr(places, "_halves", lambda evidence, rows, joint: conditions)
+    seen: list = []
+    monkeypatch.setattr(places, "_stretch", lambda *of: seen.append(of))
+    rows = np.ones((12, 3), dtype=bool)
+    rows[[0, 11], 1] = False
+    evidence: Any = SimpleNamespace(
+        rows=rows, samples=SimpleNamespace(motion=SimpleNamespace(time=np.arange(12.0)))
+    )
+    fitted: Any = SimpleNamespace(held_out=left, stacked=stacked)
+    given = whereabouts(evidence, fitted, 1)
+    energy = [8, 8, 0, 0, 0, 0, 0, 0, 0, low**2 - 1]
+    time, block, found = seen[0]
+    np.testing.assert_allclose(found, energy)
+    assert time.tolist() == block.tolist() == list(range(1, 11))
+    assert given.share == pytest.approx(16 / sum(energy))
+    left[9:11] = 0.0, np.sqrt(1 + 16 * (1 - share) / share)
+    given = whereabouts(evidence, fitted, 1)
+    assert given.share == pytest.approx(share) and given.condition == ("first" if share > 0.8 else "")
+    left[:] = 0.5
+    assert whereabouts(evidence, fitted, 1).share == 0.0
 
 
 def test_the_words_name_both() -> None:

@@ -5,12 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from operation import healthy_model
+from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
+from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, MatrixGain, RandomSource
 
 from armloop.drake import AdaptiveFeedforward, ResidualMonitor
+from armloop.drake.experiments import watched_run
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.watched_run import run_watched
 from armloop.drake.plant.fault_injection import UndeclaredEffect
@@ -128,3 +130,41 @@ def test_an_effect_that_cannot_begin_is_refused(scenario) -> None:
             plant.CreateDefaultContext(),
             [UndeclaredEffect("gravity_tilt", None, {"roll": 0.1, "pitch": 0.0})],
         )
+
+
+def test_the_monitor_is_given_torques_with_the_noise_of_the_instruments(
+    scenario, model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class BuiltError(Exception):
+        pass
+
+    def built(diagram) -> None:
+        raise BuiltError
+
+    sources, gains = [], []
+
+    def source(distribution, size, period):
+        sources.append((distribution, size, period))
+        return RandomSource(distribution, size, period)
+
+    def gain(matrix):
+        gains.append(matrix)
+        return MatrixGain(matrix)
+
+    monkeypatch.setattr(watched_run, "RandomSource", source)
+    monkeypatch.setattr(watched_run, "MatrixGain", gain)
+    monkeypatch.setattr(watched_run, "Simulator", built)
+    instruments = dataclasses.replace(scenario.plant.config.instruments, torque_noise=0.02)
+    config = dataclasses.replace(scenario.plant.config, instruments=instruments)
+    noisy = dataclasses.replace(scenario, plant=dataclasses.replace(scenario.plant, config=config))
+    for adapt in (True, False):
+        gains.clear()
+        with pytest.raises(BuiltError):
+            run_watched(noisy, model, [], 8.0, adapt=adapt)
+        speeds, noise, integral, supplied = gains
+        np.testing.assert_array_equal(speeds, np.hstack([np.zeros((3, 3)), np.eye(3)]))
+        np.testing.assert_allclose(noise, np.diag(0.02 * np.array([1.5, 5.0, 1.5])))
+        np.testing.assert_array_equal(integral, np.diag(scenario.gains.ki))
+        np.testing.assert_array_equal(supplied, np.eye(3) if adapt else np.zeros((3, 3)))
+    # a new number every tenth step: the motion's own corner lies far below that
+    assert sources[0] == (RandomDistribution.kGaussian, 3, 10 * config.time_step)

@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
-from armloop.identification.reconstruction import reconstruct
+from armloop.identification.reconstruction import reconstruct, torque_checks
+from armloop.identification.reconstruction.bandwidth import Table
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.robot.arm import load_arm
 from armloop.util.errors import LogError
@@ -70,3 +73,160 @@ def test_measured_arms_are_not_accused_and_their_faults_are_found(measured: Path
         if j:
             with pytest.raises(LogError, match=rf"columns tau{j} and tau{j + 1} are exchanged"):
                 check_torques([exchanged(log, j - 1, j, "tau")], arm, 8.0)
+
+
+class Fits(torque_checks._Problem):
+    """Fits that are given: by the joints whose sign is turned, by their order, and by the half of the blocks."""
+
+    def __init__(self, **fits: torque_checks._Fit) -> None:
+        object.__setattr__(self, "fits", fits)
+
+    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks._Fit:
+        turned = "".join(str(j + 1) for j in np.flatnonzero(signs < 0))
+        name = f"half_{half}" if half is not None else f"turned_{turned}"
+        if (order != np.arange(len(order))).any():
+            name = "order_" + "".join(str(j + 1) for j in order)
+        return self.fits.get(name, fit_of([0.5, 0.5], [-1.0, -1.0], [-1.0, -1.0]))  # type: ignore[attr-defined]
+
+
+def fit_of(relative: list[float], power: list[float], inertia: list[float]) -> torque_checks._Fit:
+    return torque_checks._Fit(np.array(relative), np.array(power), np.array(inertia))
+
+
+GOOD = [1.0, 1.0]
+
+
+class TestTurnedSigns:
+    PLAIN = fit_of([0.5, 0.5], [-0.1, 0.1], [-1.0, 1.0])
+
+    @pytest.mark.parametrize(
+        ("error", "power", "halves", "turned"),
+        [
+            # the joint alone explains its torque twice as well, and its friction brakes
+            (0.249, 0.51, False, True),
+            (0.251, 0.51, False, False),
+            (0.249, 0.49, True, False),
+            # or both halves of the blocks say that it drives, and nothing is worse than by a hundredth
+            (0.4, 0.51, True, True),
+            (0.4, 0.51, False, False),
+            (0.509, 0.51, True, True),
+            (0.511, 0.51, True, False),
+        ],
+    )
+    def test_a_joint_whose_sign_is_turned(
+        self, error: float, power: float, halves: bool, turned: bool
+    ) -> None:
+        other = fit_of([error, 0.5], [power, 0.1], GOOD)
+        half = self.PLAIN if halves else fit_of([0.5, 0.5], [0.1, 0.1], [-1.0, 1.0])
+        fits = Fits(turned_1=other, half_0=self.PLAIN, half_1=half)
+        assert fits.turned(self.PLAIN) == ([0] if turned else [])
+        assert Fits(half_0=self.PLAIN, half_1=self.PLAIN).turned(self.PLAIN) == []
+
+    def test_a_fit_that_is_good_for_nothing_accuses_nobody(self) -> None:
+        for error, turned in ((0.59, [0]), (0.61, [])):
+            plain = fit_of([2.0, 2.0], [-0.1, 0.1], [-1.0, 1.0])
+            fits = Fits(turned_1=fit_of([error, 2.0], [0.6, 0.1], GOOD), half_0=fit_of([2.0] * 2, GOOD, GOOD))
+            assert fits.turned(plain) == turned
+
+    def test_what_gains_most_is_turned(self) -> None:
+        plain = fit_of([0.5, 0.5], [-0.1, -0.1], [-1.0, -1.0])
+        one, both = fit_of([0.2, 0.5], [0.6, 0.1], GOOD), fit_of([0.2, 0.4], [0.6, 0.6], GOOD)
+        assert Fits(turned_1=one, turned_12=both, half_0=plain, half_1=plain).turned(plain) == [0, 1]
+        both = fit_of([0.3, 0.4], [0.6, 0.6], GOOD)
+        assert Fits(turned_1=one, turned_12=both, half_0=plain, half_1=plain).turned(plain) == [0]
+
+    def test_no_friction_neither_brakes_nor_drives_and_no_inertia_is_none(self) -> None:
+        none = fit_of([0.1, 0.1], [0.0, 0.0], [1.0, 0.0])
+        assert none.physical([0]) and not none.physical([0, 1]) and not none.driven([1])
+        assert fit_of([0.1], [0.0], [-1.0]).driven([0]) and not fit_of([0.1], [0.1], [-1.0]).driven([0])
+
+
+class TestExchanges:
+    def test_columns_are_exchanged_if_the_other_way_is_twice_as_good(self) -> None:
+        plain = fit_of([0.9, 0.4], GOOD, GOOD)
+        for relative, power, found in (
+            ([0.55, 0.16], GOOD, [(0, 1)]),  # by a factor of 2.02 in the geometric mean
+            ([0.55, 0.17], GOOD, []),
+            ([0.61, 0.1], GOOD, []),
+            ([0.55, 0.1], [1.0, -1.0], []),
+        ):
+            assert Fits(order_21=fit_of(relative, power, GOOD)).better_exchanged(plain) == found
+        # what is met exactly is met to a part in a billion
+        exact = fit_of([0.0, 0.0], GOOD, GOOD)
+        assert torque_checks._gain(plain, exact, 0, 1) == pytest.approx(np.sqrt(0.9 * 0.4) / 1e-9)
+
+    def test_of_several_pairs_the_best(self) -> None:
+        three = [1.0] * 3
+        plain = fit_of([0.5] * 3, three, three)
+        fits = Fits(
+            order_213=fit_of([0.2, 0.2, 0.5], three, three),
+            order_132=fit_of([0.5, 0.1, 0.1], three, three),
+            order_321=plain,
+        )
+        assert fits.better_exchanged(plain) == [(1, 2)]
+
+    @pytest.mark.parametrize(
+        ("relative", "inertia", "exchanged"),
+        [
+            ([0.39, 0.2], 1.0, True),
+            ([0.45, 0.2], 1.0, False),
+            ([0.61, 0.1], 1.0, False),
+            ([0.39, 0.2], -1.0, False),
+        ],
+    )
+    def test_whole_joints_are_if_all_torques_are_explained_twice_as_well(
+        self, relative: list[float], inertia: float, exchanged: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[MotionLog] = []
+
+        def of(logs: list[MotionLog], arm: object, cutoff_hz: float) -> Fits:
+            asked.extend(logs)
+            return Fits(turned_=fit_of(relative, GOOD, [1.0, inertia]))
+
+        monkeypatch.setattr(torque_checks._Problem, "of", staticmethod(of))
+        q = np.arange(6.0).reshape(3, 2)
+        log = unchecked_log(time=np.arange(3.0), q=q, v=q + 10, tau=q + 20, name="run")
+        arm: Any = SimpleNamespace(n=2)
+        plain = fit_of([0.5, 0.7], GOOD, [-1.0, 1.0])
+        # errors of 0.7 and 0.5, exchanged, in the geometric mean more than twice as much
+        assert torque_checks._whole_joints([log], arm, 10.0, plain, 0, 1) == exchanged
+        assert (asked[0].q == q[:, ::-1]).all() and (asked[0].v == q[:, ::-1] + 10).all()
+        assert (asked[0].tau == q[:, ::-1] + 20).all()
+
+
+def test_errors_friction_and_inertia_of_a_fit() -> None:
+    """Two joints, one base parameter that is an inertia of both, and the friction of each."""
+    rng = np.random.default_rng(0)
+    N = 400
+    v, vdot = rng.normal(size=(2, N, 2))
+    columns = np.zeros((N, 2, 7))
+    for j in range(2):
+        columns[:, j, 0] = vdot[:, j]
+        columns[:, j, 1 + 3 * j : 4 + 3 * j] = np.stack([np.sign(v[:, j]), v[:, j], np.ones(N)], axis=1)
+    noise = 0.1 * rng.normal(size=(N, 2))
+    tau = 2.0 * vdot + noise
+    tau[:, 0] += 0.5 * np.sign(v[:, 0]) - 0.2 * v[:, 0]
+    moving = np.ones((N, 2), dtype=bool)
+    moving[:50, 1] = False
+    table = Table(columns, tau, np.arange(N) // 10, moving)
+    mass = np.zeros((3, 2, 2, 1))
+    mass[:, 0, 0, 0], mass[:, 1, 1, 0] = [1.0, 2.0, 3.0], 5.0
+    problem = torque_checks._Problem(table, mass, 1)
+    found = problem.fit(np.ones(2), np.arange(2))
+    sizes = [np.sqrt(np.mean(tau[rows, j] ** 2)) for j, rows in enumerate(moving.T)]
+    np.testing.assert_allclose(found.relative, 0.1 / np.array(sizes), rtol=0.08)
+    np.testing.assert_allclose(found.inertia, [4.0, 10.0], rtol=0.01)
+    # of Coulomb friction's power against that of the drag that drives
+    brakes, drives = 0.5 * np.abs(v[:, 0]).sum(), 0.2 * (v[:, 0] ** 2).sum()
+    assert found.power[0] == pytest.approx((brakes - drives) / (brakes + drives), abs=0.03)
+    assert found.power[1] == 0.0  # friction of less than a fiftieth of the torque says nothing
+    turned = problem.fit(-np.ones(2), np.arange(2))
+    np.testing.assert_allclose(turned.power, -found.power)
+    np.testing.assert_allclose(turned.inertia, -found.inertia)
+    exchanged = problem.fit(np.ones(2), np.array([1, 0]))
+    assert (exchanged.relative > 0.9).all()
+    # a half of the blocks alone
+    tau[table.blocks % 2 == 1] = 0.0
+    half = problem.fit(np.ones(2), np.arange(2), 0)
+    np.testing.assert_allclose(half.relative, 0.1 / np.array(sizes), rtol=0.1)
+    assert problem.fit(np.ones(2), np.arange(2), 1).relative.tolist() == pytest.approx([0.0, 0.0], abs=1e-6)

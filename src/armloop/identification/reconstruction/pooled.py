@@ -163,7 +163,7 @@ class Pooled:
         r, sizes = self.shared, np.diag(G).copy()
         # what the motion does not show has no size of its own
         sizes[:r] += np.diag(prior.precision)
-        scale = 1 / np.sqrt(np.maximum(sizes, 1e-300))
+        scale = unit_length(sizes)
         precision = prior.precision * np.outer(scale[:r], scale[:r])
         centre = prior.centre / scale[:r]
         posterior, b = G * np.outer(scale, scale), b * scale
