@@ -117,13 +117,23 @@ def test_an_event_gives_way_to_an_unlisted_law_but_not_to_a_residual_without_one
     assert len(accounted(150.0, [event, event], monkeypatch, 0.1, law).contacts) == kept
 
 
-@pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (800.0, 1)])
+@pytest.mark.parametrize(("by_effects", "kept"), [(150.0, 0), (324.0, 0), (326.0, 1), (800.0, 1)])
 def test_effects_that_explain_an_event_must_explain_the_rest_of_the_run_as_well(
     by_effects: float, kept: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Beside an event a law was found that explains the run; without it a drag that explains but what the event did."""
     event = SimpleNamespace(share=0.9)
     assert len(accounted(by_effects, [event, event], monkeypatch, of_event=0.95).contacts) == kept
+
+
+@pytest.mark.parametrize(
+    ("share", "part", "kept"), [(0.9, 0.79, 1), (0.9, 0.8, 0), (0.6, 0.59, 1), (0.6, 0.6, 0)]
+)
+def test_an_event_gives_way_if_four_fifths_of_it_or_its_own_share_are_explained(
+    share: float, part: float, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    event = SimpleNamespace(share=share)
+    assert len(accounted(150.0, [event, event], monkeypatch, of_event=part).contacts) == kept
 
 
 def test_an_event_is_what_it_looks_like_without_the_effects(monkeypatch: pytest.MonkeyPatch) -> None:

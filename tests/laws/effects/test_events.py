@@ -7,8 +7,10 @@ import pytest
 from synthetic import three_axis
 
 from armloop.data.motion import Motion
-from armloop.laws.effects import Context, effect
+from armloop.laws.effects import Context, Estimate, effect
+from armloop.laws.effects.base import Parameter
 from armloop.laws.effects.events import during
+from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import tool_jacobian
 
 
@@ -24,6 +26,8 @@ def test_a_torque_acts_on_its_joint_while_it_lasts() -> None:
     assert np.array_equal(torque.full_columns(given, 0.0)[:, :, 0], np.outer(np.ones(5), [0, 1, 0]))
     found = torque.estimates(given.arm, np.array([3.0, 4.0]), np.diag([0.25, 9.0]), 0.0)["torque"]
     assert (found.value, found.std_error, found.unit) == (3.0, 0.5, "N*m")
+    slide = effect("external_torque", 3).estimates(load_arm("scara"), np.ones(1), np.eye(1), 0.0)
+    assert slide["torque"].unit == "N"
     assert torque.estimates(given.arm, np.ones(1), np.array([[-1e-20]]), 0.0)["torque"].std_error == 0.0
 
 
@@ -69,3 +73,37 @@ def test_an_event_is_of_the_log_that_stood_there_when_it_began() -> None:
     # a start within a millionth of a second of the log's first or last instant
     assert rows(-0.9e-6, 1.0, 0.0, 0.0) == [0, 1] and rows(-1.1e-6, 1.0, 0.0, 0.0) == []
     assert rows(2.0 + 0.9e-6, 3.0, 0.0, 1.0) == [] and rows(2.0 - 0.9e-6, 3.0, 0.0, 1.0) == [2]
+
+
+POSITIVE = {
+    "friction_drift": "level",
+    "joint_spring": "stiffness",
+    "load_dependent_friction": "coefficient",
+    "presliding_hysteresis": "level",
+    "rotor_inertia": "inertia",
+    "stribeck_friction": "static_excess",
+}
+
+
+@pytest.mark.parametrize("name", POSITIVE)
+def test_what_is_found_beside_a_model_is_positive_where_physics_asks_for_it(name: str) -> None:
+    made, arm = effect(name, 1), three_axis()
+    for value, plausible in ((1.0, True), (0.0, False), (-1.0, False)):
+        sizes = {p.name: value if p.name == POSITIVE[name] else 1.0 for p in made.parameters}
+        assert made.plausible(arm, {key: Estimate(x, 0.1, "1") for key, x in sizes.items()}) == plausible
+
+
+def test_what_is_wrong_with_a_parameter_is_told() -> None:
+    number = Parameter("x", "1", above=0.0)
+    assert number.fault(1.0) == "" and number.fault(0.0) == "must be above 0"
+    assert Parameter("x", "1", least=0.0).fault(0.0) == ""
+    assert Parameter("x", "1", least=0.0).fault(-1e-9) == "must not be negative"
+    assert Parameter("x", "1", least=2.0).fault(1.0) == "must not be below 2"
+    for wrong in ([1.0], [1.0, 2.0, 3.0], np.inf, np.nan):
+        assert number.fault(wrong) == "must be one finite number"
+    assert number.fault("much") == "must be a number"
+    three = Parameter("x", "1", size=3, least=0.0)
+    assert three.fault([0.0, 1.0, 2.0]) == "" and three.fault([0.0, -1.0, 2.0]) == "must not be negative"
+    for wrong in (1.0, [1.0, 2.0], [1.0, np.nan, 2.0]):
+        assert three.fault(wrong) == "must be three finite numbers"
+    assert Parameter("x").unit == "1" and Parameter("x").fault(-1e9) == ""
