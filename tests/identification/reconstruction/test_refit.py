@@ -1,6 +1,9 @@
 """Chosen terms are regressed on filtered columns: friction's parameters come back from varying motion alone."""
 
 from dataclasses import replace
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.refit import refit
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.regression.sparse import Sparse
 from armloop_paper.simulated import (
     COULOMB,
@@ -20,6 +24,8 @@ from armloop_paper.simulated import (
     collection,
     true_model,
 )
+
+refits = import_module("armloop.identification.reconstruction.refit")
 
 
 @pytest.fixture(scope="module")
@@ -70,3 +76,49 @@ def test_held_out_samples_are_not_used(varying):
     refit(one, data, Sparse("evidence").how)
     refit(other, Data.of(replace(samples, tau=tau), Options()), Sparse("evidence").how)
     assert one.law == other.law
+
+
+class TestWhatIsKept:
+    """Two joints whose v_s a refit moves by given factors."""
+
+    def refitted(
+        self, monkeypatch: pytest.MonkeyPatch, first: float, second: float, falls: bool = True, **of: Any
+    ) -> tuple[bool, list[float]]:
+        def laws(*speeds: float) -> FrictionLaw:
+            return FrictionLaw(
+                tuple((FrictionTerm("viscous", s), FrictionTerm("stribeck", s, s)) for s in speeds)
+            )
+
+        def solve(before: Any, assembled: Any) -> Any:
+            if of.get("singular"):
+                raise np.linalg.LinAlgError
+            return SimpleNamespace(
+                components=before.components, friction=laws(0.1 * first, 0.1 * second)
+            ), falls
+
+        monkeypatch.setattr(refits, "solve", solve)
+        monkeypatch.setattr(
+            refits,
+            "ReconstructedModel",
+            lambda arm, components, law: SimpleNamespace(components=components, friction=law),
+        )
+        found: Any = SimpleNamespace(arm=None, components=["bodies"], law=laws(0.1, 0.1), regressed_by=None)
+        data: Any = SimpleNamespace(
+            reference=SimpleNamespace(samples=SimpleNamespace(cutoff_hz=of.get("cutoff", 1.0)))
+        )
+        estimator: Any = SimpleNamespace(least_squares=True)
+        done = refit(found, data, estimator)
+        friction = getattr(found, "friction", found.law.terms)
+        return done, [law[1].parameter / 0.1 for law in friction]
+
+    def test_a_joint_whose_stribeck_velocity_runs_away_keeps_what_it_had(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for first, second, kept in ((2.4, 0.41, (2.4, 0.41)), (2.6, 1.5, (1, 1.5)), (1.5, 0.39, (1.5, 1))):
+            assert self.refitted(monkeypatch, first, second) == (True, pytest.approx(kept))
+        assert self.refitted(monkeypatch, 2.6, 0.39) == (False, pytest.approx([1, 1]))
+
+    def test_nothing_changes_where_the_error_would_not_fall(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.refitted(monkeypatch, 1.5, 1.5, falls=False) == (False, [1, 1])
+        assert self.refitted(monkeypatch, 1.5, 1.5, singular=True) == (False, [1, 1])
+        assert self.refitted(monkeypatch, 1.5, 1.5, cutoff=0.0) == (False, [1, 1])

@@ -1,6 +1,9 @@
 """Standard errors reach the model file under the terms' names and do not depend on how samples are cut."""
 
 import json
+from importlib import import_module
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +15,8 @@ from armloop.identification.uncertainty.solving import solve_given_terms
 from armloop.model import load_model
 from armloop.util.errors import ModelError
 from armloop_paper.simulated import Disturbance, collection, true_model
+
+standard = import_module("armloop.identification.uncertainty.standard_errors")
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +85,46 @@ def test_truth_lies_within_a_few_standard_errors(fit):
         found = errors["stribeck"][j]
         for key, value in truth.friction.stribeck_parameters(j).items():
             assert abs(found[key]["value"] - value) < 5 * found[key]["std_error"]
+
+
+def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two joints; regressions of which the second uses but the first half; every other sample of a second one left out."""
+    time = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 9.0])
+    motion = SimpleNamespace(time=time)
+    rows = [np.ones((6, 2), dtype=bool), np.zeros((6, 2), dtype=bool)]
+    rows[0][:, 1] = False
+    rows[1][:3, 1] = True
+    asked: dict[str, Any] = {"covered": []}
+
+    def correlation_time(residual: Any, used: Any, motion: Any, step: float) -> float:
+        asked["step"] = step
+        assert used.tolist() == [[True] * 6, [True] * 3 + [False] * 3][int(residual[0])]
+        return [3.0, 4.0][int(residual[0])]
+
+    def covered_time(time: Any, used: Any) -> float:
+        asked["covered"].append(used.tolist())
+        return [50.0, 20.0][len(asked["covered"]) - 1]
+
+    most = standard.MOST_UNKNOWNS
+    todo = [SimpleNamespace(unknowns=[0] * count) for count in (0, 1, most, most + 1)]
+    monkeypatch.setattr(standard, "problems", lambda model: todo)
+    monkeypatch.setattr(standard, "_residuals", lambda *_: (np.tile([0.0, 1.0], (6, 1)), None))
+    monkeypatch.setattr(standard, "correlation_time", correlation_time)
+    monkeypatch.setattr(standard, "covered_time", covered_time)
+    monkeypatch.setattr(standard, "block_length", lambda correlation, covered: 10 * correlation + covered)
+    monkeypatch.setattr(standard, "independent_blocks", lambda motion, seconds: asked.update(seconds=seconds))
+    sums = SimpleNamespace(covariance=lambda: None, degrees_of_freedom=lambda: None)
+    monkeypatch.setattr(standard, "_equations", lambda *_: sums)
+    model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
+    samples: Any = SimpleNamespace(motion=motion)
+    fitted: Any = [SimpleNamespace(rows=each) for each in rows]
+    found, seconds, correlation = standard.covariances(model, samples, fitted)
+    assert (correlation, seconds, asked["seconds"], asked["step"]) == (4.0, 60.0, 60.0, 0.5)
+    assert asked["covered"] == [[True] * 6, [True] * 3 + [False] * 3]
+    assert [len(each.unknowns) for each in found] == [1, most]
+
+
+def test_errors_are_roots_of_variances_that_rounding_made_no_less_than_none() -> None:
+    nothing: Any = None
+    errors = standard.Errors([], np.diag([4.0, -1e-20, 0.25]), nothing, nothing)
+    assert errors.std_error.tolist() == [2.0, 0.0, 0.5]
