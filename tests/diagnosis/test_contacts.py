@@ -1,0 +1,147 @@
+"""When bursts of a residual are events: their number, their length, and what is known of them already."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import contacts
+from armloop.diagnosis.contacts import Burst
+from armloop.laws.effects import Estimate, effect
+from armloop.model import AddedEffect
+
+
+def motion(lengths: tuple[int, ...] = (100,), joints: int = 2, period: float = 0.1) -> Motion:
+    """Runs of so many samples, 5 s apart."""
+    N, starts = sum(lengths), np.cumsum([0, *lengths[:-1]])
+    time = np.arange(N) * period + 5.0 * (np.searchsorted(starts, np.arange(N), side="right") - 1)
+    return Motion(time, *np.zeros((3, N, joints)), starts)
+
+
+def event(start: float, end: float, name: str = "external_torque") -> AddedEffect:
+    values = {"start": Estimate(start, 0.0, "s"), "end": Estimate(end, 0.0, "s")}
+    return AddedEffect(effect(name, 1), values)
+
+
+def test_an_event_is_of_an_interval() -> None:
+    assert contacts.is_event(event(1.0, 2.0))
+    assert not contacts.is_event(AddedEffect(effect("external_torque", 1), {}))
+    assert not contacts.is_event(event(1.0, 2.0, "joint_spring"))
+
+
+def test_samples_of_events_that_are_known_and_of_new_ones_do_not_count() -> None:
+    """0.3 s beside an event may be its own; a spring is no event."""
+    given = motion((50, 50), period=0.08)
+    known = [event(2.0, 3.0), event(1.0, 2.0, "joint_spring")]
+    rows = np.ones((100, 2), dtype=bool)
+    rows[0, 1] = False
+    kept: list[np.ndarray] = []
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(motion=given),
+        model=SimpleNamespace(effects=known),
+        rows=rows,
+        only=kept.append,
+    )
+    expected = list(range(25 - 3, 37 + 4))
+    assert np.flatnonzero(contacts.known_contacts(evidence)).tolist() == expected
+    new: Any = SimpleNamespace(rows=np.arange(100) >= 95)
+    contacts.without(evidence, [new])
+    gone = [*expected, *range(95, 100)]
+    assert np.flatnonzero(~kept[0][:, 0]).tolist() == gone
+    assert np.flatnonzero(~kept[0][:, 1]).tolist() == [0, *gone]
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "whole"),
+    [(0.11, 9.79, True), (0.09, 9.79, False), (0.11, 9.81, False)],
+)
+def test_an_event_is_seen_to_begin_and_to_end_in_its_run(start: float, end: float, whole: bool) -> None:
+    given = motion((100,))
+    rows = np.zeros(100, dtype=bool)
+    rows[50:60] = True
+    contact: Any = SimpleNamespace(added=event(start, end), rows=rows)
+    assert contacts._seen_whole(given, contact) == whole
+
+
+@pytest.mark.parametrize(
+    ("joints", "own", "other", "sticks"),
+    [({0}, 5, 6, True), ({0}, 6, 6, False), ({0}, 5, 5, False), ({0, 1}, 5, 6, False), ({1}, 5, 6, False)],
+)
+def test_a_joint_sticks_that_slides_for_half_of_a_burst_at_most_while_another_slides_longer(
+    joints: set[int], own: int, other: int, sticks: bool
+) -> None:
+    given = motion()
+    given.v[:] = 1.0
+    given.v[20:30, 0] = np.where(np.arange(10) < own, -0.011, 0.01)
+    given.v[20:30, 1] = np.where(np.arange(10) < other, 0.011, 0.0)
+    model = SimpleNamespace(history={"range": [[1, 1], [1, 1], [1, 1], [0, 0]]})
+    evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given), model=model)
+    assert contacts._sticks(evidence, Burst(slice(20, 30), frozenset(joints))) == sticks
+
+
+class TestFinding:
+    """Joint 1 and joint 2 have bursts where they are given; what is pushed is told of them."""
+
+    def pushed(self, monkeypatch: pytest.MonkeyPatch, *bursts: tuple[int, int, int], **of: Any) -> list[Any]:
+        given, asked = motion(), []
+        innovation = np.zeros((100, 2))
+        innovation[:, 1] = 1.0  # joint 1 tells nothing but where it slides
+
+        def push(evidence: Any, residual: Any, rows: slice, counted: Any, own: list[int]) -> None:
+            asked.append((rows.start, rows.stop, own, counted.sum(axis=0).tolist()))
+
+        by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
+        following = iter(by_joint)
+        monkeypatch.setattr(contacts, "innovations", lambda evidence, residual: (innovation, None))
+        monkeypatch.setattr(contacts, "novelty", lambda *_: (np.arange(100), np.zeros((100, 2))))
+        monkeypatch.setattr(contacts, "known_contacts", lambda evidence: np.arange(100) < of.get("known", 0))
+        monkeypatch.setattr(contacts, "_bursts", lambda *_: next(following))
+        monkeypatch.setattr(
+            contacts, "_comes_back", lambda evidence, rows, level, b: b.rows.start in of.get("back", ())
+        )
+        monkeypatch.setattr(contacts, "_sticks", lambda evidence, b: b.rows.start in of.get("sticks", ()))
+        monkeypatch.setattr(contacts, "_standing_out", lambda motion, rows, level, bursts: bursts)
+        monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
+        monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
+        monkeypatch.setattr(contacts, "push", push)
+        rows = np.full((100, 2), of.get("judged", True))
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=given, moving=None),
+            rows=rows,
+            model=SimpleNamespace(arm=three_axis()),
+        )
+        assert contacts.find_contacts(evidence, np.zeros((100, 2))) == []
+        return asked
+
+    def test_each_is_explained_with_the_samples_that_tell_of_it(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Joint 1 turns round in the first thirty samples: it tells nothing there. Beside another's burst it is left out."""
+        assert self.pushed(monkeypatch, (40, 50, 0)) == [(40, 50, [0], [70, 100])]
+        assert self.pushed(monkeypatch, (40, 50, 0), (41, 50, 1)) == [(40, 50, [0, 1], [70, 100])]
+        apart = [(20, 30, [0], [70, 100]), (60, 70, [1], [0, 100])]
+        assert self.pushed(monkeypatch, (20, 30, 0), (60, 70, 1)) == apart
+        near = [(20, 30, [0], [70, 0]), (31, 40, [1], [0, 100])]
+        assert self.pushed(monkeypatch, (20, 30, 0), (31, 40, 1)) == near
+
+    def test_what_comes_back_or_sticks_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        bursts = [(20, 30, 0), (40, 50, 0), (60, 70, 0)]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, back=[20])] == [40, 60]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, sticks=[60])] == [20, 40]
+
+    def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        # of 9.9 s: 3.9 s and 4.0 s
+        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 71, 0))) == 2
+        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 72, 0))) == 0
+
+    def test_where_no_joint_can_be_judged_what_stands_out_counts(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        found = self.pushed(monkeypatch, judged=False)
+        assert found == [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
+        assert self.pushed(monkeypatch, judged=False, known=11) == found[1:]
