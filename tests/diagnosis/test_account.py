@@ -1,0 +1,81 @@
+"""What an account leaves and explains, and what is recorded late of joints at rest."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import account as accounts
+from armloop.diagnosis.account import Account
+
+
+def test_the_part_of_bursts_that_effects_and_law_explain() -> None:
+    """Rows of two joints at four samples; the law of joint 2 has its own rows."""
+    rows = np.array([[True, True], [True, True], [True, False], [True, True]])
+    stacked = SimpleNamespace(joint=np.nonzero(rows)[1])
+    outcome = SimpleNamespace(after=SimpleNamespace(stacked=stacked, held_out=np.arange(1.0, 8.0)))
+    evidence = SimpleNamespace(rows=rows, scale=np.array([1.0, 0.5]), row_samples=np.nonzero(rows)[0])
+    law = SimpleNamespace(joint=2, left=np.array([0.1, 0.2, 0.3]))
+    whole: Any = None
+    bursts: Any = [
+        SimpleNamespace(rows=np.array([False, True, False, False])),
+        SimpleNamespace(rows=np.array([False, True, True, False])),
+    ]
+    residual = np.array([[9.0, 9.0], [5.0, 10.0], [6.0, 99.0], [9.0, 9.0]])
+    account = Account(whole, [], evidence, outcome, None)  # type: ignore[arg-type]
+    # samples 2 and 3: 5 and 6 N·m of joint 1, 10 N·m of joint 2
+    before = 5**2 + 6**2 + 20**2
+    assert account.explains(bursts, residual) == pytest.approx(1 - (3**2 + 4**2 + 5**2) / before)
+    with_law = Account(whole, [], evidence, outcome, law)  # type: ignore[arg-type]
+    assert with_law.explains(bursts, residual) == pytest.approx(1 - (3**2 + 0.2**2 + 5**2) / before)
+    assert outcome.after.held_out.tolist() == [1, 2, 3, 4, 5, 6, 7]
+
+
+def test_a_joint_that_rested_so_long_ago_is_recorded_at_rest() -> None:
+    """Two runs, ten samples a second, torques recorded 0.15 s late."""
+    time = np.concatenate([np.arange(10) * 0.1, 50 + np.arange(10) * 0.1])
+    motion = Motion(time, *np.zeros((3, 20, 1)), np.array([0, 10]))
+    moving = np.ones((20, 1), dtype=bool)
+    moving[4] = moving[10] = False
+    slid = accounts.slid_then(motion, moving, 0.15)
+    # between two samples of which one is at rest it may have been; before a run it was as at its beginning
+    assert np.flatnonzero(~slid[:, 0]).tolist() == [5, 6, 10, 11, 12]
+    assert np.flatnonzero(~accounts.slid_then(motion, moving, 0.0)[:, 0]).tolist() == [4, 10]
+
+
+def test_delays_add_up() -> None:
+    def effect(name: str, seconds: float) -> Any:
+        parameters = {"seconds": SimpleNamespace(value=seconds)}
+        return SimpleNamespace(effect=SimpleNamespace(name=name), parameters=parameters)
+
+    def outcome(*added: Any) -> Any:
+        return SimpleNamespace(added=lambda: list(added))
+
+    assert accounts._delay(outcome()) == accounts._delay(outcome(effect("joint_spring", 3.0))) == 0.0
+    assert accounts._delay(outcome(effect("time_delay", 0.25), effect("time_delay", 0.5))) == 0.75
+
+
+@pytest.mark.parametrize(("late", "known", "searches"), [(0.0, False, 1), (0.3, False, 2), (0.3, True, 1)])
+def test_the_search_is_made_anew_once_if_the_torque_is_late(
+    late: float, known: bool, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Any] = []
+    monkeypatch.setattr(accounts, "without", lambda whole, contacts: (whole, len(contacts)))
+    monkeypatch.setattr(
+        accounts, "search", lambda evidence, progress, panel: made.append(evidence) or len(made)
+    )
+    monkeypatch.setattr(accounts, "_delay", lambda outcome: late)
+    monkeypatch.setattr(accounts, "_resting_late", lambda whole, seconds: ("later", seconds))
+    monkeypatch.setattr(
+        accounts, "find_law", lambda evidence, outcome, progress: (f"law of {evidence}", outcome)
+    )
+    whole: Any = SimpleNamespace(unknown="known" if known else None)
+    contact: Any = "contact"
+    found = Account.of(whole, [contact], lambda text: None)
+    final = ("later", 0.3) if searches == 2 else whole
+    assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
+    assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
