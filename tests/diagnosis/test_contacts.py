@@ -145,3 +145,35 @@ class TestFinding:
         found = self.pushed(monkeypatch, judged=False)
         assert found == [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
         assert self.pushed(monkeypatch, judged=False, known=11) == found[1:]
+
+
+class TestSamePassage:
+    """Two joints of ranges 2 and 4 rad, and rad/s; a burst of joint 2 in samples 30 and 31, with its peak in the latter."""
+
+    def comes_back(
+        self, at: int, q: tuple[float, float] = (0, 0), v: tuple[float, float] = (0, 0), high: float = 9.0
+    ) -> bool:
+        given = motion((60,))
+        given.q[:], given.v[:] = (1.0, 2.0), (1.0, 2.0)
+        given.q[0], given.v[0] = (-1.0, -2.0), (-1.0, -2.0)
+        given.q[30:32], given.v[30:32] = 0.3, 0.4
+        given.q[at], given.v[at] = np.add(0.3, q), np.add(0.4, v)
+        level = np.zeros((60, 2))
+        level[30:32, 1] = 8.0, 10.0
+        level[:, 0], level[at, 0], level[at, 1] = 99.0, 0.0, high
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
+        return contacts._comes_back(evidence, np.arange(60), level, Burst(slice(30, 32), frozenset({1})))
+
+    def test_it_is_within_a_twentieth_of_half_of_all_joints_ranges(self) -> None:
+        assert self.comes_back(10)
+        for sign in (1.0, -1.0):
+            for joint, size in ((0, 1.0), (1, 2.0)):
+                near, far = (sign * part * size * np.eye(2)[joint] for part in (0.049, 0.051))
+                assert self.comes_back(10, q=tuple(near)) and not self.comes_back(10, q=tuple(far))
+                assert self.comes_back(10, v=tuple(near)) and not self.comes_back(10, v=tuple(far))
+
+    def test_it_shows_more_than_half_of_the_peak_at_the_bursts_own_joints(self) -> None:
+        assert self.comes_back(10, high=5.01) and not self.comes_back(10, high=4.99)
+
+    def test_what_is_as_near_as_the_burst_is_long_is_the_burst(self) -> None:
+        assert [self.comes_back(at) for at in (27, 28, 29, 32, 33)] == [True, False, False, False, True]
