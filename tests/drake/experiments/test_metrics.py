@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
+from armloop.drake.experiments import metrics
 from armloop.drake.experiments.metrics import measure, reversals
 
 
@@ -37,3 +38,24 @@ def test_a_reference_without_reversals_has_no_settling_and_rest_is_no_stick():
     found = measure(0.01, rest, rest, rest, rest, rest)
     assert np.isnan(found.settling).all() and np.isnan(found.unsettled).all()
     assert_allclose(found.stick, 0.0)
+
+
+def test_what_counts_as_rest_as_clipped_and_as_settled():
+    still, band = metrics.STILL, metrics.BAND
+    v_ref = np.array([[still], [-still], [0.99 * still], [1.0]])
+    v = np.array([[0.99 * still], [-0.99 * still], [0.0], [still]])
+    asked = np.array([[0.0], [0.5], [100.0], [100.0]])
+    tau = asked + np.array([[0.0], [0.9e-9], [0.9e-7], [1.1e-7]])
+    found = measure(0.5, 0 * v, v, v_ref, tau, asked)
+    assert_allclose(found.stick, 2 * 0.5)
+    assert_allclose(found.clipped, 0.25)
+    assert_allclose(measure(0.5, 0 * v, v, v_ref, asked + 1.1e-9 * np.eye(4)[:, :1], asked).clipped, 0.25)
+    # a turn at the second sample, another at the fourth
+    for error, unsettled, settling in ((band, 0.0, 0.0), (1.01 * band, 1.0, (2 + 1) / 2)):
+        found = measure(0.5, np.full((4, 1), error), v, v_ref, tau, asked)
+        assert (found.unsettled[0], found.settling[0]) == (unsettled, 0.5 * settling)
+
+
+def test_a_reference_that_rests_between_two_ways_has_turned_when_it_last_moved():
+    assert metrics.reversals(np.array([1.0, 2.0, 0.0, 0.0, -1.0, -1.0, 0.0, -2.0, 3.0])).tolist() == [2, 8]
+    assert metrics.reversals(np.zeros(5)).tolist() == []
