@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
+from armloop.laws.friction import Direction
 
 
 def random_problem(rng, n):
@@ -48,3 +49,25 @@ def test_a_wrong_guess_changes_nothing():
     laws = [ClampedLaw(0, 0.0, 1e8, 0.7), ClampedLaw(1, 0.0, 1e8, 0.4)]
     guesses = [implicit_torques(A, p, laws, [i, j], 1e-3) for i in (-1, 0, 1) for j in (-1, 0, 1)]
     assert_allclose(guesses, np.tile(guesses[0], (9, 1)), rtol=1e-9)
+
+
+def test_a_law_of_a_shared_motor_and_its_three_pieces():
+    law = ClampedLaw(0, 2.0, 10.0, 1.0, 1, -0.5)
+    assert law.speed([3.0, 4.0]) == 1.0 and law._replace(ratio=0.0).speed([3.0, 4.0]) == 3.0
+    exact = law._replace(slope=8.0)
+    # on the edge, 2 - 8 w = ±1, the law is steep still
+    assert [exact.piece(w) for w in (0.0, 0.124, 0.125, 0.2, 0.375, 0.376)] == [1, 1, 0, 0, 0, -1]
+    dry = ClampedLaw.dry(Direction(2, 1, 0.5), 3.0)
+    assert dry == ClampedLaw(2, 0.0, 1e8, 3.0, 1, 0.5)
+    assert ClampedLaw(0, 0.0, 1.0, 1.0).ratio == 0.0
+
+
+def test_a_shared_motor_acts_on_both_joints():
+    """One step of two free masses whose difference in speed rubs: the torque is equal and opposite."""
+    A, p = [[2.0, 0.0], [0.0, 1.0]], [2.0 * 3.0, 1.0 * 1.0]
+    for pieces in ([-1], [0], [1]):
+        tau = implicit_torques(A, p, [ClampedLaw(0, 0.0, 1e8, 5.0, 1, -1.0)], pieces, 1e-3)
+        assert_allclose(tau, [-5.0, 5.0], rtol=1e-9)
+        stuck = implicit_torques(A, [6.0, 2.999], [ClampedLaw(0, 0.0, 1e8, 5.0, 1, -1.0)], pieces, 1e-3)
+        # together they go on with their mean speed: 8.999 / 3
+        assert_allclose(stuck, [(2 * 8.999 / 3 - 6.0) / 1e-3, (8.999 / 3 - 2.999) / 1e-3], rtol=1e-4)

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import load_plant
 from armloop.drake.plant.exact import exact_model
+from armloop.drake.tuning import gain_design
 from armloop.drake.tuning.gain_design import propose_gains
 from armloop.drake.tuning.loop_analysis import SampledArm, model_posture, posture_model, sampled_margins
 from armloop.drake.tuning.step_check import linear_step, simulated_step
@@ -84,3 +85,15 @@ def test_the_simulated_arm_steps_as_the_linear_loop_says(name):
         1
     ]
     assert np.abs(held / step).max() < 0.05
+
+
+def test_bandwidths_and_margins_that_may_be_asked_for(monkeypatch):
+    monkeypatch.setattr(gain_design, "_joint", lambda linear, *_: (float(linear[0][0, 0]), 2.0, 3.0))
+    linear = tuple(np.diag([1.0, 5.0]) for _ in range(3))
+    highest = 0.5 * np.pi / 1e-3
+    for bandwidth, margin in ((0.999 * highest, 20.0), (1e-3, 85.0)):
+        gains = propose_gains(linear, 1e-3, bandwidth, margin)
+        assert (gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist()) == ([1, 5], [2, 2], [3, 3])
+    for bandwidth, margin in ((highest, 45.0), (0.0, 45.0), (10.0, 19.9), (10.0, 85.1)):
+        with pytest.raises(InputError):
+            propose_gains(linear, 1e-3, bandwidth, margin)
