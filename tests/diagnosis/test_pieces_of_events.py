@@ -41,7 +41,8 @@ class TestBurstsOfNovelty:
     def found(
         self, level: np.ndarray, lengths: tuple[int, ...] = (100,), median: float = 0.0
     ) -> list[tuple[int, int]]:
-        bursts = contacts._bursts(motion(list(lengths)), np.arange(sum(lengths)), level + median)
+        new = level + np.where(level < 0, -median, median)
+        bursts = contacts._bursts(motion(list(lengths)), np.arange(sum(lengths)), new)
         return [(b.start, b.stop - 1) for b in bursts]
 
     def test_it_lasts_while_it_is_above_a_quarter_of_its_peak(self) -> None:
@@ -52,6 +53,11 @@ class TestBurstsOfNovelty:
         assert self.found(level) == [(30, 50)]
         level[[30, 50]] = 2.4
         assert self.found(level) == [(31, 49)]
+
+    def test_what_pushes_back_and_then_forth_is_two_events(self) -> None:
+        level = steps(100, (30, 39, 9.0), (40, 49, -6.0), (56, 65, -7.0))
+        level[50:56] = -3.0
+        assert self.found(level) == [(30, 39), (40, 65)]
 
     def test_it_must_exceed_what_half_of_the_run_keeps_below_and_at_least_the_noise(self) -> None:
         assert self.found(steps(100, (30, 50, 4.3))) == [(30, 50)]
@@ -244,6 +250,18 @@ class TestJoints:
         assert not contacts._comes_back(evidence, np.arange(0, N, 50), np.ones((8, 1)), burst)
 
 
+class TestWhatIsNotJudged:
+    """`contacts._strays`."""
+
+    def test_a_burst_is_none_where_its_joints_are_mostly_outside_of_the_trained_range(self) -> None:
+        far = np.zeros((100, 2), dtype=bool)
+        far[30:41, 1] = True
+        assert not contacts._strays(far, Burst(slice(30, 52), frozenset({1})))
+        assert contacts._strays(far, Burst(slice(30, 51), frozenset({1})))
+        assert not contacts._strays(far, Burst(slice(30, 41), frozenset({0})))
+        assert not contacts._strays(far, Burst(slice(30, 41), frozenset({0, 1})))
+
+
 class TestLikeMotion:
     """`novelty`: the yardstick of an event."""
 
@@ -254,9 +272,24 @@ class TestLikeMotion:
 
     def test_the_middle_and_its_spread_leave_gaps_out(self) -> None:
         nan = np.nan
-        middle, spread = novelty._middle(np.array([[4.0, nan, 1.0, 2.0], [nan] * 4, [7.0, nan, nan, nan]]))
-        assert middle.tolist() == [2.0, 0.0, 7.0]
-        assert spread.tolist() == [1.4826, 0.0, 0.0]
+        middle, spread = novelty._middle(np.array([[4.0, nan, 1.0, 2.0], [7.0, nan, nan, nan]]))
+        assert middle.tolist() == [2.0, 7.0]
+        assert spread.tolist() == [1.4826, 0.0]
+
+    def test_without_like_motion_what_is_new_differs_from_the_baseline(self) -> None:
+        N = 200
+        time = np.arange(N) * 0.04
+        once = Motion(time, time[:, None], np.ones((N, 1)), np.zeros((N, 1)), np.array([0]))  # no posture twice
+        # two events of a run of eight seconds are no yardstick of each other
+        given = steps(N, (50, 60, 6.0), (120, 130, -9.0))[:, None]
+        _, new = novelty.novelty(self.evidence(once), given, np.zeros((N, 1), dtype=bool))
+        np.testing.assert_allclose(new[[55, 125], 0], [6.0, -9.0])
+
+    def test_an_event_among_few_occasions_of_like_motion_does_not_hide_another(self) -> None:
+        N, period = 400, 100  # four times the same motion
+        shown = steps(N, (120, 130, 6.0), (220, 230, 9.0))[:, None]
+        _, new = novelty.novelty(self.evidence(circling(N, period)), shown, np.zeros((N, 1), dtype=bool))
+        np.testing.assert_allclose(new[[125, 225], 0], [6.0, 9.0], rtol=0.05)
 
     def test_values_by_what_nine_in_ten_keep_within(self) -> None:
         x = np.arange(101.0)

@@ -3,6 +3,7 @@
 `Motion` is kinematics only and serves prediction; `Samples` adds the forces and serves regression.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,6 +40,16 @@ class Motion:
             )
         if len(self.starts) == 0 or self.starts[0] != 0:
             raise ValueError("starts must begin with 0, the first sample of the first run")
+
+    @classmethod
+    def joined(cls, motions: Sequence["Motion"]) -> "Motion":
+        """Return motions of the same joints as one; none of their runs goes on in the next."""
+        before = np.cumsum([0, *(m.samples for m in motions[:-1])])
+        starts = np.concatenate([m.starts + n for m, n in zip(motions, before, strict=True)])
+        time, q, v, vdot = (
+            np.concatenate([getattr(m, key) for m in motions]) for key in ("time", "q", "v", "vdot")
+        )
+        return cls(time, q, v, vdot, starts)
 
     @property
     def samples(self) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-from armloop.diagnosis.evidence import Evidence, creep
+from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
@@ -74,16 +74,20 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     known = known_contacts(evidence)
     if evidence.rows.any():
         innovation, rest = innovations(evidence, residual)
+        far = far_outside(motion, evidence.model.history.get("range"))
         tells = innovation != 0.0
         rows, new = novelty(evidence, innovation, rest)
-        level = np.where(known[rows][:, None], 0.0, np.abs(new))
-        bursts = _together([_bursts(motion, rows, of_joint) for of_joint in level.T])
+        new = np.where(known[rows][:, None], 0.0, new)
+        level = np.abs(new)
+        bursts = _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
         bursts = [
             burst
             for burst in bursts
-            if not _comes_back(evidence, rows, level, burst) and not _sticks(evidence, burst)
+            if not _comes_back(evidence, rows, level, burst)
+            and not _sticks(evidence, burst)
+            and not _strays(far, burst)
         ]
-        bursts = _standing_out(motion, rows, level, bursts)
+        bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
     else:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
@@ -138,6 +142,11 @@ def _sticks(evidence: Evidence, burst: Burst) -> bool:
     (j,) = burst.joints
     slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > 0.5
     return bool(slides.any() and not slides[j])
+
+
+def _strays(far: Mask, burst: Burst) -> bool:
+    """Whether the joints that show a burst are, for most of it, where the model was not trained: nothing is judged there."""
+    return bool(far[burst.rows, sorted(burst.joints)].mean() > 0.5)
 
 
 def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
@@ -195,14 +204,15 @@ def _together(bursts: list[list[slice]]) -> list[Burst]:
     return sorted(found, key=lambda burst: burst.rows.start)
 
 
-def _bursts(motion: Motion, rows: NDArray[np.intp], level: Array) -> list[slice]:
-    """Stretches around every peak of the novelty, as long as it is above a part of the peak.
+def _bursts(motion: Motion, rows: NDArray[np.intp], new: Array) -> list[slice]:
+    """Stretches around every peak of the novelty, of one sign, as long as it is above a part of the peak.
 
     An event is seen to begin and to end; what is there from a run's start is a past that friction remembers.
     """
     bursts: list[slice] = []
-    if len(level) == 0:
+    if len(new) == 0:
         return bursts
+    level = np.abs(new)
     threshold = _RISE * max(1.0, float(np.median(level)))
     for run in motion.runs():
         mine = np.flatnonzero((rows >= run.start) & (rows < run.stop))
@@ -210,13 +220,14 @@ def _bursts(motion: Motion, rows: NDArray[np.intp], level: Array) -> list[slice]
         if len(above) == 0:
             continue
         time = motion.time[rows]
-        gaps = np.flatnonzero(np.diff(time[above]) > PAUSE)
+        gaps = np.flatnonzero((np.diff(time[above]) > PAUSE) | (np.diff(np.sign(new[above])) != 0))
         for group in np.split(above, gaps + 1):
-            peak = float(level[group[0] : group[-1] + 1].max())
+            one = new * np.sign(new[group[0]])
+            peak = float(one[group[0] : group[-1] + 1].max())
             first, last = int(group[0]), int(group[-1])
-            while first > mine[0] and level[first - 1] > _EDGE * peak:
+            while first > mine[0] and one[first - 1] > _EDGE * peak:
                 first -= 1
-            while last < mine[-1] and level[last + 1] > _EDGE * peak:
+            while last < mine[-1] and one[last + 1] > _EDGE * peak:
                 last += 1
             begins = first > mine[0] and time[first] - time[mine[0]] >= _SHORTEST
             ends = last < mine[-1] and time[mine[-1]] - time[last] >= _SHORTEST

@@ -26,6 +26,7 @@ from armloop.diagnosis.search import Found, Outcome, Strength, strengths
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
+from armloop.diagnosis.zeros import sentences, settled
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -51,6 +52,7 @@ class Diagnosis:
         strengths: of each effect found.
         adopted: whether the model has the unlisted law.
         standing: how far the run can be judged: what a reader must know beside the verdict.
+        zeros: (L, n) encoder zeros of the logs, rad (m), that were taken off before they were judged.
     """
 
     verdict: str
@@ -63,6 +65,7 @@ class Diagnosis:
     standing: Standing = field(default_factory=lambda: Standing([], [], False))
     strengths: list[Strength] = field(default_factory=list)
     adopted: bool = False
+    zeros: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def adopt(self) -> Diagnosis:
         """The same with an unlisted law, where one was found, in the model: its feedforward supplies it.
@@ -192,6 +195,7 @@ class Diagnosis:
             "verdict": self.verdict,
             "reasons": self.reasons,
             "joints": self.standing.joints,
+            **({"encoder_zeros": self.zeros.tolist()} if self.zeros.any() else {}),
             "effects": effects,
             "error": _null(self.errors()),
         }
@@ -246,6 +250,8 @@ def diagnose(
             )
     require_different(logs)
     progress("conditioning the run like the model's training logs")
+    logs, zeros = settled(model, logs)
+    own_zeros = sentences(model, [log.name for log in logs], zeros)
     samples = preprocess(logs, model.conditioning)
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
@@ -269,7 +275,8 @@ def diagnose(
             contacts,
         )
         stand = standing(evidence, augmented, found.errors()["after"], range(1, model.arm.n + 1))
-        return replace(found, standing=replace(stand, reasons=[too_still(evidence), *stand.reasons]))
+        why = [too_still(evidence), *stand.reasons, *own_zeros]
+        return replace(found, standing=replace(stand, reasons=why), zeros=zeros)
     blocks = len(np.unique(evidence.blocks))
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
     with Hypotheses(whole, jobs) as panel:
@@ -301,4 +308,4 @@ def diagnose(
     stand = standing(evidence, augmented, found.errors()["after"], known)
     if verdict == "no_effect" and stand.unknown:
         found = replace(found, verdict="cannot_tell")
-    return replace(found, standing=stand)
+    return replace(found, standing=replace(stand, reasons=[*stand.reasons, *own_zeros]), zeros=zeros)

@@ -19,8 +19,11 @@ from armloop.util.arrays import Array
 _STEP = 0.04
 #: Like motion is sought so many seconds away at least, and counts once within so many …
 _APART, _VISIT = 1.0, 0.5
-#: … at so many occasions among so many of the nearest samples, further than a spread of the motion only for the fewest.
-_OCCASIONS, _FEWEST, _NEAREST, _LIKE = 15, 5, 300, 1.0
+#: … at so many occasions at most, within a spread of the motion, among so many of the nearest samples.
+_OCCASIONS, _NEAREST, _LIKE = 15, 300, 1.0
+#: The baseline, on which a model errs by nothing on average, counts for so many occasions more: of a short run the few
+#: that there are may be other events.
+_BASELINE = 5
 #: A joint at rest is so far from one that slides, in spreads of a motion.
 _AT_REST = 3.0
 
@@ -28,7 +31,8 @@ _AT_REST = 3.0
 def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array]:
     """Instants (M,) looked at, and (M, n) signed distance of each joint from its like, in standard deviations.
 
-    The deviation is that of the noise and of like motion together: where like motion differs, little is new.
+    The deviation is that of the noise and of like motion together: where like motion differs, little is new. Where there
+    is none, what is new is all that differs from the baseline.
     """
     motion = evidence.samples.motion
     mean = averaged(evidence.samples, innovation)
@@ -52,10 +56,10 @@ def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> t
         far, near = cKDTree(features).query(features, k=list(range(1, min(len(rows), _NEAREST) + 1)))
         away = np.abs(seconds[near] - seconds[:, None]) > _APART
         first = _first_of_each(np.where(away, visit[near], -1)) & away
-        enough = np.clip((first & (far <= _LIKE)).sum(axis=1), _FEWEST, _OCCASIONS)
-        chosen = first & (np.cumsum(first, axis=1) <= enough[:, None])
-        value = mean[rows, j]
-        middle, spread = _middle(np.where(chosen, value[near], np.nan))
+        first &= far <= _LIKE
+        chosen = first & (np.cumsum(first, axis=1) <= _OCCASIONS)
+        value, baseline = mean[rows, j], np.zeros((len(rows), _BASELINE))
+        middle, spread = _middle(np.column_stack([baseline, np.where(chosen, value[near], np.nan)]))
         new[:, j] = (value - middle) / np.hypot(1.0, spread)
     return rows, new
 
@@ -70,13 +74,10 @@ def _first_of_each(x: NDArray[np.intp]) -> NDArray[np.bool_]:
 
 
 def _middle(x: Array) -> tuple[Array, Array]:
-    """(M,) median and spread (scaled median absolute deviation) of each row's numbers; zero where there are none."""
-    few = np.sort(x, axis=1)[:, :_OCCASIONS]
-    some = np.isfinite(few).any(axis=1)
-    middle, spread = np.zeros(len(x)), np.zeros(len(x))
-    middle[some] = np.nanmedian(few[some], axis=1)
-    spread[some] = 1.4826 * np.nanmedian(np.abs(few[some] - middle[some, None]), axis=1)
-    return middle, spread
+    """(M,) median and spread (scaled median absolute deviation) of each row's numbers."""
+    few = np.sort(x, axis=1)[:, : _OCCASIONS + _BASELINE]
+    middle = np.nanmedian(few, axis=1)
+    return middle, 1.4826 * np.nanmedian(np.abs(few - middle[:, None]), axis=1)
 
 
 def _spread(x: Array) -> Array:

@@ -149,12 +149,32 @@ def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What is regressed at one corner: columns (N, n, p), torque (N, n), blocks (N,), and which samples slide (N, n)."""
+    """What is regressed at one corner.
+
+    Attributes:
+        columns: (N, n, p) of base parameters and plain friction.
+        tau: (N, n) torque, N·m (N).
+        blocks: (N,) block of each instant.
+        moving: (N, n) which joints slide.
+        motion: of the instants; each log begins a run.
+        stride: sample periods between two instants.
+    """
 
     columns: Array
     tau: Array
     blocks: NDArray[np.intp]
     moving: NDArray[np.bool_]
+    motion: Motion
+    stride: int
+
+    def every(self, step: int) -> Table:
+        """Every so many instants."""
+        thin, motion = slice(None, None, step), self.motion
+        starts = -(-motion.starts // step)
+        some = Motion(motion.time[thin], motion.q[thin], motion.v[thin], motion.vdot[thin], starts)
+        return Table(
+            self.columns[thin], self.tau[thin], self.blocks[thin], self.moving[thin], some, self.stride * step
+        )
 
 
 def table_at(
@@ -172,8 +192,9 @@ def table_at(
         aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
     """
     parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
+    motions: list[Motion] = []
     lowest, following = min(corners), 0
-    total = sum(log.samples for log in logs)
+    stride = max(1, sum(log.samples for log in logs) * arm.n // _ROWS)
     for k, log in enumerate(logs):
         try:
             samples = preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9))
@@ -186,7 +207,6 @@ def table_at(
         if aside is not None:
             used &= ~within(motion.time, aside[k], margin)
         inside = np.flatnonzero(used)
-        stride = max(1, total * arm.n // _ROWS)
         # the same instants at every corner: whole numbers of periods from the log's start
         numbers = np.rint(elapsed[inside] / period).astype(int)
         inside = inside[numbers % stride == 0]
@@ -207,10 +227,11 @@ def table_at(
         blocks = following + ((part.time - part.time[0]) / _BLOCK).astype(np.intp)
         following = int(blocks[-1]) + 1
         parts.append((columns, samples.tau[inside], blocks, speed > _SLIDES * speed.max(axis=0)))
+        motions.append(part)
     if not parts:
         return None
     columns, tau, blocks, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Table(columns, tau, blocks, moving)
+    return Table(columns, tau, blocks, moving, Motion.joined(motions), stride)
 
 
 def _held_out(table: Table) -> Array:

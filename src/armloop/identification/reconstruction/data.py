@@ -341,17 +341,11 @@ def _survey(stride: int, part: _Conditioned) -> tuple[Chunk, int] | None:
 def _joined(chunks: Sequence[Chunk]) -> Chunk:
     """One chunk of several."""
     samples = [chunk.samples for chunk in chunks]
-    motions = [s.motion for s in samples]
-    before = np.cumsum([0, *(m.samples for m in motions[:-1])])
-    starts = np.concatenate([m.starts + n for m, n in zip(motions, before, strict=True)])
-    time, q, v, vdot = (
-        np.concatenate([getattr(m, key) for m in motions]) for key in ("time", "q", "v", "vdot")
-    )
     tau, moving = (np.concatenate([getattr(s, key) for s in samples]) for key in ("tau", "moving"))
     first = samples[0]
     spans = [s.spans for s in samples if s.spans is not None]
     whole = Samples(
-        Motion(time, q, v, vdot, starts),
+        Motion.joined([s.motion for s in samples]),
         tau,
         moving,
         first.period,

@@ -20,6 +20,7 @@ from armloop.identification.reconstruction.bandwidth import (
 )
 from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Apart, independent_blocks
 from armloop.identification.reconstruction.data import Data
+from armloop.identification.reconstruction.encoder_zeros import encoder_zeros
 from armloop.identification.reconstruction.excitation import check_recorded
 from armloop.identification.reconstruction.fitted import uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
@@ -155,6 +156,12 @@ def reconstruct(
     usual = [conditioning or one.conditioning for one in wanted]
     bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
     settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
+    zeros = None
+    if kept and not METHODS[method].reference:
+        filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
+        aside = held_out_intervals(kept, filters, settings)
+        zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, apart.correlation)
+        logs = kept = zeros.corrected(kept)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
     refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
@@ -175,6 +182,9 @@ def reconstruct(
         if bandwidth.trials:
             found.history["bandwidth"] = bandwidth.to_dict()
         found.notes += bandwidth.notes()
+        if zeros is not None and zeros.found:
+            found.history["encoder_zeros"] = zeros.to_dict(kept)
+            found.notes += zeros.notes(arm)
         return Attempt(library, how, data, found, apart.margin)
 
     if len(left) == 1:

@@ -110,9 +110,7 @@ class _Problem:
             return None
         q = np.concatenate([log.q for log in logs])
         q = q[:: max(1, len(q) // _POSTURES)]
-        thin = slice(None, None, _EVERY)
-        table = Table(table.columns[thin], table.tau[thin], table.blocks[thin], table.moving[thin])
-        return _Problem(table, mass_columns(arm, base, q), base.count)
+        return _Problem(table.every(_EVERY), mass_columns(arm, base, q), base.count)
 
     def fit(self, signs: Array, order: NDArray[np.intp], half: int | None = None) -> _Fit:
         """Regress the torques with these signs in this order, of all blocks or of every other one."""

@@ -1,0 +1,100 @@
+"""Best linear unbiased prediction of a log's encoder zeros, robustly, before a run is judged.
+
+Where the zeros differed among a model's training logs (:mod:`armloop.identification.reconstruction.encoder_zeros`), a new
+log has zeros of its own, from the same distribution. They are nuisance parameters: nothing that has changed. A joint
+whose zero lies outside of that distribution keeps it, and the search finds an encoder offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.data.filters import INDEPENDENT
+from armloop.data.log import MotionLog
+from armloop.data.signals import ShortRunError, preprocess
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects import effect
+from armloop.laws.effects.encoder_offset import EncoderOffset
+from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
+
+#: A zero more than so many spreads away has been changed.
+_BEYOND = 3.0
+#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less; rounds of it.
+_FREEDOM, _ROUNDS = 4.0, 30
+
+
+def spread(model: ReconstructedModel) -> Array:
+    """(n,) standard deviation of the training logs' encoder zeros, rad (m); zeros where they did not differ."""
+    kept = model.history.get("encoder_zeros")
+    return np.zeros(model.arm.n) if not kept else np.asarray(kept["spread"], dtype=float)
+
+
+def settled(model: ReconstructedModel, logs: Sequence[MotionLog]) -> tuple[list[MotionLog], Array]:
+    """Logs as encoders with the model's zeros would have recorded them, and (L, n) the zeros taken off, rad (m)."""
+    usual = spread(model)
+    zeros: Array = np.zeros((len(logs), model.arm.n))
+    if usual.any():
+        zeros = np.stack([_zeros(model, log, usual) for log in logs])
+    pairs = zip(logs, zeros, strict=True)
+    return [replace(log, q=log.q - zero) if zero.any() else log for log, zero in pairs], zeros
+
+
+def sentences(model: ReconstructedModel, logs: Sequence[str], zeros: Array) -> list[str]:
+    """What was taken off, a sentence a log."""
+    found = []
+    for name, zero in zip(logs, zeros, strict=True):
+        pairs = zip(zero, model.arm.joints, strict=True)
+        words = [f"joint {j} {x:+.3f} {joint.position_unit}" for j, (x, joint) in enumerate(pairs, 1) if x]
+        if words:
+            found.append(
+                f"{name}: the encoder zeros of this log, {', '.join(words)}, were regressed and taken off first; the "
+                "training logs' differ by as much"
+            )
+    return found
+
+
+def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
+    """(n,) zeros of one log; zero for joints that have none of their own, or another altogether."""
+    try:
+        samples = preprocess([log], model.conditioning)
+    except ShortRunError:
+        return np.zeros(model.arm.n)
+    evidence = Evidence.of(model, samples, [])
+    rows = np.zeros_like(evidence.rows)
+    rows[evidence.kept] = evidence.rows[evidence.kept]
+    left = (evidence.residual([]) / evidence.scale)[rows]
+    slopes = np.stack(
+        [
+            (effect("encoder_offset", j + 1).columns(evidence.context, 0.0)[:, :, 0] / evidence.scale)[rows]
+            for j in range(model.arm.n)
+        ],
+        axis=1,
+    )
+    own = usual > 0
+    beyond, zeros = np.zeros_like(own), np.zeros(model.arm.n)
+    for _ in range(model.arm.n + 1 if len(left) else 0):
+        # one that was changed is regressed beside the others, so that they do not stand in for it
+        zeros[own] = _robust(slopes[:, own], left, np.where(beyond, EncoderOffset.farthest, usual)[own])
+        more = own & ~beyond & (np.abs(zeros) > _BEYOND * usual)
+        if not more.any():
+            break
+        beyond |= more & (np.abs(zeros) == np.abs(zeros)[more].max())
+    return np.where(beyond, 0.0, zeros)
+
+
+def _robust(X: Array, y: Array, spreads: Array) -> Array:
+    """(p,) posterior mode of normal effects in noise of Student's t, of unit scale, by reweighting.
+
+    As many samples as lie in a period of the filter's corner tell no more than one does.
+    """
+    weight: Array = np.ones(len(y))
+    x: Array = np.zeros(X.shape[1])
+    for _ in range(_ROUNDS):
+        G = (X.T * weight) @ X / INDEPENDENT + np.diag(1 / spreads**2)
+        x = np.asarray(np.linalg.solve(G, (X.T * weight) @ y / INDEPENDENT))
+        weight = np.asarray((_FREEDOM + 1) / (_FREEDOM + (y - X @ x) ** 2))
+    return np.asarray(x)

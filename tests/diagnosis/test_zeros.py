@@ -1,0 +1,75 @@
+"""A run's own encoder zeros, where the training logs' differed, are taken off before it is judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.diagnosis import diagnose
+from armloop.diagnosis.zeros import sentences, settled, spread
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.model import ReconstructedModel
+
+SPREAD = [0.0, 0.03, 0.02]
+
+
+def run(seed: int, zero: tuple[float, float, float] = (0, 0, 0), push: float = 0.0) -> MotionLog:
+    """A run of 30 s, with a torque on joint 2 from 12 to 14 s."""
+    motion = fourier_motion(30.0, 100.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    tau[(motion.time > 12) & (motion.time < 14), 1] += push
+    log = measured(motion, tau, seed, name=f"run {seed}")
+    return replace(log, q=log.q + np.array(zero))
+
+
+@pytest.fixture(scope="module")
+def plain() -> ReconstructedModel:
+    options = Options(standard_errors=False, parts=False)
+    return reconstruct([run(1), run(2)], three_axis(), library="rigid-body", options=options).model
+
+
+@pytest.fixture(scope="module")
+def model(plain: ReconstructedModel) -> ReconstructedModel:
+    """A model whose training logs' zeros differed."""
+    return replace(plain, history={**plain.history, "encoder_zeros": {"spread": SPREAD, "logs": []}})
+
+
+def test_a_model_of_one_zero_leaves_logs_alone(plain: ReconstructedModel) -> None:
+    logs = [run(3, (0.0, 0.04, 0.0))]
+    same, zeros = settled(plain, logs)
+    assert same[0] is logs[0] and not zeros.any() and not spread(plain).any()
+
+
+def test_zeros_are_taken_off_log_by_log(model: ReconstructedModel) -> None:
+    logs = [run(3, (0.0, 0.04, -0.02)), run(4)]
+    own, zeros = settled(model, logs)
+    np.testing.assert_allclose(zeros, [[0.0, 0.04, -0.02], [0.0, 0.0, 0.0]], atol=2e-3)
+    np.testing.assert_allclose(own[0].q, logs[0].q - zeros[0])
+    (first, *_) = sentences(model, [log.name for log in logs], zeros)
+    assert first.startswith("run 3: the encoder zeros of this log, joint 2 +0.0")
+
+
+def test_an_event_does_not_move_them(model: ReconstructedModel) -> None:
+    _, quiet = settled(model, [run(5, (0.0, 0.03, 0.0))])
+    _, pushed = settled(model, [run(5, (0.0, 0.03, 0.0), push=4.0)])
+    np.testing.assert_allclose(pushed, quiet, atol=1e-3)
+
+
+def test_a_zero_beyond_all_that_was_usual_stays_and_the_others_go(model: ReconstructedModel) -> None:
+    _, zeros = settled(model, [run(6, (0.0, 0.2, 0.02))])
+    assert zeros[0, 1] == 0.0
+    assert zeros[0, 2] == pytest.approx(0.02, abs=0.01)
+
+
+def test_a_usual_zero_is_no_change_of_the_arm(model: ReconstructedModel, plain: ReconstructedModel) -> None:
+    log = run(7, (0.0, 0.04, 0.0))
+    judged = diagnose(model, [log], jobs=1)
+    assert judged.verdict == "no_effect"
+    assert judged.to_dict()["encoder_zeros"][0][1] == pytest.approx(0.04, abs=2e-3)
+    assert any("the encoder zeros of this log, joint 2 +0.0" in reason for reason in judged.reasons)
+    (effect,) = diagnose(plain, [log], jobs=1).to_dict()["effects"]
+    assert (effect["effect"], effect["joint"]) == ("encoder_offset", 2)
