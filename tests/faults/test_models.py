@@ -89,6 +89,17 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     ),
     (("history", "inertial"), [[1.0], "x", [1e300] * 30, 3], "inertial"),
     (("history", "notes"), [3, [3]], "notes"),
+    (
+        ("history", "encoder_zeros"),
+        [
+            3,
+            {},
+            {"spread": "wide"},
+            *({"spread": spread} for spread in ([], [0.1] * 2, [-0.1] * 3, [1e300] * 3)),
+            {"spread": [0.1] * 3, "logs": [{"log": "run", "zeros": "x"}]},
+        ],
+        "encoder_zeros",
+    ),
     (("uncertainty",), [None, [], "x"], "uncertainty"),
     (
         ("uncertainty", "friction"),

@@ -75,6 +75,7 @@ class DiagnosisData(Struct):
     error: RemainsData
     reasons: list[Text] = []
     joints: list[JointShareData] = []
+    encoder_zeros: list[PerJoint] | UnsetType = UNSET
     written_by: Name = ""
 
 

@@ -143,6 +143,23 @@ class BaselineData(Struct):
     samples: Count | None = None
 
 
+class LogZerosData(Struct):
+    """What one log's encoders read too much."""
+
+    log: Text
+    zeros: PerJoint
+
+
+class EncoderZerosData(Struct):
+    """Encoder zeros that differed from log to log, rad (m)."""
+
+    spread: Annotated[
+        list[NotNegative], Meta(min_length=1, max_length=MOST_JOINTS, description="standard deviation")
+    ]
+    logs: Annotated[list[LogZerosData], Meta(max_length=100_000)] = []
+    errors: dict[Text, NotNegative] = {}
+
+
 class HistoryData(Struct):
     """How the model came about; what else stands there is kept as it is."""
 
@@ -152,6 +169,7 @@ class HistoryData(Struct):
     notes: Annotated[list[Text], Meta(max_length=10_000)] = []
     range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | None = None
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | None = None
+    encoder_zeros: EncoderZerosData | None = None
 
 
 class ErrorData(Struct):
@@ -223,12 +241,15 @@ def model_data(data: Any) -> dict[str, Any]:
 def _agree(model: ModelData) -> None:
     """Raise ``ModelError`` where lengths do not go with the number of joints."""
     arm, n = model.arm, len(model.arm.joints)
+    kept = model.history.encoder_zeros
+    zeros = [] if kept is None else [("history.encoder_zeros.spread", kept.spread)]
     lengths: list[tuple[str, Any]] = [
         *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
         ("friction", model.friction),
         ("recorded.drive_gains", model.recorded.drive_gains),
         *((f"baseline.{key}", getattr(model.baseline, key)) for key in ("rmse", "rms", "nrmse", "worst")),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
+        *zeros,
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
             for key in ("joints", "friction", "stribeck")
