@@ -166,6 +166,23 @@ def test_what_friction_may_do_where_a_joint_turns_round_tells_nothing_of_an_even
     np.testing.assert_array_equal(counted[burst, 0], innovation[burst, 0] != 0.0)
 
 
+def test_an_event_stands_out_from_what_lies_within_the_trained_range(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    samples = preprocess([run(18, 20.0)], model.conditioning)
+    evidence, N = Evidence.of(model, samples, []), samples.motion.samples
+    new, far, asked = np.zeros((N, 3)), np.zeros((N, 3), dtype=bool), []
+    new[1000:1100, 1], new[1500, 1] = 10.0, 9.0  # what is so short is no event
+    monkeypatch.setattr(contacts, "novelty", lambda *given: (np.arange(N), new))
+    monkeypatch.setattr(contacts, "far_outside", lambda *given: far)
+    monkeypatch.setattr(contacts, "push", lambda *given: asked.append(given[2]))
+    find_contacts(evidence, evidence.residual([]))
+    assert asked == []
+    far[1500] = True
+    find_contacts(evidence, evidence.residual([]))
+    assert asked == [slice(1000, 1100)]
+
+
 def test_one_event_is_listed_once(model: ReconstructedModel) -> None:
     motion = fourier_motion(10.0, 25.0, 14)
 

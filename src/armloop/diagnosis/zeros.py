@@ -17,7 +17,6 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import ShortRunError, preprocess
 from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects import effect
-from armloop.laws.effects.encoder_offset import EncoderOffset
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 
@@ -74,16 +73,10 @@ def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
         ],
         axis=1,
     )
-    own = usual > 0
-    beyond, zeros = np.zeros_like(own), np.zeros(model.arm.n)
-    for _ in range(model.arm.n + 1 if len(left) else 0):
-        # one that was changed is regressed beside the others, so that they do not stand in for it
-        zeros[own] = _robust(slopes[:, own], left, np.where(beyond, EncoderOffset.farthest, usual)[own])
-        more = own & ~beyond & (np.abs(zeros) > _BEYOND * usual)
-        if not more.any():
-            break
-        beyond |= more & (np.abs(zeros) == np.abs(zeros)[more].max())
-    return np.where(beyond, 0.0, zeros)
+    own, zeros = usual > 0, np.zeros(model.arm.n)
+    # one that was changed is regressed beside the others, so that they do not stand in for it
+    zeros[own] = _robust(slopes[:, own], left, usual[own])
+    return np.where(np.abs(zeros) > _BEYOND * usual, 0.0, zeros)
 
 
 def _robust(X: Array, y: Array, spreads: Array) -> Array:

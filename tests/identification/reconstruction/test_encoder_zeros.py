@@ -15,11 +15,14 @@ from armloop.identification.reconstruction.encoder_zeros import EncoderZeros
 SPREAD, LOGS = 0.03, 6
 
 
-def recorded(seed: int, zeros: np.ndarray | None = None, offsets: np.ndarray | None = None) -> list[MotionLog]:
+def recorded(
+    seed: int, zeros: np.ndarray | None = None, offsets: np.ndarray | None = None, hanging: bool = False
+) -> list[MotionLog]:
     """Logs whose encoders read so much too much (L, 3), rad, and whose torques are so far off (L, 3), N·m."""
     logs = []
     for k in range(LOGS if zeros is None else len(zeros)):
-        motion = fourier_motion(12.0, 100.0, 100 * seed + k)
+        motion = fourier_motion(12.0, 100.0, 100 * seed + k, size=0.5 if hanging else 1.0)
+        motion.q[:, 1] -= np.pi / 2 if hanging else 0.0
         tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
         log = measured(motion, tau, k, name=f"log {k}")
         log = log if zeros is None else replace(log, q=log.q + zeros[k])
@@ -59,7 +62,11 @@ def test_encoders_that_keep_their_zero_have_none_found(seed: int) -> None:
 
 
 def test_torques_that_are_off_from_log_to_log_are_no_encoders() -> None:
-    assert not found(recorded(4, offsets=drawn(4, 1.0))).found
+    off = drawn(4, 1.0) * [0, 1, 1]
+    assert not found(recorded(4, offsets=off)).found
+    # of an arm that hangs down, a zero is nearly an offset
+    assert not found(recorded(4, offsets=off, hanging=True)).found
+    assert found(recorded(4, drawn(4, SPREAD), hanging=True)).found
 
 
 def test_two_logs_and_samples_that_are_no_series_say_nothing() -> None:

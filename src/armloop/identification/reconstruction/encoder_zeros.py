@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -202,7 +203,7 @@ class _Mixed:
         log = np.concatenate([self.log[own] for _, own in rows])
         order = np.argsort(log, kind="stable")
         edges = np.searchsorted(log[order], np.arange(self.logs + 1))
-        parts = [order[first:end] for first, end in zip(edges, edges[1:], strict=False)]
+        parts = [order[first:end] for first, end in pairwise(edges)]
         for _ in range(_ROUNDS):
             slopes = self._per_log(kind, theta)
             Z = np.concatenate([slopes[own, j] / self.scale[j] for j, own in rows])
