@@ -83,6 +83,11 @@ def fourier_motion(
     return Motion(time, q, v, vdot, np.array([0]))
 
 
+def standing(N: int, n: int) -> Motion:
+    """A motion that is none, of so many samples and joints."""
+    return Motion(np.arange(N) * 0.01, *np.zeros((3, N, n)), np.array([0]))
+
+
 def measured(motion: Motion, tau: Array, seed: int, noise: float = 0.01, name: str = "run") -> MotionLog:
     """What sensors would make of it: torque noise (relative to the RMS), a little on q and v, no vdot."""
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+from synthetic import fourier_motion, friction, measured, rigid_torque, standing, three_axis
 
 from armloop.cli import main
 from armloop.data.filters import LowPass, filter_reach
@@ -132,6 +132,8 @@ def test_a_block_is_judged_with_what_the_blocks_beside_it_showed_alone() -> None
         rng.standard_normal((instants, joints)),
         np.arange(instants) // 10,
         np.ones((instants, joints), dtype=bool),
+        standing(instants, joints),
+        1,
     )
     # of R rows and p columns, what is fitted leaves 1 − p/R of the energy, what is not 1 + p/(R − p − 1)
     left = bandwidth._held_out(table)
@@ -158,7 +160,12 @@ class TestPieces:
                 k = next(tables)
                 return replace(
                     Table(
-                        np.full(1, k), np.tile([2.0, 2.0, 4.0], (100, 1)), np.zeros(100, dtype=int), moving
+                        np.full(1, k),
+                        np.tile([2.0, 2.0, 4.0], (100, 1)),
+                        np.zeros(100, dtype=int),
+                        moving,
+                        standing(100, 3),
+                        1,
                     ),
                     moving=moving if k == 0 else ~moving,
                 )

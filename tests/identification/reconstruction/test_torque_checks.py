@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+from synthetic import fourier_motion, friction, measured, rigid_torque, standing, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
 from armloop.identification.reconstruction import reconstruct, torque_checks
@@ -208,7 +208,7 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     tau[:, 0] += 0.5 * np.sign(v[:, 0]) - 0.2 * v[:, 0]
     moving = np.ones((N, 2), dtype=bool)
     moving[:50, 1] = False
-    table = Table(columns, tau, np.arange(N) // 10, moving)
+    table = Table(columns, tau, np.arange(N) // 10, moving, standing(N, 2), 1)
     mass = np.zeros((3, 2, 2, 1))
     mass[:, 0, 0, 0], mass[:, 1, 1, 0] = [1.0, 2.0, 3.0], 5.0
     problem = torque_checks._Problem(table, mass, 1)
