@@ -1,6 +1,8 @@
 """Reading and conditioning a log anew on every pass gives the model that it gives in memory."""
 
 import re
+import sys
+import weakref
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +18,7 @@ from armloop.data.signals import Conditioning, ShortRunError, preprocess
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
+from armloop.identification.reconstruction import data as data_module
 from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.regression.sparse import Sparse
@@ -89,6 +92,35 @@ def test_a_csv_in_pieces_gives_the_model_of_its_pieces_to_the_bit(
     kept = reconstruct(parts, three_axis(), library="rigid-body", options=options)
     streamed = reconstruct(pieces, three_axis(), library="rigid-body", options=options, in_memory=0)
     assert streamed.model.to_dict() == kept.model.to_dict()
+
+
+def test_of_streamed_logs_one_piece_lies_in_memory_at_a_time(
+    logs: list[MotionLog], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever is kept of a pass over the logs is copied out of them: memory does not grow with their number."""
+    made: list[weakref.ref[np.ndarray]] = []
+    most = 0
+    room = "armloop.identification.reconstruction"
+    conditioned = data_module._Conditioned
+    chunk = conditioned.chunk
+
+    def counted(self: object) -> Chunk | None:
+        nonlocal most
+        found = chunk(self)
+        made.extend([weakref.ref(found.samples.tau), weakref.ref(found.samples.motion.q)])
+        most = max(most, *(sum(one() is not None for one in made[k::2]) for k in (0, 1)))
+        return found
+
+    monkeypatch.setattr(conditioned, "chunk", counted)
+    for user in ("fitted", "training"):
+        monkeypatch.setattr(f"{room}.{user}._WINDOW", 600)
+    # Not by its name alone, which is its function's, too.
+    monkeypatch.setattr(sys.modules[f"{room}.reconstruct"], "_RIPPLE", 600)
+    half = logs[0].samples // 2
+    pieces = [log.select(rows) for log in logs[:2] for rows in (slice(None, half), slice(half, None))]
+    result = reconstruct(pieces, three_axis(), library="rigid-body", in_memory=0)
+    assert len(made) >= 2 * 5 * len(pieces) and most == 1
+    assert result.model.uncertainty and result.parts
 
 
 def test_a_long_pass_tells_how_much_time_is_left(
