@@ -1,0 +1,149 @@
+"""Which force or torque a push is: the simplest of those that explain as much, where an arm can tell them apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import pushes
+from armloop.laws.effects import effect
+from armloop.robot.arm import load_arm
+
+Shares = dict[str, float]
+
+
+class TestChoice:
+    """Trials of given shares: t1, t2, … a torque on a joint, f0 a force on the tool, f3, … on a link."""
+
+    def pushed(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        shares: Shares,
+        joints: int = 7,
+        own: float = 0.9,
+        shown: Any = (0, 1),
+    ) -> tuple[str, list[tuple[str, int | None, float]]] | None:
+        asked: list[str] = []
+        weights: list[Any] = []
+
+        def trial(evidence: Any, residual: Any, weight: Any, burst: Any, kind: Any, shown: Any) -> Any:
+            name = f"t{kind.effect.joint}" if kind.effect.joint else f"f{kind.link}"
+            asked.append(name)
+            weights.append(weight)
+            if name not in shares:
+                return None
+            nothing: Any = None
+            return pushes.Contact(SimpleNamespace(name=name), nothing, nothing, nothing, shares[name], own)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(pushes, "_trial", trial)
+        evidence: Any = SimpleNamespace(
+            model=SimpleNamespace(arm=SimpleNamespace(n=joints)), scale=np.array([0.5, 4.0])
+        )
+        nothing: Any = None
+        counted = np.array([[True, True], [True, False]])
+        found = pushes.push(evidence, nothing, slice(0, 2), counted, list(shown))
+        links = [f"f{link}" for link in range(joints - 1, 2, -1)]
+        assert asked == [*(f"t{j + 1}" for j in shown), "f0", *links]
+        assert weights[0].tolist() == [[2.0, 0.25], [2.0, 0.0]]
+        if found is None:
+            return None
+        assert (found.share, found.own) == (shares[found.added.name], own)  # type: ignore[attr-defined]
+        return found.added.name, [(e.name, e.joint, share) for e, share in found.rivals]  # type: ignore[attr-defined]
+
+    def test_on_an_arm_of_more_than_three_joints_it_is_a_force_if_that_explains_as_much(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        torque = ("external_torque", 1)
+        assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.86}, 4) == ("f0", [(*torque, 0.9)])
+        assert self.pushed(monkeypatch, {"t1": 0.9, "f0": 0.84}, 4) == ("t1", [])
+        # two or three joints feel it as they feel a torque, which is simpler
+        found = self.pushed(monkeypatch, {"t1": 0.86, "f0": 0.9}, 3)
+        assert found == ("t1", [("external_contact", None, 0.9)])
+        assert self.pushed(monkeypatch, {"t1": 0.84, "f0": 0.9}, 3) == ("f0", [])
+
+    def test_on_the_tool_before_a_link_and_of_links_or_joints_the_one_that_explains_most(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # a force on a link is no other effect than one on the tool
+        assert self.pushed(monkeypatch, {"f0": 0.86, "f5": 0.9}) == ("f0", [])
+        assert self.pushed(monkeypatch, {"f0": 0.5, "f4": 0.88, "f5": 0.9}) == ("f5", [])
+        assert self.pushed(monkeypatch, {"t1": 0.88, "t2": 0.9}) == ("t2", [("external_torque", 1, 0.88)])
+
+    def test_it_must_explain_half_of_the_joints_that_showed_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.pushed(monkeypatch, {"f0": 0.9}, own=0.5) == ("f0", [])
+        assert self.pushed(monkeypatch, {"f0": 0.9}, own=0.49) is None
+        assert self.pushed(monkeypatch, {}) is None
+
+
+class TestParameters:
+    """What a trial tells of a push of 2 N·m, or of 2 N along each axis, on twenty samples."""
+
+    def trial(
+        self, monkeypatch: pytest.MonkeyPatch, kind: Any, arm: Any, samples: int = 40, **of: Any
+    ) -> Any:
+        given = Motion(np.arange(float(samples)) * 0.01, *np.zeros((3, samples, arm.n)), np.array([0]))
+        given.q[:] = np.linspace(0.1, 0.5, samples)[:, None] * np.arange(1, arm.n + 1)
+        moved: list[slice] = []
+
+        def interval(evidence: Any, residual: Any, weight: Any, burst: slice, kind: Any) -> slice:
+            moved.append(burst)
+            return slice(burst.start + 1, burst.stop)
+
+        monkeypatch.setattr(pushes, "_interval", interval)
+        reach = of.get("reach", 0.0)
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=given, period=0.01, reach=reach),
+            scale=np.ones(arm.n),
+            model=SimpleNamespace(arm=arm),
+        )
+        columns = kind.columns(evidence, given)
+        residual = columns @ np.full(columns.shape[2], 2.0) * of.get("size", 1.0)
+        found = pushes._trial(
+            evidence, residual, np.ones((samples, arm.n)), slice(7, 30), kind, of.get("shown", [0])
+        )
+        # interval and size are found in turn three times
+        assert [b.start for b in moved] == [7, 8, 9]
+        return found
+
+    def test_a_torque_has_its_joints_unit_and_the_posture_where_it_began(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        arm = load_arm("scara")
+        found = self.trial(
+            monkeypatch, pushes._Kind(effect("external_torque", 3)), arm, shown=[2]
+        ).added.parameters
+        assert found["torque"].value == pytest.approx(2.0) and found["torque"].unit == "N"
+        assert found["posture"].unit == "rad or m"
+        assert (found["start"].value, found["end"].value) == pytest.approx((0.1, 0.29))
+        first = np.linspace(0.1, 0.5, 40)[10]
+        np.testing.assert_allclose(found["posture"].value, first * np.arange(1, 5))
+        assert found["start"].std_error == 0.01
+        found = self.trial(monkeypatch, pushes._Kind(effect("external_torque", 1)), three_axis(), reach=0.1)
+        assert (
+            found.added.parameters["torque"].unit == "N*m" and found.added.parameters["posture"].unit == "rad"
+        )
+        assert found.added.parameters["start"].std_error == pytest.approx(0.15)
+
+    @pytest.mark.parametrize("link", [0, 3])
+    def test_a_force_has_its_link_unless_that_is_the_tool(
+        self, link: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        kind = pushes._Kind(effect("external_contact", None), link)
+        found = self.trial(monkeypatch, kind, three_axis(), shown=[0, 1, 2])
+        force = found.added.parameters["force"]
+        np.testing.assert_allclose(force.value, 2.0, rtol=0.05)
+        assert force.unit == "N" and found.share == pytest.approx(1.0) and found.own == pytest.approx(1.0)
+        assert ("link" in found.added.parameters) == (link > 0)
+        assert link == 0 or found.added.parameters["link"].value == 3.0
+
+    def test_what_no_joint_showed_has_no_own_part(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        kind = pushes._Kind(effect("external_torque", 1))
+        assert self.trial(monkeypatch, kind, three_axis(), shown=[1]).own == 0.0
+        assert self.trial(monkeypatch, kind, three_axis(), size=0.0) is None
+        assert replace(kind).link == 0
