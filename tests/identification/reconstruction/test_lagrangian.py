@@ -62,6 +62,19 @@ def test_the_planted_energies_are_found_under_noise(result: Reconstruction):
         assert value == pytest.approx(TRUTH.get(name, 0.0), rel=0.1, abs=0.02)
 
 
+def test_a_step_has_the_terms_that_act_on_a_joint_by_then(result: Reconstruction):
+    (body,) = result.model.components
+    count, friction = candidates(three_axis()).count, result.model.friction.terms
+    assert {term.step for law in friction for term in law} == {1, 2}
+    for step, report in enumerate(result.reports, 1):
+        # at rest the potential energy, in motion the kinetic too, which each joint feels whose angle or speed is in it
+        names = [name for name in body.energy.names if step > 1 or "v" not in name]
+        acting = [sum(f"q{j}" in name or f"v{j}" in name for name in names) for j in (1, 2, 3)]
+        rubbing = [sum(term.step <= step for term in law) for law in friction]
+        assert report.terms == [a + b for a, b in zip(acting, rubbing, strict=True)]
+        assert (report.step, report.candidates, report.independent) == (step, count, count)
+
+
 def test_a_fresh_run_is_predicted(result: Reconstruction):
     samples = preprocess([a_run(9, noise=0.0)], result.model.conditioning)
     assert max(score(result.model, samples).moving["nrmse"]) < 0.02

@@ -43,6 +43,18 @@ def result() -> Reconstruction:
     return reconstruct([a_run(1), a_run(2)], three_axis(), library="rigid-body")
 
 
+def test_a_step_has_all_base_parameters_of_a_joint_and_the_friction_found_by_then(result: Reconstruction):
+    base, (body,) = BaseParameters.of_arm(three_axis(), rotors=True), result.model.components
+    friction = result.model.friction.terms
+    for step, report in enumerate(result.reports, 1):
+        rubbing = [sum(term.step <= step for term in law) for law in friction]
+        assert report.terms == [len(body.terms(three_axis(), j)) + rubbing[j] for j in range(3)]
+        # friction that was regressed, and what of it vanished
+        assert report.candidates >= base.count + sum(len(law) for law in friction)
+        assert (report.step, report.independent) == (step, base.count)
+    assert result.reports[0].terms != result.reports[1].terms == result.reports[2].terms
+
+
 def test_base_parameters_are_recovered_though_the_urdf_is_wrong(result: Reconstruction):
     base = BaseParameters.of_arm(three_axis(), rotors=True)
     (body,) = result.model.components
