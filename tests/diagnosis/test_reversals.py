@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +12,10 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
-from armloop.diagnosis import diagnose
+from armloop.diagnosis import diagnose, reversals
 from armloop.diagnosis.reversals import turning
 from armloop.identification.scoring import score
+from armloop.laws.effects import effect as named
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.laws.hysteresis import stop_operator
 from armloop.model import ReconstructedModel
@@ -78,3 +81,55 @@ def test_a_joint_that_turns_around_does_not_rest() -> None:
     assert np.count_nonzero(np.diff(turns[:, 0].astype(int)) > 0) == 3
     assert turns[[100, 200, 300], 0].all() and not (turns[:, 0] & moving[:, 0]).any()
     assert not turns[:, 1:].any()
+
+
+class TestTurning:
+    """One joint, a sample every 0.1 s; it counts as moving but in given samples."""
+
+    def turned(self, v: list[float], still: list[int], starts: tuple[int, ...] = (0,)) -> list[int]:
+        speeds = np.array(v, dtype=float)[:, None]
+        time = 0.1 * np.arange(len(v))
+        motion = Motion(time, 0 * speeds, speeds, 0 * speeds, np.array(starts))
+        moving = np.ones((len(v), 1), dtype=bool)
+        moving[still] = False
+        return np.flatnonzero(turning(motion, moving)[:, 0]).tolist()
+
+    def test_it_turns_if_it_moves_the_other_way_afterwards(self) -> None:
+        assert self.turned([1, 1, 0, -1, -1], [2]) == [2]
+        assert self.turned([1, 1, 0, 1, 1], [2]) == []
+        assert self.turned([1, 1, 0, -1, -1, 0, 1, 1], [2, 5]) == [2, 5]
+
+    def test_within_four_tenths_of_a_second(self) -> None:
+        # 0.3 s between the last sample that moves and the next, and 0.5 s
+        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3]) == [2, 3]
+        assert self.turned([1, 1, 0, 0, 0, 0, -1, -1], [2, 3, 4, 5]) == []
+
+    def test_what_a_run_begins_or_ends_with_is_no_turn_nor_is_what_two_runs_do(self) -> None:
+        assert self.turned([1, 0, -1, -1], [0, 1]) == self.turned([1, 1, -1, -1], [2, 3]) == []
+        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3], (0, 3)) == []
+        assert self.turned([9, 1, 1, 0, -1, -1], [3], (0, 1)) == [3]
+
+
+def test_an_error_at_reversals_is_noticeable_from_three_hundredths_of_the_torque() -> None:
+    """Of the rows that count; in the baselines of the joints."""
+    tau = np.array([[3.0, 99.0], [4.0, 2.0], [99.0, 2.0]])
+    rows = np.array([[True, False], [True, True], [False, True]])
+    evidence: Any = SimpleNamespace(samples=SimpleNamespace(tau=tau), rows=rows, scale=np.array([0.5, 0.1]))
+    stacked = SimpleNamespace(joint=np.array([0, 0, 1, 1]), block=np.arange(4))
+    judged = np.array([[True, True], [False, True], [True, False]])
+    fit: Any = SimpleNamespace(stacked=stacked)
+    view = reversals._View.of(evidence, fit, judged)
+    np.testing.assert_allclose(view.noticeable, [(0.03 / 0.5) ** 2 * 12.5, (0.03 / 0.1) ** 2 * 4.0])
+    assert view.rows.tolist() == judged[rows].tolist() and view.block.tolist() == [0, 1, 2, 3]
+    evidence.rows = np.zeros((3, 2), dtype=bool)
+    assert reversals._View.of(evidence, fit, judged).noticeable.tolist() == [0.0, 0.0]
+
+
+def test_effects_in_a_joint_are_asked_and_no_sensor_nor_what_is_known() -> None:
+    arm = three_axis()
+    current: Any = SimpleNamespace(effects=[named("joint_spring", 2)])
+    asked = {each.place for each in reversals._concerned(arm, {1}, current)}
+    assert ("viscous_friction", 2, None) in asked and ("transmission_coupling", 2, 3) in asked
+    assert ("transmission_coupling", 1, 2) in asked and ("transmission_coupling", 1, 3) not in asked
+    assert ("joint_spring", 2, None) not in asked and ("viscous_friction", 1, None) not in asked
+    assert not {"torque_offset", "payload", "gravity_tilt"} & {name for name, *_ in asked}
