@@ -1,0 +1,113 @@
+"""A ripple is a line of the spectrum over the angle: how strong it must be, and that it keeps its phase."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.identification.reconstruction import ripple
+from armloop.identification.reconstruction.ripple import Residual
+from armloop.robot.arm import load_arm
+
+ORDERS = np.arange(1.0, 201.0)
+
+
+def residual(
+    sine: float = 0.3, cosine: float = 0.4, noise: float = 0.5, blocks: int = 40, **of: Any
+) -> Residual:
+    """A joint that turns evenly, with a wave of order 100 in given blocks of 100 samples."""
+    rng = np.random.default_rng(of.get("seed", 0))
+    q = np.sort(rng.uniform(-3, 3, 100 * blocks))
+    block = np.arange(100 * blocks) // 100
+    wave = sine * np.sin(100 * q) + cosine * np.cos(100 * q)
+    there = np.isin(block, of.get("there", range(blocks)))
+    return Residual(q, np.where(there, wave, 0.0) + noise * rng.normal(size=len(q)), block)
+
+
+def test_the_spectrum_is_what_waves_take_of_the_squares() -> None:
+    q = 2 * np.pi * np.arange(600) / 600
+    x = 3.0 * np.sin(5 * q) + 4.0 * np.cos(7 * q)
+    power = ripple.spectrum(q, x, np.arange(3.0, 10.0))
+    np.testing.assert_allclose(power, [0, 0, 9 * 300, 0, 16 * 300, 0, 0], atol=1e-9)
+
+
+def test_a_line_has_the_coefficients_and_the_errors_of_least_squares_over_blocks() -> None:
+    left = residual()
+    line = ripple._line(left, ORDERS, 3)
+    assert line is not None
+    order, x, covariance = line
+    assert order == 100.0
+    X = np.column_stack([np.sin(100 * left.q), np.cos(100 * left.q)])
+    np.testing.assert_allclose(x, np.linalg.lstsq(X, left.left, rcond=None)[0])
+    np.testing.assert_allclose(x, [0.3, 0.4], atol=4 * 0.5 * np.sqrt(2 / 4000))
+    bread, after = np.linalg.inv(X.T @ X), left.left - X @ x
+    scores = np.array([X[left.block == k].T @ after[left.block == k] for k in range(40)])
+    np.testing.assert_allclose(covariance, bread @ scores.T @ scores @ bread)
+
+
+def test_noise_has_no_line_nor_has_what_a_few_blocks_hold() -> None:
+    assert all(ripple._line(residual(0.0, 0.0, seed=seed), ORDERS, 3) is None for seed in range(5))
+    # strong in two blocks of forty it stands out of the spectrum, but no chance is ruled out
+    burst = residual(6.0, 8.0, there=(7, 22))
+    power = ripple.spectrum(burst.q, burst.left, ORDERS)
+    assert power[99] > 20 * np.median(power) and power[99] > 0.005 * np.sum(burst.left**2)
+    assert ripple._line(burst, ORDERS, 3) is None
+
+
+def even(*waves: tuple[int, float]) -> Residual:
+    """Eight turns at an even speed, of which waves of whole orders are orthogonal, in forty blocks."""
+    q = 16 * np.pi * np.arange(4000) / 4000
+    return Residual(q, np.sum([a * np.sin(k * q) for k, a in waves], axis=0), np.arange(4000) // 100)
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.0051, True), (0.0049, False)])
+def test_a_line_must_hold_a_two_hundredth_of_the_squares(share: float, found: bool) -> None:
+    line = ripple._line(even((1, np.sqrt(1 / share - 1)), (100, 1.0)), ORDERS[20:], 3)
+    assert (line is not None) == found
+    assert line is None or line[1] == pytest.approx([1.0, 0.0], abs=1e-9)
+
+
+def test_a_line_is_twenty_times_as_strong_as_the_orders_a_quarter_around_it() -> None:
+    around = [k for k in range(75, 126) if abs(k - 100) > 6]
+    for times, found in ((20.2, True), (19.8, False)):
+        line = ripple._line(even((100, np.sqrt(times)), *((k, 1.0) for k in around)), ORDERS, 3)
+        assert (line is not None) == found
+    # the nearest, which it leaks into, and those farther away do not matter
+    near = [k for k in range(94, 107) if k != 100]
+    for others in (near, [*range(20, 75), *range(126, 180)]):
+        line = ripple._line(even((100, 4.0), *((k, 0.5) for k in others)), ORDERS, 3)
+        assert line is not None and line[0] == 100.0
+
+
+@pytest.mark.parametrize("samples", [499, 500])
+def test_joints_that_turn_are_asked_until_nothing_is_left_three_times_at_most(
+    samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A SCARA: the third joint slides."""
+    arm, asked = load_arm("scara"), []
+    own = Residual(np.zeros(samples), np.full(samples, 9.0), np.zeros(samples, dtype=int))
+
+    def line(left: Residual, orders: Any, joints: int) -> Any:
+        asked.append(float(left.left[0]))
+        return None if len(asked) == 5 else (10.0 + len(asked), np.array([3.0, 2.0]), np.eye(2))
+
+    monkeypatch.setattr(ripple, "_residuals", lambda *_: ([own] * 4, 0.01))
+    monkeypatch.setattr(ripple, "_line", line)
+    monkeypatch.setattr(ripple.TorqueRipple, "shapes", lambda self, context: [1.0, 2.0])
+    model: Any = SimpleNamespace(arm=arm)
+    sampled: Any = SimpleNamespace(cutoff_hz=1.0, motion=None)
+    nothing: Any = None
+    found = ripple.find_ripple(model, [], sampled, nothing)
+    if samples == 499:
+        assert found == [] and asked == []
+        return
+    # what a line explains, two per unit of its cosine, is taken away before the next
+    assert asked == [9.0, 7.0, 5.0, 9.0, 7.0, 9.0, 7.0, 5.0]
+    assert [added.effect.joint for added in found] == [1, 1, 1, 2, 4, 4, 4]
+    assert {added.when for added in found} == {"always"}
+    sampled.cutoff_hz = 0.0
+    assert ripple.find_ripple(model, [], sampled, nothing) == [] and three_axis().n == 3
