@@ -7,11 +7,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from armloop.data.log import read_log, write_log
+from armloop.drake.experiments import collection
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.scenarios import load_plan, load_plant, plant_for
+from armloop.drake.experiments.speed_mode import Recording
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.experiment.design import Limits, Series, nominal_torque
+from armloop.experiment.excitation import fourier_reference
 from armloop.robot.kinematics import nominal_parameters, regressor
 
 TINY = dataclasses.replace(
@@ -143,3 +146,83 @@ def test_a_motion_of_the_designed_family_is_followed():
     assert np.abs(log.q - q).max() < 2e-4
     assert np.sqrt(np.mean((log.v - v) ** 2, axis=0)).max() < 5e-3
     assert np.all(np.abs(log.tau).max(axis=0) < effort)
+
+
+class TestPieces:
+    """A rig that records one sample per 0.1 s of zeros, and of the torque one."""
+
+    @pytest.fixture
+    def rigs(self, monkeypatch):
+        made = []
+
+        class Rig:
+            def __init__(self, arm, friction, *, time_step, **of):
+                self.time_step, self.of, self.followed = time_step, of, []
+                made.append(self)
+
+            def follow(self, reference, *, rate, settle=0.0):
+                self.followed.append((reference.duration, rate, settle))
+                time = np.arange(0.0, max(reference.duration, 0.3), 0.1)
+                q = np.full((len(time), 3), reference.duration)
+                return Recording(time, q, 0 * q, 1 + 0 * q)
+
+        monkeypatch.setattr(collection, "SpeedModeArm", Rig)
+        return made
+
+    def test_the_longest_segments_come_first_and_each_time_step_has_one_rig(self, rigs):
+        plant = load_plant("three_axis")
+        plan = dataclasses.replace(
+            TINY, static_poses=1, velocity_segments=2, trajectories=2, trajectory_duration=5.0, rate=7.0
+        )
+        told = []
+        logs = collect(plant.arm, plant.config, plan, 1, lambda what, done: told.append((what, done)))
+        fine, coarse = rigs
+        assert fine.time_step == plant.config.time_step and coarse.time_step == plan.segment_time_step
+        assert fine.followed == [(5.0, 7.0, 0.0)] * 2
+        constant = plan.velocity_settle + plan.velocity_hold, 7.0, plan.velocity_settle
+        static = plan.static_settle + plan.static_hold, 7.0, plan.static_settle
+        assert coarse.followed == [constant] * 2 + [static] * 2
+        total = 10 + 2 * constant[0] + 2 * static[0]
+        done = np.cumsum([5.0, 5.0, constant[0], constant[0], static[0], static[0]]) / total
+        assert_allclose([part for _, part in told], done)
+        assert list(logs) == ["static", "constant_velocity", "varying"]
+        assert [len(log.runs()) for log in logs.values()] == [2, 2, 2]
+
+    def test_trajectories_differ_by_seed_and_number(self):
+        plant = load_plant("three_axis")
+        plan = dataclasses.replace(TINY, static_poses=1, velocity_segments=2, trajectories=2)
+        parts = {part.name: part for part in collection._parts(plant.arm, plant.config, plan, 3)}
+        for k, reference in enumerate(parts["varying"].references):
+            expected = fourier_reference(plant.config.ranges, plan.trajectory_duration, 3000 + k)
+            assert_allclose(reference.evaluate([0.7])[0], expected.evaluate([0.7])[0])
+        assert (parts["varying"].settle, parts["static"].settle) == (0.0, plan.static_settle)
+        creep = np.abs(parts["static"].references[0].evaluate([0.1])[1][0])
+        assert_allclose(creep, np.deg2rad(0.1))
+        dwelling = collection._parts(plant.arm, plant.config, dataclasses.replace(plan, dwell=True), 3)[0]
+        assert len(dwelling.references) == 1 and not dwelling.references[0].evaluate([0.1])[1].any()
+
+    def test_a_measured_run_is_of_fifty_seconds_and_five_harmonics_at_half_a_kilohertz(
+        self, rigs, monkeypatch
+    ):
+        asked = []
+
+        def drawn(ranges, duration, seed, harmonics):
+            asked.append((duration, seed, harmonics))
+            return fourier_reference(ranges, 1.0, seed, harmonics=harmonics)
+
+        monkeypatch.setattr(collection, "fourier_reference", drawn)
+        plant, told = load_plant("three_axis"), []
+        measure_run(plant.arm, plant.config, 4, progress=lambda what, done: told.append(done))
+        assert asked == [(50.0, 4, 5)] and rigs[0].followed == [(1.0, 500.0, 0.0)] and told == [0.0, 1.0]
+
+    def test_recordings_are_runs_twenty_periods_apart_with_the_sensors_noise(self):
+        time = np.arange(5) * 0.01
+        q = np.linspace(0.0, 1e-3, 5)[:, None] + 1.23456789123e-3
+        parts = [Recording(time, q, q, 3.0 + 0 * q), Recording(time + 0.5, q, q, 4.0 + 0 * q)]
+        log = collection._as_log("two", parts, Instruments(torque_noise=0.02), np.random.default_rng(8))
+        assert_allclose(log.time, [*time, *(0.04 + 0.2 + 0.5 + time)], atol=1e-9)
+        assert len(log.runs()) == 2 and log.name == "two"
+        noise = 0.02 * np.sqrt(12.5) * np.random.default_rng(8).standard_normal((10, 1))
+        tau = np.repeat([3.0, 4.0], 5)[:, None] + noise
+        assert np.array_equal(log.tau, np.round(tau, 6))
+        assert np.array_equal(log.q[:5], np.round(q, 9)) and np.array_equal(log.v[:5], np.round(q, 7))
