@@ -12,6 +12,7 @@ from armloop.data.signals import independent_rows, preprocess
 from armloop.identification.uncertainty import Fitted, standard_errors
 from armloop.identification.uncertainty import standard_errors as module_function
 from armloop.identification.uncertainty.solving import solve_given_terms
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import load_model
 from armloop.util.errors import ModelError
 from armloop_paper.simulated import Disturbance, collection, true_model
@@ -128,3 +129,75 @@ def test_errors_are_roots_of_variances_that_rounding_made_no_less_than_none() ->
     nothing: Any = None
     errors = standard.Errors([], np.diag([4.0, -1e-20, 0.25]), nothing, nothing)
     assert errors.std_error.tolist() == [2.0, 0.0, 0.5]
+
+
+def unknown(name: str, joint: int | None, value: float = 0.0, kind: str = "friction") -> Any:
+    return SimpleNamespace(name=name, joint=joint, value=value, kind=kind)
+
+
+class TestWhatIsNotDetermined:
+    """A coefficient of the bodies whose column is twice that of one of the friction's, in one regression or in two."""
+
+    def errors(self, stage: tuple[int, ...] = (0, 0, 0)) -> Any:
+        X = np.random.default_rng(0).normal(size=(30, 3))
+        X[:, 0] = 2 * X[:, 2]
+        unknowns = [
+            unknown("mass", None, 3.0, "shared"),
+            unknown("drag", 1, 5.0, "joints"),
+            unknown("viscous", 1, 7.0),
+        ]
+        equations = SimpleNamespace(
+            jacobian=np.array([X[:10].T @ X[:10], X[10:].T @ X[10:]]), stage=np.array(stage)
+        )
+        return standard.Errors(unknowns, np.diag([4.0, 1.0, 9.0]), np.ones(3), equations)
+
+    def test_the_friction_stays_and_the_sum_has_a_standard_error(self) -> None:
+        (entry,) = self.errors().undetermined()
+        assert entry["joint"] is None and entry["coefficients"] == ["mass"]
+        (told,) = entry["sums"]
+        assert told["sum"] == "viscous + 2 mass"
+        assert told["value"] == pytest.approx(7 + 2 * 3) and told["std_error"] == pytest.approx(
+            np.sqrt(9 + 4 * 4)
+        )
+
+    def test_what_another_regression_found_is_told_apart(self) -> None:
+        assert self.errors((0, 0, 1)).undetermined() == []
+
+    def test_a_joints_own_coefficient_is_told_with_its_joint(self) -> None:
+        errors = self.errors()
+        errors.unknowns[0] = unknown("inertia", 1, 3.0, "joints")
+        assert errors.undetermined()[0]["joint"] == 2
+        errors.covariance[:] = -1e-20
+        assert errors.undetermined()[0]["sums"][0]["std_error"] == 0.0
+
+
+def test_levels_of_stribeck_friction_are_sums_with_the_fewest_degrees_of_freedom() -> None:
+    terms = (FrictionTerm("sign", 0.5), FrictionTerm("stribeck", -0.2, 0.3), FrictionTerm("viscous", 2.0))
+    names = [term.name(2) for term in terms]
+    unknowns = [
+        *(unknown(name, 1) for name in names),
+        unknown("v_s", 1),
+        unknown(names[0], 0),
+        unknown(names[0], 1, kind="x"),
+    ]
+    covariance = np.diag([4.0, 9.0, 16.0, 25.0, 99.0, 99.0])
+    covariance[0, 1] = covariance[1, 0] = -2.0
+    nothing: Any = None
+    part = standard.Errors(unknowns, covariance, np.array([30.0, 20.0, 10.04, 40.0, 1.0, 1.0]), nothing)
+    model: Any = SimpleNamespace(friction=FrictionLaw(((), terms)))
+    found = standard._stribeck(model, [part], 1)
+    assert {key: (e["value"], e["degrees_of_freedom"]) for key, e in found.items()} == {
+        "static": (0.5, 30.0),
+        "coulomb": (0.3, 20.0),
+        "stribeck_velocity": (0.3, 40.0),
+        "viscous": (2.0, 10.0),
+    }
+    errors = {key: e["std_error"] for key, e in found.items()}
+    assert errors == pytest.approx({"static": 2.0, "coulomb": 3.0, "stribeck_velocity": 5.0, "viscous": 4.0})
+    assert standard._stribeck(model, [part], 0) == {}
+
+
+def test_of_no_blocks_the_sum_is_zero() -> None:
+    assert standard._summed(np.zeros((0, 2, 2)), 2).tolist() == [[0, 0], [0, 0]]
+    assert standard._summed(np.zeros((0, 3)), 3).tolist() == [0, 0, 0]
+    assert standard._summed(np.ones((2, 3)), 3).tolist() == [2, 2, 2]

@@ -1,0 +1,44 @@
+"""A shifted encoder on an arm whose torque is known: exact at the shift found, a derivative at none."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.laws.effects import Context, Estimate, effect
+
+
+@pytest.fixture
+def context() -> Context:
+    q = np.random.default_rng(0).uniform(-1, 1, (9, 3))
+    motion = Motion(np.arange(9.0), q, 0 * q, 0 * q, np.array([0]))
+    return Context(three_axis(), motion, predict=lambda motion: np.sin(motion.q) * [1.0, 10.0, 100.0])
+
+
+def test_its_columns_are_the_change_of_torque_per_radian(context: Context) -> None:
+    offset, q = effect("encoder_offset", 2), context.motion.q[:, 1]
+    for shift in (0.3, -0.3, 0.011):
+        made = offset.columns(context, shift)
+        assert made.shape == (9, 3, 1) and not made[:, [0, 2]].any()
+        assert_allclose(made[:, 1, 0], 10 * (np.sin(q - shift) - np.sin(q)) / shift, atol=1e-9)
+    for small in (0.0, 0.01, -0.009):
+        slope = 10 * (np.sin(q - 0.01) - np.sin(q + 0.01)) / 0.02
+        assert_allclose(offset.columns(context, small)[:, 1, 0], slope, atol=1e-9)
+    change = offset.torque(context, {"offset": 0.2})
+    assert_allclose(change[:, 1], 10 * (np.sin(q - 0.2) - np.sin(q)), atol=1e-9)
+    assert not offset.torque(context, {"offset": 0.0}).any()
+
+
+def test_a_shift_of_more_than_six_tenths_is_no_small_fault(context: Context) -> None:
+    offset = effect("encoder_offset", 2)
+    assert [offset.refined(np.array([x]), 0.0) for x in (0.5, 0.7, -0.7)] == [0.5, 0.6, -0.6]
+    assert [
+        offset.plausible(context.arm, {"offset": Estimate(x, 0.1, "rad")}) for x in (0.59, -0.59, 0.6)
+    ] == [
+        True,
+        True,
+        False,
+    ]
+    q, tau = offset.falsified(context.motion.time, context.motion.q, context.motion.q, {"offset": 0.2})
+    assert_allclose(q - tau, np.outer(np.ones(9), [0, 0.2, 0]), atol=1e-12)
