@@ -156,3 +156,130 @@ class TestSearch:
         swaps = {"joint_spring": drag, "viscous_friction": offset, "torque_offset": spring}
         chosen(swaps, [spring, offset])
         assert len(asked) == 4
+
+
+class TestOneForSeveral:
+    """Two effects of joints found; one of the whole arm, or of a pair of joints, in their stead."""
+
+    def instead(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        errors: dict[str, float | None],
+        found: int = 2,
+        left: float = 100.0,
+    ) -> list[tuple[str, float]]:
+        listed = [effect("payload", None), effect("transmission_coupling", 1, 2), effect("joint_spring", 3)]
+        given: Any = [
+            SimpleNamespace(effect=effect(name, 1), shape=0.0, share=1.0)
+            for name in ("torque_offset", "viscous_friction")[:found]
+        ]
+        asked: list[str] = []
+
+        def trial(effect: Any) -> Any:
+            asked.append(effect.name)
+            error = errors.get(effect.name)
+            return None if error is None else SimpleNamespace(shapes=["first", "its"], score=score(error))
+
+        search: Any = object.__new__(searching._Search)
+        search.evidence, search.progress = SimpleNamespace(model=SimpleNamespace(arm=None)), lambda text: None
+        search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(1000.0)), trial=trial)
+        search.explainable = np.array([1000.0, 500.0])
+        monkeypatch.setattr(searching, "hypotheses", lambda arm: listed)
+        monkeypatch.setattr(
+            searching,
+            "_known",
+            lambda evidence, found: SimpleNamespace(fit=SimpleNamespace(score=score(left))),
+        )
+        monkeypatch.setattr(searching, "is_behind", lambda bare, trial, best: trial.error > best.error)
+        made = search._one_for_several(given)
+        assert "joint_spring" not in asked and (found > 1 or asked == [])
+        if made is given:
+            return []
+        assert made[0].shape == "its" and made[0].rivals == []
+        return [(f.effect.name, f.share) for f in made]
+
+    def test_one_effect_that_does_what_several_did_takes_their_place(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        assert self.instead(monkeypatch, {"payload": 100.0}) == [("payload", pytest.approx(0.6))]
+        assert self.instead(monkeypatch, {"payload": 101.0}) == []
+        pair = [("transmission_coupling", pytest.approx(0.66))]
+        assert self.instead(monkeypatch, {"payload": 101.0, "transmission_coupling": 10.0}) == pair
+        assert self.instead(monkeypatch, {"payload": None}) == []
+        assert self.instead(monkeypatch, {"payload": -9000.0}) == [("payload", 1.0)]
+
+    def test_of_one_effect_nobody_asks(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.instead(monkeypatch, {"payload": 0.0}, found=1) == []
+
+
+class TestOutcomes:
+    """Effects by name, fitted again without one of them."""
+
+    @staticmethod
+    def outcome(*names: str) -> Any:
+        found = [SimpleNamespace(effect=SimpleNamespace(place=name), shape=name) for name in names]
+        return searching.Outcome(found, None, SimpleNamespace(score="all"), None)  # type: ignore[arg-type]
+
+    @pytest.fixture(autouse=True)
+    def known(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def names(evidence: Any, found: Any) -> Any:
+            return SimpleNamespace(fit=SimpleNamespace(score="".join(f.shape for f in found)))
+
+        monkeypatch.setattr(searching, "_known", names)
+
+    def test_what_is_worth_nothing_beside_the_others_goes_the_first_first(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        nothing: Any = None
+
+        def kept(worth: dict[tuple[str, str], bool], *names: str) -> str:
+            monkeypatch.setattr(
+                searching, "is_worth", lambda e, others, after: worth.get((others, after), True)
+            )
+            made = searching.pruned(nothing, self.outcome(*names))
+            return "".join(f.shape for f in made.found)
+
+        assert kept({}, "a", "b", "c") == "abc"
+        assert kept({("ac", "all"): False}, "a", "b", "c") == "ac"
+        assert kept({("ac", "all"): False, ("c", "ac"): False}, "a", "b", "c") == "c"
+        # either would go, but not both
+        assert kept({("b", "all"): False, ("a", "all"): False}, "a", "b") == "b"
+
+    def test_the_strength_of_an_effect_is_what_the_others_leave(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(searching, "times_enough", lambda evidence, others, after: f"{others} {after}")
+        monkeypatch.setattr(searching, "lead", lambda others, after: f"{after} {others}")
+        nothing: Any = None
+        found = searching.strengths(nothing, self.outcome("a", "b", "c"))
+        assert [(s.times, s.errors) for s in found] == [
+            ("bc all", "all bc"),
+            ("ac all", "all ac"),
+            ("ab all", "all ab"),
+        ]
+
+    def test_effects_at_a_joint_are_taken_away_and_the_others_fitted_again(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(
+            searching, "_acts_mainly_on", lambda evidence, effect, shape, joint: shape == "abc"[joint]
+        )
+        nothing: Any = None
+        whole = self.outcome("a", "b")
+        bare = searching.without_effects_at(nothing, whole, 0)
+        assert [f.shape for f in bare.found] == ["b"] and bare.after.score == "b"  # type: ignore[comparison-overlap]
+        assert searching.without_effects_at(nothing, whole, 2) is whole
+
+
+def test_the_joint_that_an_effect_acts_on_above_all() -> None:
+    """Weighted: 3 N·m of joint 1 at a baseline of 2, 2 of joint 2 at one of 1; -2 and 2 of joint 3 at one of 2."""
+    columns = np.array([[[3.0, 0.0], [2.0, 0.0], [-2.0, 2.0]]])
+    evidence: Any = SimpleNamespace(
+        columns=lambda effect, shape: columns * shape, scale=np.array([2.0, 1.0, 2.0])
+    )
+    shape: Any = SimpleNamespace(final=1.0)
+    of = searching._acts_mainly_on
+    assert [of(evidence, effect("payload", None), shape, j) for j in range(3)] == [False, True, False]
+    assert [of(evidence, effect("joint_spring", 3), shape, j) for j in range(3)] == [False, False, True]
+    pair = effect("transmission_coupling", 1, 3)
+    assert [of(evidence, pair, shape, j) for j in range(3)] == [True, False, True]
