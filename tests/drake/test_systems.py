@@ -118,3 +118,104 @@ def test_what_is_sampled_is_sampled_from_the_start():
         timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
         if timing is not None:
             assert (timing.period_sec(), timing.offset_sec()) == (0.5, 0.0), type(system)
+
+
+class Scaled:
+    """A model without an arm: the position times a factor, by steps."""
+
+    def __init__(self, factor):
+        self.factor = factor
+
+    def feedforward(self, q, v, vdot, step):
+        return self.factor * (q + 10 * v * (step > 1) + 100 * vdot * (step > 2))
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_one_port_may_have_all_of_the_reference_and_the_model_may_be_exchanged(step):
+    expected = (
+        np.array([1.0, 2.0])
+        + 10 * np.array([3.0, 4.0]) * (step > 1)
+        + 100 * np.array([5.0, 6.0]) * (step > 2)
+    )
+    for stacked in (True, False):
+        system = Feedforward(Scaled(1.0), step, n=2, stacked=stacked)
+        for factor in (1.0, -2.0):
+            context = system.CreateDefaultContext()
+            values = (
+                {"motion_ref": [1, 2, 3, 4, 5, 6]}
+                if stacked
+                else {"q_ref": [1, 2], "v_ref": [3, 4], "vdot_ref": [5, 6]}
+            )
+            for name, value in values.items():
+                system.GetInputPort(name).FixValue(context, value)
+            assert_allclose(system.GetOutputPort("tau_ff").Eval(context), factor * expected)
+            system.set_model(Scaled(-2.0))
+
+
+def test_the_number_of_joints_must_be_known_and_the_models():
+    model = model_of(load_arm("three_axis"))
+    assert Feedforward(model, n=3).GetOutputPort("tau_ff").size() == 3
+    for wrong, told in (
+        ((Scaled(1.0), 3), "say its number of joints"),
+        ((model, 4), "step is 4"),
+        ((model, 0), "step is 0"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            Feedforward(*wrong)
+    with pytest.raises(ValueError, match="n is 2; the model's arm has 3 joints"):
+        Feedforward(model, n=2)
+
+
+def test_a_reference_source_has_the_torques_of_its_model_of_another_or_given_ones():
+    reference = paper_reference()
+    source = ReferenceSource(reference, 1.0, Scaled(1.0))
+    q, v, vdot = source.tables
+    assert q.shape == (41, 3)
+
+    def torque(time):
+        context = source.CreateDefaultContext()
+        context.SetTime(time)
+        return source.GetOutputPort("tau_ff").Eval(context)
+
+    for row in (0, 7, 40):
+        assert_allclose(torque(float(row)), q[row] + 10 * v[row] + 100 * vdot[row], atol=1e-12)
+    # to the nearest period, and held at the end
+    assert_allclose(torque(6.6), torque(7.0))
+    assert_allclose(torque(99.0), torque(40.0))
+    source.set_model(Scaled(2.0), 1)
+    assert_allclose(torque(7.0), 2 * q[7])
+    source.set_torques(0 * q + 5.0)
+    assert_allclose(torque(7.0), 5.0)
+    source.set_model(None)
+    assert_allclose(torque(7.0), 0.0)
+    source.set_model(Scaled(np.nan), 1)
+    with pytest.raises(RuntimeError, match=r"not finite at t = 0\.0000 s"):
+        torque(7.0)
+
+
+def test_a_torque_that_is_not_finite_is_told_with_its_time():
+    class Late:
+        def feedforward(self, q, v, vdot, step):
+            return np.where(np.abs(q - late) < 1e-9, np.inf, q)
+
+    source = ReferenceSource(paper_reference(), 0.01)
+    late = source.tables[0][1234]
+    source.set_model(Late())
+    context = source.CreateDefaultContext()
+    context.SetTime(12.34)
+    with pytest.raises(RuntimeError, match=r"not finite at t = 12\.3400 s"):
+        source.GetOutputPort("tau_ff").Eval(context)
+
+
+def test_gains_are_finite_numbers_of_at_least_zero_one_per_joint():
+    PidGains([0.0, 1.0], [0.0, 0.0], [0.0, 2.0])
+    assert PidGains(1.0, 2.0, 3.0).kp.tolist() == [1.0]
+    assert [x.tolist() for x in vars(PidGains.paper(2)).values()] == [[80, 80], [8, 8], [2, 2]]
+    for wrong in (
+        ([1.0, 2.0], [1.0], [1.0, 1.0]),
+        ([-1e-9], [1.0], [1.0]),
+        ([1.0], [np.inf], [1.0]),
+        ([[1.0]], [[1.0]], [[1.0]]),
+    ):
+        with pytest.raises(ValueError, match="finite numbers of at least 0, one per joint"):
+            PidGains(*wrong)
