@@ -1,5 +1,6 @@
 """Torques that cannot be the arm's are refused with the likely cause; honest ones never are."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -43,6 +44,35 @@ def test_turned_and_exchanged_columns_are_named(seed: int, dry: float) -> None:
     for i, j in ((0, 1), (1, 2), (0, 2)):
         with pytest.raises(LogError, match=rf"columns tau{i + 1} and tau{j + 1} are exchanged"):
             check_torques([exchanged(log, i, j, "tau")], three_axis(), 10.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("dry", [1.0, 0.3])
+@pytest.mark.parametrize("factor", [10.0, 100.0])
+def test_a_gain_far_off_is_named(seed: int, dry: float, factor: float) -> None:
+    log = run(seed, dry)
+    for j in range(3):
+        gains = np.where(np.arange(3) == j, factor, 1.0)
+        with pytest.raises(
+            LogError, match=rf"run: the torques do not fit one another: tau{j + 1} is"
+        ) as found:
+            check_torques([replace(log, tau=log.tau * gains)], three_axis(), 10.0)
+        said = re.search(r"about (\S+) times", str(found.value))
+        assert said is not None and float(said[1]) == pytest.approx(factor, rel=0.15)
+
+
+def test_no_law_that_is_not_listed_passes_for_a_gain() -> None:
+    """A spring, a drag and a coupling, each as strong as what the joints need anyway, and a gain that is off by half."""
+    log = run(1)
+    size = np.std(log.tau, axis=0)
+    beside = {
+        "spring": size * (log.q - 0.3),
+        "drag": size * log.v * np.abs(log.v),
+        "coupling": np.outer(log.v[:, 1] + log.v[:, 2], [0, 1, 1]) * size,
+        "half": 0.5 * log.tau * [0, 1, 0],
+    }
+    for name, more in beside.items():
+        check_torques([replace(log, tau=log.tau + more, name=name)], three_axis(), 10.0)
 
 
 def test_reconstruct_asks_for_the_check() -> None:

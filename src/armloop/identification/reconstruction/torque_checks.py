@@ -3,7 +3,8 @@
 Rigid bodies with Coulomb and viscous friction are regressed on the torques as recorded and on what they would be had a
 column been turned in sign or exchanged with another. A log is refused only where physics or the error speak plainly: a
 joint whose friction drives *and* whose inertia is negative, in both halves of the data, and neither once its sign is
-turned; or two joints whose torques are explained twice as well, and physically, once they are exchanged. Nothing is
+turned; two joints whose torques are explained twice as well, and physically, once they are exchanged; or one that is, once
+it is multiplied by a number far from one, for the links that it carries show in the others' torques, too. Nothing is
 compared with the masses of the URDF, which may be dummies.
 """
 
@@ -31,6 +32,8 @@ from armloop.util.errors import LogError
 _DRIVES, _FRICTION = 0.5, 0.02
 #: An exchange must lower the relative error of the two joints by this factor (geometric mean), to below this.
 _BETTER, _GOOD = 2.0, 0.6
+#: A gain is far off from this factor on; in two halves of the data it must be the same but for this one.
+_FAR, _ALIKE = 3.0, 1.5
 #: Whole joints in exchange must lower the error of all joints by this factor.
 _BETTER_ALL = 1.5
 #: Mean relative error from which on whole joints are tried in exchange where the fit is unphysical; rows a joint must have.
@@ -62,6 +65,11 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None
         raise LogError(
             f"{names}: columns tau{i + 1} and tau{j + 1} are exchanged: the other way round they are explained "
             "at least twice as well; put the columns in the order of the joints, base to tip"
+        )
+    for j, factor in problem.better_scaled(plain):
+        raise LogError(
+            f"{names}: the torques do not fit one another: tau{j + 1} is about {float(f'{1 / factor:.2g}'):g} times what "
+            "the links give that explain the other joints; check the units and drive gains of all joints"
         )
     if float(np.mean(plain.relative)) > _POOR and not plain.physical(range(arm.n)):
         for i, j in combinations(range(arm.n), 2):
@@ -175,6 +183,41 @@ class _Problem:
             if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < _GOOD:
                 found.append((gain, (i, j)))
         return [max(found)[1]] if found else []
+
+    def better_scaled(self, plain: _Fit) -> list[tuple[int, float]]:
+        """The joint whose torque is explained far better times a factor far from one, with the factor."""
+        n, found = len(plain.power), []
+        for j in range(n) if n > 1 else ():
+            first, second = (self._factor(j, half) for half in (0, 1))
+            if min(first, second) <= 0 or abs(np.log(first / second)) > np.log(_ALIKE):
+                continue
+            factor = float(np.sqrt(first * second))
+            if abs(np.log(factor)) < np.log(_FAR):
+                continue
+            factors = np.ones(n)
+            factors[j] = factor
+            other = self.fit(factors, np.arange(n))
+            ratio = np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9)
+            if ratio[j] > _BETTER and other.physical(range(n)) and other.relative[j] < _GOOD:
+                found.append((float(np.exp(np.mean(np.log(ratio)))), (j, factor)))
+        return [max(found)[1]] if found and max(found)[0] > 1 else []
+
+    def _factor(self, joint: int, half: int) -> float:
+        """The factor of a joint's torque that is regressed together with all parameters, on every other block."""
+        table = self.table
+        rows = table.moving & (table.blocks % 2 == half)[:, None]
+        X, y, unknown = [], [], []
+        for j, own in enumerate(rows.T):
+            size = max(float(root_mean_square(table.tau[own, j])), 1e-12)
+            tau = table.tau[own, j] / size
+            X.append(table.columns[own, j] / size)
+            y.append(np.zeros_like(tau) if j == joint else tau)
+            unknown.append(-tau if j == joint else np.zeros_like(tau))
+        A = np.column_stack([np.concatenate(X), np.concatenate(unknown)])
+        lengths = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+        A = A / lengths
+        found = np.linalg.solve(A.T @ A + 1e-7 * np.eye(A.shape[1]), A.T @ np.concatenate(y)) / lengths
+        return float(found[-1])
 
 
 def _gain(plain: _Fit, other: _Fit, i: int, j: int) -> float:
