@@ -157,7 +157,7 @@ def reconstruct(
     bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
     settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
     zeros = None
-    if kept and not METHODS[method].reference:
+    if kept and bandwidth.cutoff_hz > 0 and not METHODS[method].reference:
         filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
         aside = held_out_intervals(kept, filters, settings)
         zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, apart.correlation)
