@@ -8,7 +8,14 @@ from scipy.optimize import brentq
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.plant.friction import JointFriction
-from armloop.drake.tuning.loop_analysis import _margins, loop_margins, model_posture, posture_model
+from armloop.drake.tuning.loop_analysis import (
+    SampledArm,
+    _margins,
+    cut_loop,
+    loop_margins,
+    model_posture,
+    posture_model,
+)
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import load_arm
 
@@ -101,3 +108,52 @@ def test_the_papers_gains_are_comfortable():
     wild = loop_margins(arm, friction, PidGains([80.0] * 3, [8.0] * 3, [200.0] * 3), [0.0, 0.3, -0.5])
     assert wild[2].gain_margin == np.inf
     assert 0.02 < wild[2].gain_reduction < 0.5
+
+
+def test_a_loop_with_the_others_closed():
+    L = np.array([[[1 + 2j, 3.0, 0.5], [4j, -2 + 1j, 1.0], [0.2, 1j, 0.3]]])
+    others = np.array([1, 2])
+    for i, rest in ((0, others), (1, np.array([0, 2])), (2, np.array([0, 1]))):
+        # what the others answer to a torque of i comes back through them
+        closed = np.linalg.inv(np.eye(2) + L[0][np.ix_(rest, rest)])
+        expected = L[0, i, i] - L[0][i, rest] @ closed @ L[0][rest, i]
+        assert_allclose(cut_loop(L, i), [expected])
+
+
+def test_a_closed_loops_step_is_the_controllers_law():
+    rng = np.random.default_rng(0)
+    sampled = SampledArm(rng.normal(size=(4, 4)), rng.normal(size=(4, 2)), 0.01)
+    gains = PidGains([8.0, 4.0], [3.0, 2.0], [0.5, 0.25])
+    A, B = sampled.closed(gains)
+    q, v, integral, wanted = rng.normal(size=(4, 2))
+    torque = gains.kp * (wanted - q) + gains.ki * integral - gains.kd * v
+    after = A @ np.concatenate([q, v, integral]) + B @ wanted
+    assert_allclose(after[:4], sampled.A @ np.concatenate([q, v]) + sampled.B @ torque)
+    assert_allclose(after[4:], integral + 0.01 * (wanted - q))
+    # frequencies are up to Nyquist
+    assert_allclose(sampled.frequencies(5)[[0, -1]], [0.01, np.pi / 0.01])
+    assert len(sampled.frequencies(5)) == 5
+
+
+def test_a_mode_that_stays_does_not_decay():
+    """A mass that only a damper holds: without an integrator its sum of errors never decays."""
+    sampled = SampledArm(np.array([[0.5, 0.0], [0.0, 0.5]]), np.array([[0.0], [1.0]]), 0.01)
+    assert not sampled.is_stable(PidGains([0.1], [0.0], [0.0]))
+    assert SampledArm(np.array([[0.5, 0.0], [1.0, 0.5]]), np.array([[1.0], [0.0]]), 0.01).is_stable(
+        PidGains([0.1], [1.0], [0.0])
+    )
+
+
+def test_margins_of_a_loop_that_is_written_down():
+    """L = k / (j w): it crosses 1 at w = k with 90 degrees, and closed it falls to sqrt(1/2) there."""
+    w = np.geomspace(0.01, 100.0, 4001)
+    found = _margins(2.0 / (1j * w), w)
+    assert found.phase_margin == pytest.approx(90.0, abs=1e-3)
+    assert found.bandwidth == pytest.approx(2.0, rel=5e-3)
+    assert found.gain_margin == np.inf and found.gain_reduction == 0.0
+    assert found.sensitivity_peak == pytest.approx(1.0, abs=1e-3)
+    # at Nyquist the loop is real and negative: four times as much is on the edge
+    edge = 2.0 / (1j * w)
+    edge[-1] = -0.25
+    assert _margins(edge, w).gain_margin == pytest.approx(4.0)
+    assert _margins(np.full(9, 5.0 + 0j), w[:9]).bandwidth == np.inf
