@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import account as accounts
 from armloop.diagnosis.account import Account
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects.found import RANGE
 
 
 def test_the_part_of_bursts_that_effects_and_law_explain() -> None:
@@ -45,6 +48,50 @@ def test_a_joint_that_rested_so_long_ago_is_recorded_at_rest() -> None:
     # between two samples of which one is at rest it may have been; before a run it was as at its beginning
     assert np.flatnonzero(~slid[:, 0]).tolist() == [5, 6, 10, 11, 12]
     assert np.flatnonzero(~accounts.slid_then(motion, moving, 0.0)[:, 0]).tolist() == [4, 10]
+
+
+def test_a_joint_that_is_recorded_at_rest_tells_nothing_there() -> None:
+    """It moves but in the fourth sample of ten, recorded a sample late; the second sample counts for nothing anyway."""
+    nothing = np.zeros((10, 1))
+    motion = Motion(0.1 * np.arange(10), nothing, nothing, nothing, np.array([0]))
+    moving, rows = np.ones((10, 1), dtype=bool), np.ones((10, 1), dtype=bool)
+    moving[3], rows[[1, 3]] = False, False
+    samples = Samples(motion, nothing, moving, 0.1)
+    known: Any = None
+    evidence = Evidence(known, samples, np.ones(1), np.ones(1), rows, np.zeros(10, dtype=int), known)
+    late = accounts._resting_late(evidence, 0.11)
+    assert late.unknown is not None
+    # half of a sample more: what lies between the fourth and a sample that moved is not known either
+    assert np.flatnonzero(~late.samples.moving).tolist() == [3, 4, 5]
+    assert np.flatnonzero(late.unknown).tolist() == [3, 4, 5]
+    assert np.flatnonzero(~late.rows).tolist() == [1, 3, 4, 5]
+
+
+def test_what_remains_is_beside_effects_and_the_law_whatever_its_range(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    @dataclass
+    class Added:
+        parameters: dict[str, float]
+
+    law = Added({"v1": 2.0, **dict.fromkeys(RANGE, 9.0)})
+    seen: list[Any] = []
+
+    def with_effects(added: list[Any]) -> Any:
+        seen.append([a.parameters for a in added])
+        return SimpleNamespace(predict=lambda motion: np.full((3, 1), 0.5))
+
+    monkeypatch.setattr(accounts, "smooth", lambda samples, x: 10 * x)
+    whole: Any = SimpleNamespace(
+        samples=SimpleNamespace(tau=np.full((3, 1), 7.0), motion=None),
+        model=SimpleNamespace(with_effects=with_effects),
+    )
+    outcome: Any = SimpleNamespace(added=lambda: [Added({"of": 1.0})])
+    nothing: Any = None
+    for unlisted, expected in ((None, [{"of": 1.0}]), (law, [{"of": 1.0}, {"v1": 2.0}])):
+        found: Any = None if unlisted is None else SimpleNamespace(added=lambda: [law])
+        assert (Account(whole, [], nothing, outcome, found).remaining() == 2.0).all()
+        assert seen.pop() == expected
 
 
 def test_delays_add_up() -> None:

@@ -25,6 +25,17 @@ def test_a_block_needs_ten_samples_and_learning_four_blocks(model) -> None:
             ResidualMonitor(model, period=times[0], block=times[1], learn=times[2])
 
 
+def test_it_samples_a_hundred_times_a_second_for_blocks_of_half_a_second(model) -> None:
+    timing = ResidualMonitor(model).GetUniquePeriodicDiscreteUpdateAttribute()
+    assert (timing.period_sec(), timing.offset_sec()) == (0.01, 0.0)
+    # fifty samples a block, forty blocks to learn from
+    ResidualMonitor(model, learn=2.0)
+    with pytest.raises(ValueError, match=r"period 0\.01 s, block 0\.5 s, learn 1\.7 s"):
+        ResidualMonitor(model, learn=1.7)
+    with pytest.raises(ValueError, match=r"period 0\.3 s, block 0\.5 s, learn 20\.0 s"):
+        ResidualMonitor(model, period=0.3)
+
+
 def test_a_block_is_handed_on_as_it_was_sampled(model, monkeypatch) -> None:
     """Ten samples a block, twice the period of a tenth of a second; of a model that knows the speeds of its joints."""
     knowing = dataclasses.replace(
@@ -47,7 +58,7 @@ def test_a_block_is_handed_on_as_it_was_sampled(model, monkeypatch) -> None:
     rows = np.arange(10 * 12.0).reshape(10, 12)
     v = rows[:, 6:9]
     v[:] = 1.0
-    limit = residual_monitor._SLIDES * np.array([1.0, 2.0, 4.0])
+    limit = 0.02 * np.array([1.0, 2.0, 4.0])
     v[3], v[4] = 0.99 * limit, -1.01 * limit
     for k in [*range(10), *range(10)]:  # the second block writes over the first
         context.SetTime(3.0 + 0.1 * k)
