@@ -113,7 +113,10 @@ class TestFinding:
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=given, moving=None),
             rows=rows,
-            model=SimpleNamespace(arm=three_axis()),
+            model=SimpleNamespace(arm=three_axis(), history={}),
+        )
+        monkeypatch.setattr(
+            contacts, "_strays", lambda far, b: far.shape == (100, 2) and b.rows.start in of.get("strays", ())
         )
         assert contacts.find_contacts(evidence, np.zeros((100, 2))) == []
         return asked
@@ -129,10 +132,11 @@ class TestFinding:
         near = [(20, 30, [0], [70, 0]), (31, 40, [1], [0, 100])]
         assert self.pushed(monkeypatch, (20, 30, 0), (31, 40, 1)) == near
 
-    def test_what_comes_back_or_sticks_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_what_comes_back_or_sticks_or_strays_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         bursts = [(20, 30, 0), (40, 50, 0), (60, 70, 0)]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, back=[20])] == [40, 60]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, sticks=[60])] == [20, 40]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, strays=[40])] == [20, 60]
 
     def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # of 9.9 s: 3.9 s and 4.0 s

@@ -48,7 +48,13 @@ def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
     context = SimpleNamespace(load=of.get("load"), predicted=of.get("predicted"))
     rows = np.ones(given.shape, dtype=bool)
     return SimpleNamespace(
-        samples=samples, model=model, context=context, rows=rows, scale=np.ones(1), unknown=of.get("unknown")
+        samples=samples,
+        model=model,
+        context=context,
+        rows=rows,
+        scale=np.ones(1),
+        unknown=of.get("unknown"),
+        residual=lambda known: of.get("bare", 0.0),
     )
 
 
@@ -155,10 +161,16 @@ class TestDeviations:
         evidence.model.predict = lambda motion: 0 * predicted[:3]
         np.testing.assert_allclose(innovations.deviations(evidence, np.zeros((3, 1)))[:, 0], [1e-12] * 3)
 
+    def test_what_effects_supply_is_known_but_for_a_part_of_it(self) -> None:
+        bare, left = np.full((4, 1), 20.0), np.array([[20.0], [0.0], [40.0], [10.0]])
+        evidence = at_speeds([1.0] * 4, predicted=0 * bare, bare=bare)
+        part = np.sqrt(0.003) * np.array([0.0, 20.0, 20.0, 10.0])
+        np.testing.assert_allclose(innovations.deviations(evidence, left)[:, 0], np.hypot(1.0, part))
+
     def test_an_average_of_the_runs_own_noise_may_be_more_than_the_baseline(self) -> None:
         # means over five of the samples, ±1 in turn, are ±1/5
         residual = 10 * np.where(np.arange(100) % 2, -1.0, 1.0)[:, None]
-        evidence = at_speeds([1.0] * 100, predicted=0 * residual, reach=0.05)
+        evidence = at_speeds([1.0] * 100, predicted=0 * residual, reach=0.05, bare=residual)
         assert innovations.deviations(evidence, residual)[50, 0] == 1.0  # no time series
         evidence.samples.cutoff_hz = 1e-9
         evidence.samples.motion = at_speeds([1.0] * 100, tuple(range(0, 100, 10))).samples.motion

@@ -14,6 +14,7 @@ from scipy.ndimage import binary_erosion, uniform_filter1d
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import NEARLY
 from armloop.dynamics import Dynamics
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
@@ -87,7 +88,8 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     """(N, n) standard deviation of the averaged residual, N·m (N).
 
     The baseline's, at least what the run's own noise leaves in an average: the sensor may have become a noisier one.
-    Where a model contradicts itself, it is unsure by as much.
+    Where a model contradicts itself, it is unsure by as much, and of what effects found since supply by a part of it: no
+    law is met exactly.
     """
     model, motion = evidence.model, evidence.samples.motion
     predicted = evidence.context.predicted
@@ -106,7 +108,10 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
         if run.stop - run.start > 2:
             rate[run] = np.gradient(tau[run], motion.time[run], axis=0)
     late = _APART * evidence.samples.period * rate
-    return np.asarray(np.sqrt(np.maximum(own, 1e-12) ** 2 + late**2 + contradiction(model, motion) ** 2))
+    supplied = NEARLY * (evidence.residual([]) - residual) ** 2
+    return np.asarray(
+        np.sqrt(np.maximum(own, 1e-12) ** 2 + late**2 + contradiction(model, motion) ** 2 + supplied)
+    )
 
 
 def contradiction(model: ReconstructedModel, motion: Motion) -> Array:
