@@ -79,11 +79,14 @@ class Smooth:
         return Smooth(log.time, *(back(x) for x in (q, v, np.gradient(v, step, axis=0))))
 
 
-def generate_measured(source: int, cases: int, data: Path, logs: Path, answers: Path) -> None:
-    """Write the training logs and cases of one measured arm; kinds, places and sizes are drawn from its number."""
-    one = SOURCES[source]
+def generate_measured(seed: int, cases: int, data: Path, logs: Path, answers: Path) -> None:
+    """Write the training logs and cases of one measured arm; kinds, places and sizes are drawn from the seed.
+
+    Seeds 1, 2, 3 are the three arms, 4, 5, 6 the same arms with other cases, and so on.
+    """
+    one = SOURCES[(seed - 1) % len(SOURCES) + 1]
     place = data / one.folder
-    folder = logs / f"measured_{one.folder}"
+    folder = logs / (f"measured_{one.folder}" + (f"_{seed}" if seed > len(SOURCES) else ""))
     folder.mkdir(parents=True, exist_ok=True)
     answers.mkdir(parents=True, exist_ok=True)
     urdf = next(place.glob("*.urdf"))
@@ -93,7 +96,7 @@ def generate_measured(source: int, cases: int, data: Path, logs: Path, answers: 
         if path.stem not in one.judged:
             write_log(folder / f"baseline_{path.stem}.csv", _in_torques(read_log(path), one))
     runs = [_in_torques(read_log(place / f"{name}.csv"), one) for name in one.judged]
-    rng = np.random.default_rng([source, 0x3EA5])
+    rng = np.random.default_rng([seed, 0x3EA5])
     for case in range(cases):
         # each kind meets each of the runs in turn
         log = runs[(case + case // len(KINDS)) % len(runs)]

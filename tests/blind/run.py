@@ -8,7 +8,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --arms 20 --cases 16
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
     python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
-    python tests/blind/run.py --measured ../shared/data   effects added to measured logs of three arms
+    python tests/blind/run.py --measured ../shared/data   effects added to logs of three arms (--first 4, 7, …: others)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
 
@@ -102,9 +102,8 @@ def main() -> int:
         }
         kept = Kept(Path(options.keep) if options.keep and not options.again else None, scripts)
         if not options.again:
-            seeds = range(options.first, options.first + options.arms)
-            if options.measured is not None:
-                seeds = range(1, min(options.arms, len(SOURCES)) + 1)
+            arms = options.arms if options.measured is None else min(options.arms, len(SOURCES))
+            seeds = range(options.first, options.first + arms)
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
                 s: workers.submit(make, s, options.cases, place, options.outside, options.measured)
