@@ -51,6 +51,50 @@ def test_margins_hold_at_every_posture_of_a_box(width: float, prismatic: int | N
         np.testing.assert_allclose(1 - relative, 1 - margin, rtol=0.02, atol=1e-11)
 
 
+@pytest.mark.parametrize("sine", [False, True])
+@pytest.mark.parametrize("power", [0, 1, 2, 3])
+def test_what_a_tangent_leaves_of_a_term_is_bounded_and_the_bound_is_met(power: int, sine: bool) -> None:
+    """f(3 q1) q2^a, for changes of the phase up to two turns: each bound is below and above what it bounds."""
+    terms = MassTerms(
+        np.array([[3.0, 0.0]]), np.array([[0, power]]), np.array([sine]), np.ones((1, 1, 1)), np.eye(1)
+    )
+    for width in (0.0, 1e-3, 0.1, 0.5, 1.0, 2.0, 4.0):
+        for q1 in (-1.3, 0.2, 0.7):
+            centre, half = np.array([[q1, 0.4]]), np.array([[width, 0.3 * (power > 0)]])
+            tangents, rest, _ = terms._changes(centre, half)
+            across = np.linspace(-1, 1, 801)
+            d = np.stack(np.meshgrid(across * half[0, 0], across[::20] * half[0, 1]), axis=-1).reshape(-1, 2)
+            steps = tangents[0, :, 0, 0] / np.where(half > 0, half, 1.0)[0, terms.joints]
+            change = (terms.at(centre + d) - terms.at(centre))[:, 0, 0]
+            left = np.abs(change - d[:, terms.joints] @ steps).max()
+            assert rest[0, 0, 0] >= left
+            if power == 0 and 3 * width <= np.pi:
+                assert rest[0, 0, 0] == pytest.approx(left, abs=1e-12)
+    # of a box without width what is left is the rounding of the term
+    assert (
+        terms._changes(np.array([[0.2, 0.4]]), np.zeros((1, 2)))[1][0, 0, 0]
+        > np.finfo(float).eps * 0.4**power
+    )
+
+
+@pytest.mark.parametrize("joints", [1, 2])
+def test_a_mass_matrix_that_is_the_same_everywhere_is_proven_at_once(joints: int) -> None:
+    """Of one joint, or of slides only, no inertia depends on the posture."""
+    each = np.arange(joints)
+    energy = EnergyTerms(
+        np.ones(joints, dtype=bool),
+        np.zeros((joints, joints), dtype=int),
+        each < 0,
+        np.stack([each, each], 1),
+    )
+    ends = np.full(joints, 3.0)
+    terms = MassTerms.of(energy, 0.5 * (1.0 + each), np.zeros((joints, joints)))
+    proof = prove_definite(terms, -ends, ends)
+    assert proof.complete and proof.boxes == 1 and proof.least == pytest.approx(1.0)
+    proof = prove_definite(MassTerms.of(energy, -each - 0.5, np.zeros((joints, joints))), -ends, ends)
+    assert proof.indefinite is not None
+
+
 def corner(depth: float) -> tuple[MassTerms, np.ndarray, np.ndarray]:
     """M_11 = 1 - depth - (cos q2 + cos q3)/2 is least at a corner of the limits: -depth."""
     degrees = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0], [0, 0, 0]])

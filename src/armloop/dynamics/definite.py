@@ -155,13 +155,13 @@ class MassTerms:
         curved = np.abs(f) * (1 - np.cos(np.minimum(w, np.pi))) + np.abs(slope) * (w - np.sin(w))
         rest = (curved + _ROUNDING) * most
         rest += np.abs(f) * (most - size - rising) + np.abs(slope) * w * (most - size)
-        raw = self.matrices.reshape(-1, n * n)
-        tangents = np.stack(steps, axis=1) @ raw if k else np.empty((len(f), 0))
-        weights = np.stack(shares, axis=1) @ np.abs(raw) if k else np.empty((len(f), 0))
+        raw, cells = self.matrices.reshape(-1, n * n), (len(f), k, n, n)
+        if k == 0:
+            return np.zeros(cells), (rest @ np.abs(raw)).reshape(-1, n, n), np.zeros(cells)
         return (
-            tangents.reshape(-1, k, n, n),
+            (np.stack(steps, axis=1) @ raw).reshape(cells),
             (rest @ np.abs(raw)).reshape(-1, n, n),
-            weights.reshape(-1, k, n, n),
+            (np.stack(shares, axis=1) @ np.abs(raw)).reshape(cells),
         )
 
     def _factor(self, q: Array) -> Array:
