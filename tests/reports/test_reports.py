@@ -11,7 +11,8 @@ from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.reports.diagnosis_report import diagnosis_report
 from armloop.reports.html import Card, Report, Section, prose, render, tied, wide
-from armloop.reports.loop_report import loop_figure, loop_report
+from armloop.reports.loop_report import loop_report
+from armloop.reports.loop_stages import loop_figure
 from armloop.reports.tables import make_table
 from armloop.reports.words import number
 

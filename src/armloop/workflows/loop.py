@@ -89,7 +89,8 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     """
     from armloop.reports.diagnosis_tables import diagnosis_table
     from armloop.reports.html import Section
-    from armloop.reports.loop_report import loop_figure, loop_report
+    from armloop.reports.loop_report import loop_report
+    from armloop.reports.loop_stages import loop_figure
     from armloop.reports.tables import eta_table, score_table, steps_table
     from armloop.reports.words import controller
 
