@@ -1,10 +1,11 @@
-"""Writers of other programs' logs, each as the program writes it, from one motion."""
+"""Writers of other programs' logs, each as the program writes it, from one motion; and what is asked of the reader."""
 
 from pathlib import Path
 
 import numpy as np
 from synthetic import fourier_motion, friction, rigid_torque, three_axis
 
+from armloop.cli import main
 from armloop.data.log import MotionLog
 
 NAMES = [joint.name for joint in three_axis().joints]
@@ -117,3 +118,18 @@ def libfranka(path: Path, log: MotionLog, *, old: bool, parts: int) -> Path:
             text.append(f"{ms},1,{cells}" + (",," if old else ",") + ",".join(f"{x:.9g}" for x in log.q[k]))
     path.write_text("\n".join(text) + "\n")
     return path
+
+
+def assert_same(found: MotionLog, log: MotionLog, tolerance: float = 1e-8) -> None:
+    assert found.samples == log.samples
+    np.testing.assert_allclose(found.q, log.q, atol=tolerance * 10)
+    np.testing.assert_allclose(found.v, log.v, atol=tolerance * 10)
+    np.testing.assert_allclose(found.tau, log.tau, atol=tolerance * 100)
+
+
+def refused(line: list[str], capsys) -> str:
+    """The line that a command refuses its input with."""
+    assert main(line) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("armloop: ") and error.count("\n") == 1
+    return error

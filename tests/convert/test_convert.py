@@ -8,13 +8,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
-from answers import answered
-from foreign_logs import NAMES, bag, libfranka, motion, rtde
+from foreign_logs import NAMES, assert_same, bag, libfranka, motion, refused, rtde
 from synthetic import three_axis
 
 from armloop.cli import main
-from armloop.convert import Answers, convert, read_map
-from armloop.convert.headers import suggest
+from armloop.convert import Answers, convert
 from armloop.convert.joints import match
 from armloop.data.log import MotionLog, read_log
 from armloop.util.errors import InputError
@@ -25,21 +23,6 @@ TORQUE = Answers(tau_unit="N*m")
 @pytest.fixture(scope="module")
 def log() -> MotionLog:
     return motion()
-
-
-def assert_same(found: MotionLog, log: MotionLog, tolerance: float = 1e-8) -> None:
-    assert found.samples == log.samples
-    np.testing.assert_allclose(found.q, log.q, atol=tolerance * 10)
-    np.testing.assert_allclose(found.v, log.v, atol=tolerance * 10)
-    np.testing.assert_allclose(found.tau, log.tau, atol=tolerance * 100)
-
-
-def refused(line: list[str], capsys) -> str:
-    """The line that a command refuses its input with."""
-    assert main(line) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("armloop: ") and error.count("\n") == 1
-    return error
 
 
 @pytest.mark.parametrize("kind", ["db3", "mcap"])
@@ -302,124 +285,6 @@ def test_matlab_and_numpy_arrays(tmp_path, log, sideways):
         found = convert([tmp_path / name], answers=Answers("N*m", None, "rad"))
         assert_same(found.log, log, 1e-12)
         np.testing.assert_allclose(found.log.time, log.time, atol=1e-12)
-
-
-def test_a_map_turns_units_signs_and_order(tmp_path, log, capsys):
-    table = tmp_path / "table.txt"
-    rows = np.column_stack(
-        [1e3 * log.time, np.degrees(log.q[:, ::-1]) * [1, -1, 1], np.degrees(log.v[:, ::-1]) * [1, -1, 1]]
-    )
-    rows = np.column_stack([rows, 1e3 * log.tau[:, ::-1] / [3, 2, 1], 20 + log.time])
-    names = ["ms", "p_c", "p_b", "p_a", "s_c", "s_b", "s_a", "i_c", "i_b", "i_a", "oil temperature"]
-    text = ["\t".join(names), *("\t".join(f"{x:.12g}".replace(".", ",") for x in row) for row in rows)]
-    table.write_text("\n".join(text) + "\n")
-    (tmp_path / "map.yaml").write_text(
-        "time: {column: ms, unit: ms}\n"
-        f"joints: [{', '.join(NAMES[::-1])}]\n"
-        "q: {columns: [p_c, p_b, p_a], unit: deg, sign: [1, -1, 1]}\n"
-        "v: {columns: [s_c, s_b, s_a], unit: deg/s, sign: [1, -1, 1]}\n"
-        "tau: {columns: [i_c, i_b, i_a], unit: mA, gains: [3, 2, 1]}\n"
-    )
-    out = tmp_path / "log.csv"
-    assert (
-        main(
-            [
-                "convert",
-                str(table),
-                "--map",
-                str(tmp_path / "map.yaml"),
-                "--arm",
-                "three_axis",
-                "--out",
-                str(out),
-            ]
-        )
-        == 0
-    )
-    assert_same(read_log(out, joints=3), log)
-    assert "oil temperature" in out.read_text().splitlines()[0]
-
-
-def test_suggest_writes_a_map_with_questions_that_must_be_answered(tmp_path, log, capsys):
-    table = tmp_path / "table.csv"
-    names = [
-        "Time [ms]",
-        *(f"Axis{j} position (deg)" for j in (1, 2, 3)),
-        *(f"Axis{j} velocity (deg/s)" for j in (1, 2, 3)),
-    ]
-    names += [f"Axis{j} current" for j in (1, 2, 3)] + ["Axis1 target position (deg)", "state"]
-    rows = np.column_stack(
-        [1e3 * log.time, np.degrees(log.q), np.degrees(log.v), log.tau, np.degrees(log.q[:, 0])]
-    )
-    lines = [",".join([*(f"{x:.12g}" for x in row), "RUN"]) for row in rows]
-    table.write_text("\n".join([",".join(names), *lines]) + "\n")
-    place, out = tmp_path / "map.yaml", tmp_path / "log.parquet"
-    assert main(["convert", str(table), "--suggest", "--map", str(place)]) == 0
-    assert "tau.unit" in capsys.readouterr().out
-    assert read_map(place).q.unit == "deg" and read_map(place).time.unit == "ms"
-    assert main(["convert", str(table), "--suggest", "--json"]) == 0
-    suggestion = answered(capsys.readouterr().out, "suggestion")
-    assert suggestion["text"] == place.read_text() and "tau.unit" in suggestion["unsure"]
-    line = ["convert", str(table), "--map", str(place), "--out", str(out)]
-    assert "does not say what tau holds" in refused(line, capsys)
-    assert "exists" in refused(["convert", str(table), "--suggest", "--map", str(place)], capsys)
-    place.write_text(place.read_text().replace("unit: '?'", "unit: N*m"))
-    assert main([*line, "--json"]) == 0
-    answer = answered(capsys.readouterr().out, "conversion")
-    assert answer["runs"] == [[0, log.samples]] and answer["tau_unit"] == "N*m"
-    assert_same(read_log(out), log)
-
-
-HEADERS = {
-    "t,pos0,pos1,vel0,vel1,effort0,effort1": "pos0 pos1 effort0 effort1",
-    "time,joint_1_q,joint_2_q,joint_1_dq,joint_2_dq,joint_1_tau,joint_2_tau": "joint_1_q joint_2_q joint_1_tau joint_2_tau",
-    "stamp,q_d[0],q_d[1],q[0],q[1],tau_J[0],tau_J[1],tau_ext[0],tau_ext[1]": "q[0] q[1] tau_J[0] tau_J[1]",
-    "timestamp_ns,elbow.pos,wrist.pos,elbow.torque,wrist.torque": "elbow.pos wrist.pos elbow.torque wrist.torque",
-    "sec,ActualPos1,ActualPos2,TargetPos1,TargetPos2,Torque1,Torque2": "ActualPos1 ActualPos2 Torque1 Torque2",
-}
-
-
-@pytest.mark.parametrize("header", HEADERS)
-def test_headers_are_understood(header):
-    found = suggest(header.split(",")).mapping
-    assert found is not None and found.time.column == header.split(",")[0]
-    assert [*found.q.columns, *found.tau.columns] == HEADERS[header].split()
-
-
-BAD_MAPS = {
-    "no field": ("q: {columns: [a]}", "map.yaml"),
-    "unknown field": ("time: {column: t}\nq: {columns: [a]}\ntau: {columns: [b]}\nbogus: 1", "bogus"),
-    "unit": ("time: {column: t}\nq: {columns: [a], unit: furlong}\ntau: {columns: [b]}", "furlong"),
-    "count": ("time: {column: t}\nq: {columns: [a, c]}\ntau: {columns: [b]}", "1 columns, but q has 2"),
-    "sign": ("time: {column: t}\nq: {columns: [a], sign: 2}\ntau: {columns: [b]}", "sign must be"),
-    "both times": ("time: {column: t, rate: 3}\nq: {columns: [a]}\ntau: {columns: [b]}", "either column"),
-    "rate": ("time: {rate: -3}\nq: {columns: [a]}\ntau: {columns: [b]}", "time.rate is -3"),
-    "infinite": (
-        "time: {column: t}\nq: {columns: [a], offset: .inf}\ntau: {columns: [b]}",
-        "must be a finite number",
-    ),
-    "range": ("time: {column: t}\nq: {columns: 'q{1..999999999}'}\ntau: {columns: [b]}", "1 to 24 joints"),
-    "no range": ("time: {column: t}\nq: {columns: 'q{3..1}'}\ntau: {columns: [b]}", "1 to 24 joints"),
-    "twice": ("time: {column: t}\nq: {columns: [a]}\nq: {columns: [b]}\ntau: {columns: [b]}", "stands twice"),
-    "a list": ("- a\n- b", "mapping of fields"),
-    "no yaml": ("time: {column: [", "map.yaml"),
-    "no column": (
-        "time: {column: t, unit: s}\nq: {columns: [zz], unit: rad}\ntau: {columns: [u], unit: N*m}",
-        "no column",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD_MAPS)
-def test_a_bad_map_is_told_in_a_line(tmp_path, log, capsys, case):
-    text, word = BAD_MAPS[case]
-    (tmp_path / "map.yaml").write_text(text)
-    path = rtde(tmp_path / "robot.csv", log)
-    error = refused(
-        ["convert", str(path), "--map", str(tmp_path / "map.yaml"), "--out", str(tmp_path / "o.csv")], capsys
-    )
-    assert word in error
-    assert not (tmp_path / "o.csv").exists()
 
 
 def test_sources_follow_each_other_as_runs(tmp_path, log):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ TEXTS = {
     "one row": "a,b\n1,2",
     "no rows": "a,b\n",
     "header alone": "a,b",
+    "blank lines alone": "\n\r\n",
 }
 
 
@@ -51,6 +53,10 @@ def test_a_file_that_is_written_anew_is_counted_anew(tmp_path: Path) -> None:
     for rows in (3, 5, 2):
         path.write_text("\n".join(["a,b", *ROWS[:rows]]))
         assert index_rows(path).count == rows
+    # as long as before, but later
+    path.write_text(path.read_text().replace("\n", " ", 1))
+    os.utime(path, ns=(0, path.stat().st_mtime_ns + 1_000_000))
+    assert index_rows(path).count == rows - 1
 
 
 def test_a_span_holds_the_rows_asked_for_and_few_besides(tmp_path: Path) -> None:
