@@ -19,7 +19,7 @@ from typing import Any
 from armloop import __version__
 from armloop.commands.options import Options
 from armloop.util.doubts import listening
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, one_line
 from armloop.util.outputs import guarding
 
 #: In the order of the help. A command `name` is the module armloop.commands.name, its options the class Name in it.
@@ -135,7 +135,7 @@ def _end_of(error: BaseException | None) -> int | None:
 
 
 def _fault(message: str, status: int) -> int:
-    print(f"armloop: {' '.join(message.split())}", file=sys.stderr)
+    print(f"armloop: {one_line(message)}", file=sys.stderr)
     return status
 
 

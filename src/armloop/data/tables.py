@@ -287,7 +287,7 @@ def _is_number(cell: str) -> bool:
         float(cell or "nan")
     except ValueError:
         return False
-    return "_" not in cell  # Python reads 1_000 as a number, nobody else does
+    return cell.isascii() and "_" not in cell  # Python reads 1_000 and ١ as numbers, nobody else does
 
 
 def _csv_cell(path: Path, name: str, row: int) -> str:
@@ -307,5 +307,7 @@ def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
             for cells in reader:
                 if cells:
                     yield reader.line_num, cells
-    except (UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError as error:
         raise LogError(f"{path}: not a text file in UTF-8; a CSV log is plain text with commas") from error
+    except csv.Error as error:
+        raise LogError(f"{path}: line {reader.line_num}: {error}; is a quote left open before it?") from error

@@ -5,11 +5,17 @@ row, says what is wrong and what would be right; the command line prints it and 
 """
 
 
+def one_line(text: str) -> str:
+    """The text in one line; characters that a terminal would obey (a file's name may hold them) are spelt out."""
+    text = " ".join(text.split())
+    return "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in text)
+
+
 class InputError(ValueError):
     """The input is at fault; its text is one line: where, what is wrong and what would be right."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        super().__init__(one_line(message))
 
 
 class LogError(InputError):
@@ -36,4 +42,4 @@ class InputWarning(UserWarning):
     """The input is doubtful: one line that says what, with the numbers. The work goes on."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        super().__init__(one_line(message))

@@ -171,6 +171,73 @@ class TestTurnedSigns:
         assert fit_of([0.1], [0.0], [-1.0]).driven([0]) and not fit_of([0.1], [0.1], [-1.0]).driven([0])
 
 
+class Scaled(Fits):
+    """Fits that are given, with the factor that each half of the blocks says of each joint."""
+
+    def __init__(self, factors: list[tuple[float, float]], **fits: torque_checks._Fit) -> None:
+        super().__init__(**fits)
+        object.__setattr__(self, "factors", factors)
+
+    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks._Fit:
+        (changed,) = np.flatnonzero(signs != 1)
+        return self.fits[f"scaled_{changed + 1}"]  # type: ignore[attr-defined, no-any-return]
+
+    def _factor(self, joint: int, half: int) -> float:
+        return self.factors[joint][half]  # type: ignore[attr-defined, no-any-return]
+
+
+class TestGains:
+    PLAIN = fit_of([0.4, 0.4], GOOD, GOOD)
+
+    @pytest.mark.parametrize(
+        ("halves", "relative", "power", "found"),
+        [
+            ((0.1, 0.1), [0.19, 0.4], GOOD, True),
+            ((0.1, 0.1), [0.21, 0.4], GOOD, False),  # not twice as well
+            ((0.3, 0.36), [0.19, 0.4], GOOD, True),  # 3.04 in the geometric mean
+            ((0.32, 0.36), [0.19, 0.4], GOOD, False),  # 2.95: no gain is that little off
+            ((0.1, 0.149), [0.19, 0.4], GOOD, True),
+            ((0.1, 0.151), [0.19, 0.4], GOOD, False),  # the halves contradict each other
+            ((10.0, 10.0), [0.19, 0.4], GOOD, True),  # too small is a fault, too
+            ((-0.1, -0.1), [0.19, 0.4], GOOD, False),  # a sign is no gain
+            ((0.1, 0.1), [0.19, 0.4], [1.0, -1.0], False),  # friction would drive
+            ((0.1, 0.1), [0.19, 0.9], GOOD, False),  # what the joint gains the others lose
+        ],
+    )
+    def test_a_joint_whose_gain_is_off(
+        self, halves: tuple[float, float], relative: list[float], power: list[float], found: bool
+    ) -> None:
+        fits = Scaled([halves, (1.0, 1.0)], scaled_1=fit_of(relative, power, GOOD))
+        expected = pytest.approx(np.sqrt(np.prod(halves))) if found else None
+        assert fits.better_scaled(self.PLAIN) == ([(0, expected)] if found else [])
+
+    def test_what_stays_poor_is_no_gain(self) -> None:
+        plain = fit_of([1.3, 1.3], GOOD, GOOD)
+        for error, found in ((0.59, [(0, pytest.approx(0.1))]), (0.61, [])):
+            fits = Scaled([(0.1, 0.1), (1.0, 1.0)], scaled_1=fit_of([error, 1.3], GOOD, GOOD))
+            assert fits.better_scaled(plain) == found
+
+    def test_of_several_the_one_that_explains_most(self) -> None:
+        fits = Scaled(
+            [(0.1, 0.1), (0.2, 0.2)],
+            scaled_1=fit_of([0.1, 0.4], GOOD, GOOD),
+            scaled_2=fit_of([0.3, 0.1], GOOD, GOOD),
+        )
+        assert fits.better_scaled(self.PLAIN) == [(1, pytest.approx(0.2))]
+
+    def test_a_single_joint_has_nothing_to_be_compared_with(self) -> None:
+        assert Scaled([(0.1, 0.1)]).better_scaled(fit_of([0.4], [1.0], [1.0])) == []
+
+    def test_each_half_has_a_factor_of_its_own(self) -> None:
+        """A gain that changes from block to block, to and fro: two factors, which contradict each other."""
+        log = run(1)
+        problem = torque_checks._Problem.of([log], three_axis(), 10.0)
+        assert problem is not None
+        for half, factor in enumerate((2.0, 5.0)):
+            problem.table.tau[problem.table.blocks % 2 == half, 1] *= factor
+        assert [1 / problem._factor(1, half) for half in (0, 1)] == pytest.approx([2.0, 5.0], rel=0.15)
+
+
 class TestExchanges:
     def test_columns_are_exchanged_if_the_other_way_is_twice_as_good(self) -> None:
         plain = fit_of([0.9, 0.4], GOOD, GOOD)
