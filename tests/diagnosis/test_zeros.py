@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
+from armloop.data.filters import INDEPENDENT
 from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
+from armloop.diagnosis import zeros as of_zeros
 from armloop.diagnosis.zeros import sentences, settled, spread
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.model import ReconstructedModel
@@ -63,6 +65,27 @@ def test_a_zero_beyond_all_that_was_usual_stays_and_the_others_go(model: Reconst
     _, zeros = settled(model, [run(6, (0.0, 0.2, 0.02))])
     assert zeros[0, 1] == 0.0
     assert zeros[0, 2] == pytest.approx(0.02, abs=0.01)
+
+
+def test_a_log_that_is_too_short_keeps_its_zeros(model: ReconstructedModel) -> None:
+    log = run(3, (0.0, 0.04, 0.0)).select(slice(0, 25))
+    (same,), zeros = settled(model, [log])
+    assert same is log and not zeros.any()
+
+
+def test_zeros_are_as_large_as_they_usually_are(model: ReconstructedModel) -> None:
+    """Joint 1, whose zero gravity does not feel, and 2, of which the data say much, by the prior's spread alone."""
+    X, y = np.array([[0.0, 1.0]] * 40), np.full(40, 0.5)
+    wide, narrow = (of_zeros._robust(X, y, np.array([0.1, spread])) for spread in (100.0, 0.05))
+    assert wide == pytest.approx([0.0, 0.5], abs=1e-3)
+    told = 40 / INDEPENDENT * 5 / (4 + (0.5 - narrow[1]) ** 2)
+    assert narrow == pytest.approx([0.0, 0.5 * told / (told + 1 / 0.05**2)])
+    # and that spread is the training logs'
+    short, usual = run(3, (0.0, 0.04, 0.0)).select(slice(0, 150)), model.history["encoder_zeros"]
+    narrow_model = replace(
+        model, history={**model.history, "encoder_zeros": {**usual, "spread": [0, 1e-6, 0]}}
+    )
+    assert np.abs(settled(narrow_model, [short])[1]).max() < 1e-5
 
 
 def test_a_usual_zero_is_no_change_of_the_arm(model: ReconstructedModel, plain: ReconstructedModel) -> None:

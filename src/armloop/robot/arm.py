@@ -246,14 +246,14 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
     # Drake is imported here: a command that fails before it needs an arm should not wait for it.
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
-    from pydrake.multibody.tree import JointIndex, PrismaticJoint, RevoluteJoint, WeldJoint
+    from pydrake.multibody.tree import JointIndex, RevoluteJoint, WeldJoint
 
     plant = MultibodyPlant(time_step=0.0)
+    base = _base_link(root, path)
     try:
         # What it warns of (links without mass, joints it does not know) is checked here or in `urdf`.
         with quiet("drake"):
             (instance,) = Parser(plant).AddModelsFromString(mechanics_only(root), "urdf")
-        base = _base_link(root, path)
         # A root link called "world" is Drake's world itself: nothing is left to weld.
         if base != "world":
             plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
@@ -266,11 +266,6 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
         joint = plant.get_joint(JointIndex(index))
         if isinstance(joint, WeldJoint):
             continue
-        if not isinstance(joint, RevoluteJoint | PrismaticJoint):
-            raise ArmError(
-                f"{path}: joint {joint.name()!r} is {joint.type_name()}; only revolute, continuous, prismatic "
-                "and fixed joints are supported"
-            )
         moving.append(joint)
     if not moving:
         raise ArmError(f"{path}: the URDF has no moving joint; an arm needs at least one")

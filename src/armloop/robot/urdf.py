@@ -1,7 +1,6 @@
 """A URDF read, validated and reduced to a serial chain before any parser meets it: plain XML and numpy.
 
-What a parser would take silently (a mass of ``1kg``, an inertia that no body has), or answer with a traceback, is
-answered with one line that names the file and the element. Entities are not expanded and sizes are bounded.
+Its links and joints are checked by :mod:`armloop.robot.urdf_checks`. Entities are not expanded and sizes are bounded.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armloop.robot.urdf_checks import MOVING, check_joint, check_link, three
 from armloop.util.arrays import Array
 from armloop.util.doubts import warn
 from armloop.util.errors import ArmError
@@ -21,12 +21,6 @@ Element = ElementTree.Element
 MOST_JOINTS = 16
 """Moving joints that an arm may have."""
 _MOST_BYTES, _MOST_ELEMENTS, _LONGEST_NAME = 8_000_000, 2_000, 128
-_MOVING = ("revolute", "continuous", "prismatic")
-# Limits beyond these are none: rad or m, and everything else.
-_LARGEST = {"lower": 1e6, "upper": 1e6}
-_LARGEST_ELSE = 1e12
-# Principal moments may miss the triangle inequality by so much of the largest before it is said: rounding in CAD.
-_TRIANGLE = 0.01
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -40,9 +34,10 @@ def read_urdf(path: Path) -> Element:
     if not names["link"]:
         raise ArmError(f"{path}: the URDF has no <link>")
     for link in root.findall("link"):
-        _check_inertial(link, path)
+        check_link(link, f"{path}: link {link.get('name')!r}")
     for joint in root.findall("joint"):
-        _check_joint(joint, names["link"], path)
+        check_joint(joint, names["link"], f"{path}: joint {joint.get('name')!r}")
+    _check_tree(root, path)
     return root
 
 
@@ -54,7 +49,7 @@ def serial_chain(root: Element, path: Path, lock: Mapping[str, float], tip: str 
     """
     root = ElementTree.fromstring(ElementTree.tostring(root))
     joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
-    moving = [name for name, joint in joints.items() if joint.get("type") in _MOVING]
+    moving = [name for name, joint in joints.items() if joint.get("type") in MOVING]
     for name, value in lock.items():
         if name not in moving:
             raise ArmError(
@@ -62,17 +57,18 @@ def serial_chain(root: Element, path: Path, lock: Mapping[str, float], tip: str 
             )
         if not np.isfinite(value):
             raise ArmError(f"{path}: --lock {name}={value}: give a finite position in rad (m)")
+        _say_beyond(joints[name], value, f"{path}: --lock {name}={value:g}")
         _fix(joints[name], value, path)
     if tip is not None:
         _keep_way_to(tip, root, path)
     for name, joint in joints.items():
         mimic = joint.find("mimic")
-        if mimic is not None and joint.get("type") in _MOVING:
+        if mimic is not None and joint.get("type") in MOVING:
             raise ArmError(
                 f"{path}: joint {name!r} mimics {mimic.get('joint')!r}, a serial arm's joints are free; "
                 f"lock it (--lock {name}=0) or name the arm's last link (--tip LINK)"
             )
-    left = [name for name, joint in joints.items() if joint.get("type") in _MOVING]
+    left = [name for name, joint in joints.items() if joint.get("type") in MOVING]
     if len(left) > MOST_JOINTS:
         raise ArmError(
             f"{path}: {len(left)} moving joints, at most {MOST_JOINTS} are supported; lock those that stand still "
@@ -115,6 +111,10 @@ def _names(root: Element, kind: str, path: Path) -> list[str]:
         name = element.get("name", "")
         if not name:
             raise ArmError(f"{path}: a <{kind}> has no name; each must have one of its own")
+        if not name.isprintable():
+            raise ArmError(
+                f"{path}: {kind} {name[:40]!r}: a name of characters that cannot be shown; rename it"
+            )
         if len(name) > _LONGEST_NAME:
             raise ArmError(
                 f"{path}: {kind} {name[:20]!r}...: a name of {len(name)} characters; give at most {_LONGEST_NAME}"
@@ -130,85 +130,6 @@ def _names(root: Element, kind: str, path: Path) -> list[str]:
     if twice is not None:
         raise ArmError(f"{path}: {kind} {twice!r} is declared twice; names must be unique")
     return names
-
-
-def _number(element: Element, key: str, where: str) -> float:
-    """One finite number of an attribute that must be there; ``where`` names file and element."""
-    text = element.get(key)
-    if text is None:
-        raise ArmError(f"{where} has no {key}; give a number")
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if "_" in text or not np.isfinite(value):
-        raise ArmError(
-            f"{where} {key}={text[:40]!r} is not a finite number; write it like 0.25, without a unit"
-        )
-    return value
-
-
-def _three(element: Element, key: str, where: str) -> Array:
-    text = element.get(key, "0 0 0")
-    parts = text.split()
-    try:
-        values = np.array([float(part) for part in parts])
-    except ValueError:
-        values = np.array([np.nan])
-    if len(parts) != 3 or not np.isfinite(values).all():
-        raise ArmError(f"{where} {key}={text[:60]!r} must be three finite numbers, such as '0 0 1'")
-    if np.abs(values).max() > _LARGEST_ELSE:
-        raise ArmError(f"{where} {key}={text[:60]!r} is out of all proportion; give m and rad")
-    return values
-
-
-def _check_origin(element: Element, where: str) -> None:
-    for origin in element.findall("origin"):
-        for key in ("xyz", "rpy"):
-            _three(origin, key, f"{where}: <origin>")
-
-
-def _check_inertial(link: Element, path: Path) -> None:
-    where = f"{path}: link {link.get('name')!r}"
-    inertial = link.find("inertial")
-    if inertial is None:
-        return  # a frame without a body
-    _check_origin(inertial, where)
-    element = inertial.find("mass")
-    if element is None:
-        raise ArmError(f"{where}: <inertial> has no <mass>; give its value in kg")
-    mass = _number(element, "value", f"{where}: <mass>")
-    if not 0 <= mass < _LARGEST_ELSE:
-        raise ArmError(f"{where}: <mass> value={mass:g} must not be negative; give kg")
-    element = inertial.find("inertia")
-    if element is None:
-        raise ArmError(
-            f"{where}: <inertial> has no <inertia>; give ixx, iyy, izz (and ixy, ixz, iyz) in kg·m²"
-        )
-    diagonal = [_number(element, key, f"{where}: <inertia>") for key in ("ixx", "iyy", "izz")]
-    ixy, ixz, iyz = (
-        _number(element, key, f"{where}: <inertia>") if key in element.attrib else 0.0
-        for key in ("ixy", "ixz", "iyz")
-    )
-    tensor = np.diag(diagonal) + np.array([[0, ixy, ixz], [ixy, 0, iyz], [ixz, iyz, 0]])
-    if np.abs(tensor).max() > _LARGEST_ELSE:
-        raise ArmError(f"{where}: <inertia> holds {np.abs(tensor).max():g}; give kg·m²")
-    least, middle, most = np.linalg.eigvalsh(tensor)
-    if least < -1e-9 * max(most, abs(least)):
-        raise ArmError(
-            f"{where}: <inertia> is not positive definite: a principal moment is {least:.4g} kg·m²; no body has it"
-        )
-    if mass == 0 and most > 0:
-        warn(
-            f"{where}: <mass> is zero with an <inertia>, which no body has; the link is taken for one without either"
-        )
-    elif mass > 0 and most == 0:
-        warn(f"{where}: <inertia> is zero with a mass of {mass:g} kg; it is taken for a point")
-    elif least + middle < most * (1 - _TRIANGLE):
-        warn(
-            f"{where}: <inertia> has principal moments {least:.4g}, {middle:.4g}, {most:.4g} kg·m²; of a body, two add "
-            "up to at least the third, which is taken to be their sum"
-        )
 
 
 def as_of_a_body(link: Element) -> None:
@@ -236,46 +157,18 @@ def as_of_a_body(link: Element) -> None:
         tensor.set(key, repr(float(value)))
 
 
-def _check_joint(joint: Element, links: list[str], path: Path) -> None:
-    where, kind = f"{path}: joint {joint.get('name')!r}", joint.get("type")
-    for end in ("parent", "child"):
-        element = joint.find(end)
-        name = None if element is None else element.get("link")
-        if name is None:
-            raise ArmError(f"{where} has no <{end} link=...>; name the link")
-        if name not in links and not (end == "parent" and name == "world"):
-            raise ArmError(f"{where}: {end} link {name[:40]!r} is not declared")
-    _check_origin(joint, where)
-    if kind not in _MOVING:
-        if kind not in ("fixed", "planar", "floating", "ball"):
+def _check_tree(root: Element, path: Path) -> None:
+    """Raise `ArmError` where joints close a loop: a serial arm is a tree."""
+    before: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        name, (parent, child) = joint.get("name", ""), _links(joint)
+        if parent == child:
+            raise ArmError(f"{path}: joint {name!r} joins link {child!r} to itself")
+        if child in before:
             raise ArmError(
-                f"{where}: type {str(kind)[:40]!r} is unknown; it must be one of {', '.join(_MOVING)}, fixed"
+                f"{path}: link {child!r} is the child of two joints, {before[child]!r} and {name!r}; an arm has no loop"
             )
-        return
-    axis = joint.find("axis")
-    if axis is not None and not np.linalg.norm(_three(axis, "xyz", f"{where}: <axis>")) > 1e-9:
-        raise ArmError(f"{where}: <axis> has no length; give a direction such as '0 0 1'")
-    limit = joint.find("limit")
-    if limit is None:
-        return
-    values = {}
-    for key in ("lower", "upper", "velocity", "effort"):
-        if key in limit.attrib:
-            values[key] = _number(limit, key, f"{where}: <limit>")
-            if abs(values[key]) > _LARGEST.get(key, _LARGEST_ELSE):
-                raise ArmError(f"{where}: <limit> {key}={values[key]:g} is no limit; leave it out")
-    if values.get("velocity", 1.0) <= 0:
-        raise ArmError(
-            f"{where}: <limit> velocity={values['velocity']:g} must be positive; leave it out if unknown"
-        )
-    if values.get("effort", 0.0) < 0:
-        raise ArmError(f"{where}: <limit> effort={values['effort']:g} must not be negative")
-    lower, upper = values.get("lower", 0.0), values.get("upper", 0.0)
-    if kind != "continuous" and ("lower" in values or "upper" in values) and lower >= upper:
-        raise ArmError(
-            f"{where}: <limit> lower={lower:g} is not below upper={upper:g}; lock a joint that does not move "
-            f"(--lock {joint.get('name')}={lower:g})"
-        )
+        before[child] = name
 
 
 def _links(joint: Element) -> tuple[str, str]:
@@ -296,19 +189,28 @@ def _keep_way_to(tip: str, root: Element, path: Path) -> None:
         way.add(before[link].get("name", ""))
         link = _links(before[link])[0]
     for joint in root.findall("joint"):
-        if joint.get("name") not in way and joint.get("type") in _MOVING:
+        if joint.get("name") not in way and joint.get("type") in MOVING:
             _fix(joint, 0.0, path)
+
+
+def _say_beyond(joint: Element, value: float, where: str) -> None:
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") == "continuous" or not {"lower", "upper"} & set(limit.attrib):
+        return
+    lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+    if not lower <= value <= upper:
+        warn(f"{where} is outside of the joint's limits, {lower:g} to {upper:g}")
 
 
 def _fix(joint: Element, value: float, path: Path) -> None:
     """Make a joint a fixed one at a position; what it can do no more is taken out."""
     where = f"{path}: joint {joint.get('name')!r}"
     origin, axis = joint.find("origin"), joint.find("axis")
-    direction = np.array([1.0, 0.0, 0.0]) if axis is None else _three(axis, "xyz", f"{where}: <axis>")
+    direction = np.array([1.0, 0.0, 0.0]) if axis is None else three(axis, "xyz", f"{where}: <axis>")
     direction = direction / np.linalg.norm(direction)
     xyz, rpy = np.zeros(3), np.zeros(3)
     if origin is not None:
-        xyz, rpy = _three(origin, "xyz", where), _three(origin, "rpy", where)
+        xyz, rpy = three(origin, "xyz", where), three(origin, "rpy", where)
         joint.remove(origin)
     R = _rotation(rpy)
     if joint.get("type") == "prismatic":

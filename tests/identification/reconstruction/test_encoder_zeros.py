@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
+from armloop.data.signals import Conditioning
+from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import Options, encoder_zeros, reconstruct
+from armloop.identification.reconstruction.bandwidth import table_at
 from armloop.identification.reconstruction.encoder_zeros import EncoderZeros
 
 SPREAD, LOGS = 0.03, 6
@@ -85,6 +90,68 @@ def test_held_out_blocks_take_no_part() -> None:
     ]
     np.testing.assert_allclose(found(spoilt, aside).zeros, found(logs, aside).zeros, atol=1e-3)
     assert np.abs(found(spoilt).zeros - found(logs).zeros).max() > 5e-3
+
+
+def mixed(logs: list[MotionLog]) -> encoder_zeros._Mixed:
+    """The regression that `encoder_zeros` makes of logs."""
+    arm = three_axis()
+    base = BaseParameters.of_arm(arm, rotors=True)
+    table = table_at(list(logs), arm, base, Conditioning(), 10.0, [10.0], [np.zeros((0, 2))] * len(logs))
+    assert table is not None
+    return encoder_zeros._Mixed.of(table, arm, base, 1.0)
+
+
+@pytest.mark.parametrize("kind", ["", "zeros", "offsets"])
+def test_what_is_left_on_a_block_owes_nothing_to_that_block(kind: str) -> None:
+    model = mixed(recorded(6, drawn(6, SPREAD)))
+    table, rng = model.table, np.random.default_rng(0)
+    expected = table.tau - model.left_out(kind)
+    even = table.blocks % 2 == 0
+    changed = table.tau + np.where(even[:, None], rng.normal(size=table.tau.shape), 0.0)
+    other = replace(model, table=replace(table, tau=changed))
+    found = changed - other.left_out(kind)
+    np.testing.assert_allclose(found[even], expected[even], atol=1e-9)
+    assert np.abs(found - expected)[~even].max() > 1e-3
+
+
+def test_zeros_must_leave_clearly_less_and_less_than_offsets(monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = recorded(6, drawn(6, SPREAD))
+    left: dict[str, float] = {}
+    monkeypatch.setattr(
+        encoder_zeros._Mixed, "left_out", lambda self, kind: np.full_like(self.table.tau, 0.05 * left[kind])
+    )
+    for zeros, offsets, true in (
+        (0.89, 1.0, True),
+        (0.91, 1.0, False),
+        (0.5, 0.51, True),
+        (0.5, 0.49, False),
+    ):
+        left |= {"": 1.0, "zeros": zeros, "offsets": offsets}
+        assert found(logs).found == true
+    left |= {"zeros": 0.5, "offsets": 1.0}
+    monkeypatch.setattr(encoder_zeros, "_clearly", lambda *_: False)
+    assert not found(logs).found
+
+
+def test_a_gain_is_clear_by_its_blocks() -> None:
+    """Three standard errors of the mean over blocks, however many samples they have; numbers of no block do not count."""
+    blocks = np.repeat(np.array([0, 1, 2, 3, 7, 8, 9, 20]), 10)
+    model: Any = SimpleNamespace(table=SimpleNamespace(blocks=blocks), judged=[(0, np.ones(80, dtype=bool))])
+    before = np.ones((80, 1))
+
+    def clear(after: list[float]) -> bool:
+        return encoder_zeros._clearly(model, before, np.repeat(after, 10)[:, None])
+
+    assert clear([0.9] * 4 + [0.8] * 4)
+    assert not clear([1.0] * 7 + [0.0])  # one block: its gain is one standard error
+    assert not clear([0.2, 1.3] * 4)  # 0.5 ± 0.3
+    assert not clear([1.1] * 8)
+
+
+def test_neighbours_that_tell_the_same_count_once() -> None:
+    """Of instants that all tell no more than one does, nothing is known."""
+    logs, nothing = recorded(6, drawn(6, SPREAD)), [np.zeros((0, 2))] * LOGS
+    assert not encoder_zeros.encoder_zeros(logs, three_axis(), 10.0, nothing, 1e5).found
 
 
 def test_corrected_logs_have_the_zeros_taken_off() -> None:
