@@ -17,11 +17,13 @@ class Evaluate(OfModel, Json):
 def run(options: Evaluate) -> None:
     """Score a model on logs."""
     from armloop.commands.shared import model_and_logs, print_json
+    from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import score
     from armloop.reports.tables import score_table
 
     model, logs = model_and_logs(options)
+    require_different(logs)
     result = score(model, preprocess(logs, model.conditioning))
     if options.json:
         print_json(result.to_dict())

@@ -238,7 +238,12 @@ def read_log(
     if tau_unit not in TAU_UNITS:
         raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
     n, _ = check_header(path, joints)
-    if tau_unit != "A" and said_of(path, _UNIT) == "A":
+    told = said_of(path, _UNIT)
+    if told not in (None, *TAU_UNITS):
+        raise LogError(
+            f"{path}: says of itself that tau is in {told[:40]!r}; it must be one of {', '.join(TAU_UNITS)}"
+        )
+    if tau_unit != "A" and told == "A":
         raise LogError(
             f"{path}: tau holds motor currents (A), as the file itself says; give --tau-unit A, and --drive-gains to make "
             "torques of them"

@@ -32,6 +32,11 @@ _FROZEN = 0.2
 _WINDOWS, _SERIES_ROWS = 5_000, 20_000
 # Lags that are tried, and the one from which on it is said, s.
 _LAGS, _LAG = np.arange(-0.03, 0.0301, 0.001), 0.0035
+# v that is proportional to the rate of q, at such a correlation, by a factor so far from one.
+_ALIKE, _OFF = 0.998, 0.05
+# Torque is cut off where so many of the rows hold its extreme, so many times as many as any of so many values beside it; a
+# sensor that knows fewer values than the last rounds.
+_CUT, _PILED, _BESIDE, _LEVELS = 0.01, 10, 5, 50
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,8 @@ def faults(log: Recorded) -> Iterator[Finding]:
 
 
 def doubts(log: Recorded) -> Iterator[Finding]:
-    """Yield what may be right and should be known: v that lags or disagrees, a log of few samples a second."""
+    """Yield what may be right and should be known: a torque that is cut off, v that lags or disagrees, few samples."""
+    yield from _saturated(log)
     if not is_time_series(log.q, log.runs):
         return
     if log.derived:
@@ -177,8 +183,9 @@ def _jumps(log: Recorded) -> Iterator[Finding]:
             continue
         q, dt = log.q[run], np.diff(log.time[run])[:, None]
         step = np.diff(q, axis=0)
-        rate = step / dt
-        jump = np.abs(step[1:-1] - dt[1:-1] * 0.5 * (rate[2:] + rate[:-2]))
+        # the rate over both neighbours: of one whose stamps nearly coincide alone it would be without bound
+        rate = (step[2:] + step[:-2]) / (dt[2:] + dt[:-2])
+        jump = np.abs(step[1:-1] - dt[1:-1] * rate)
         for j in range(q.shape[1]):
             row = int(np.argmax(jump[:, j]))
             size, usual = float(jump[row, j]), float(np.quantile(jump[:, j], 0.95))
@@ -339,7 +346,16 @@ def _disagreements(log: Recorded) -> Iterator[Finding]:
         **{key: getattr(windows, key)[inside] for key in ("start", "end", "change", "integral")},
     )
     lags = []
+    of_q, of_v = windows.rates()
     for j in windows.moving():
+        similar = float(windows.similarity()[j, j])
+        factor = similar * float(of_v[j] / of_q[j])
+        if similar > _ALIKE and abs(factor - 1) > _OFF:
+            yield Finding(
+                f"column v{j + 1}",
+                f"is {factor:.3g} times the rate of q{j + 1}; leave out all columns v to have q differentiated",
+            )
+            continue
         size = float(np.mean(np.square(windows.change[:, j])))
         errors = [_error(log, windows, j, float(lag)) for lag in _LAGS]
         best = int(np.argmin(errors))
@@ -360,6 +376,25 @@ def _disagreements(log: Recorded) -> Iterator[Finding]:
             f"{'lag behind' if lag > 0 else 'lead'} dq/dt by {1e3 * abs(lag):.1f} ms; "
             "leave them out to have q differentiated",
         )
+
+
+def _saturated(log: Recorded) -> Iterator[Finding]:
+    """A torque that is cut off: while the arm moves, far more rows hold its extreme than any other value near it."""
+    moves = np.append(False, (np.diff(log.q, axis=0) != 0).any(axis=1))
+    if moves.sum() < _FEWEST:
+        return
+    for j, x in enumerate(log.tau[moves].T):
+        values, counts = np.unique(x, return_counts=True)
+        if len(values) < _LEVELS:
+            continue  # a coarse sensor, or none
+        for end, beside in ((0, slice(1, _BESIDE + 1)), (-1, slice(-1 - _BESIDE, -1))):
+            share = counts[end] / len(x)
+            if values[end] != 0 and share > _CUT and counts[end] > _PILED * counts[beside].max():
+                yield Finding(
+                    f"column tau{j + 1}",
+                    f"is {values[end]:.6g} to the last digit in {share:.0%} of the rows, as where a sensor or a drive "
+                    "saturates; leave out those parts",
+                )
 
 
 def _far_from_the_ends(log: Recorded, windows: _Windows) -> NDArray[np.bool_]:
@@ -391,9 +426,12 @@ def _likely_cause(ratio: float) -> str:
         np.pi / 180: "as if q were in degrees",
         1e3: "as if time were in milliseconds or v in mm/s",
         1e-3: "as if q were in mm",
-        -1.0: "the opposite sign",
+        30 / np.pi: "as if v were in revolutions per minute",
+        1 / (2 * np.pi): "as if v were in revolutions per second",
+        2 * np.pi: "as if q were in revolutions",
+        1 / 60: "as if time were in minutes",
     }
-    for factor, cause in causes.items():
-        if 0.8 < ratio / factor < 1.25:
-            return cause
-    return "which is not one"
+    if ratio < 0:
+        return "the opposite sign" if 0.8 < -ratio < 1.25 else "which is not one"
+    factor = min(causes, key=lambda each: abs(np.log(ratio / each)))
+    return causes[factor] if 0.8 < ratio / factor < 1.25 else "which is not one"

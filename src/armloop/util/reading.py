@@ -160,7 +160,11 @@ def _size(node: Any, known: dict[int, int], level: int) -> int:
         if isinstance(node, yaml.SequenceNode):
             total += sum(_size(each, known, level + 1) for each in node.value)
         elif isinstance(node, yaml.MappingNode):
-            keys = [key.value for key, _ in node.value if isinstance(key.value, str)]
+            for key, _ in node.value:
+                if key.tag not in ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge"):
+                    line = key.start_mark.line + 1
+                    raise _Doubt(f"line {line}: a field's name must be text; put it between quotes")
+            keys = [key.value for key, _ in node.value]
             twice = (
                 {key for key in keys if keys.count(key) > 1 and key != "<<"} if len(keys) < 1000 else set()
             )
@@ -182,10 +186,16 @@ def _loader() -> Any:
     def integer(loader: Any, node: Any) -> int:
         if len(node.value) > _DIGITS:
             raise _Doubt(f"{node.value[:20]}… is a number of {len(node.value)} digits; give a shorter one")
+        digits = node.value.lstrip("+-")
+        if ":" in digits or (digits[:1] == "0" and digits.isdigit() and len(digits) > 1):
+            # YAML 1.1 takes 1:30 for 90 and 010 for 8, which nobody means
+            raise _Doubt(
+                f"line {node.start_mark.line + 1}: {node.value[:20]} is no plain number; write it like 90 or 0.5"
+            )
         return int(yaml.SafeLoader.construct_yaml_int(loader, node))
 
     def number(loader: Any, node: Any) -> float:
-        value = float(yaml.SafeLoader.construct_yaml_float(loader, node))
+        value = math.inf if ":" in node.value else float(yaml.SafeLoader.construct_yaml_float(loader, node))
         if not math.isfinite(value):
             raise _Doubt(f"line {node.start_mark.line + 1}: {node.value[:20]} must be a finite number")
         return value

@@ -135,7 +135,7 @@ def test_zeros_must_leave_clearly_less_and_less_than_offsets(monkeypatch: pytest
 
 def test_a_gain_is_clear_by_its_blocks() -> None:
     """Three standard errors of the mean over blocks, however many samples they have; numbers of no block do not count."""
-    blocks = np.repeat(np.array([0, 1, 2, 3, 7, 8, 9, 20]), 10)
+    blocks = np.repeat(np.array([0, 1, 2, 3, 7, 8, 9, 300]), 10)
     model: Any = SimpleNamespace(table=SimpleNamespace(blocks=blocks), judged=[(0, np.ones(80, dtype=bool))])
     before = np.ones((80, 1))
 

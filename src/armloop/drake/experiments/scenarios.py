@@ -47,6 +47,7 @@ __all__ = [
 ]
 
 _LEAST_LOG = 14.0  # s, what a diagnosis needs and a little more
+_FEWEST_STEPS = 10  # of the plant, that are scored
 
 
 def plant_names() -> list[str]:
@@ -107,9 +108,11 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
             f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}"
         )
     score = data.score or [0.0, reference.duration]
-    if len(score) != 2 or not 0 <= score[0] < score[1] <= reference.duration + 1e-9:
+    least = _FEWEST_STEPS * period
+    if len(score) != 2 or not 0 <= score[0] <= score[1] - least < score[1] <= reference.duration + 1e-9:
         raise ScenarioError(
-            f"{where}: score is {score}; it must be a start and an end in 0 to {reference.duration:g} s"
+            f"{where}: score is {score}; it must be a start and an end in 0 to {reference.duration:g} s, "
+            f"{least:g} s or more apart"
         )
     if data.bandwidth is not None and not 0 < data.bandwidth <= 1 / period:
         raise ScenarioError(

@@ -8,11 +8,14 @@ from armloop.data.motion import Samples
 from armloop.robot.arm import Arm
 from armloop.util.errors import ExcitationError
 
+#: Torques that stay below are none, N·m (N): a watch's are a hundred times as large.
+NOTHING = 1e-8
+
 
 def check_recorded(arm: Arm, samples: Samples) -> None:
-    """Raise ``ExcitationError`` if a joint's torque is zero throughout: nobody recorded it."""
+    """Raise ``ExcitationError`` if a joint's torque is zero throughout, or next to it: nobody recorded it."""
     for j, joint in enumerate(arm.joints):
-        if not samples.tau[:, j].any():
+        if np.abs(samples.tau[:, j]).max() < NOTHING:
             raise ExcitationError(
                 f"tau{j + 1}: zero throughout; give logs that hold the torque (or current) of joint {joint.name!r}"
             )
