@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from armloop.regression.constrained import TooCostly, constrained_least_squares
+from armloop.regression.constrained import TooCostly, _bounded, constrained_least_squares
 
 
 def test_nothing_violated_leaves_the_solution_alone():
@@ -137,3 +137,34 @@ def test_the_cost_is_counted_from_where_it_starts():
     assert constrained_least_squares(G, b, start, cuts, 0.01)[0] == 0.0
     with pytest.raises(TooCostly, match="cost 1"):
         constrained_least_squares(G, b, b, cuts, 0.99)
+
+
+@pytest.mark.parametrize(
+    ("parts", "holds"), [([1.8e-6, 0.0], True), ([3e-6, 0.0], False), ([0.0, 3e-6], False)]
+)
+def test_in_the_end_a_millionth_of_a_constraints_addends_may_be_missing(parts, holds):
+    rounds = []
+
+    def cuts(theta):
+        rounds.append(theta)
+        return np.array([[1.0, -1.0 - part] for part in (parts if len(rounds) == 21 else [0.0])])
+
+    # of θ = (2, 2) the last rows are violated by 2 x of 4 + 2 x: the worst one counts
+    start = np.array([1.0, 3.0])
+    if holds:
+        theta, rows = constrained_least_squares(np.eye(2), start, start, cuts)
+        assert theta == pytest.approx([2.0, 2.0]) and rows == 1
+    else:
+        with pytest.raises(ArithmeticError, match="2 are still violated"):
+            constrained_least_squares(np.eye(2), start, start, cuts)
+
+
+def test_bounds_of_single_coefficients_are_met_whatever_their_size():
+    theta = np.array([-1e-9, 1e-9, -1e-9, 0.4, -0.5, -0.3, -0.2])
+    rows = np.diag([0.5, -0.5, 3.0, 0.5, -0.5, 0.0, 0.0])[:5]
+    # the last row is of two coefficients, and no bound, however hard it pushes
+    rows = np.vstack([rows, np.eye(7)[5] + np.eye(7)[6]])
+    found = _bounded(theta, rows, np.array([0.0, 0.0, 0.5, 0.0, 0.0, 7.0]))
+    assert found.tolist() == [0.0, 0.0, 0.0, 0.4, -0.5, -0.3, -0.2]
+    # what pushes is zero, though it was met from within
+    assert _bounded(np.array([1e-9, 2.0]), np.eye(2), np.array([0.5, 0.0])).tolist() == [0.0, 2.0]

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from armloop.regression.estimators import Problem, Reduction
+from armloop.regression.estimators import LISTED, Estimator, Problem, Reduction
 from armloop.regression.estimators.lasso import lasso
 from armloop.regression.estimators.problem import halves
 from armloop.regression.estimators.rooted import rooted
@@ -154,3 +154,54 @@ def test_a_penalty_is_chosen_on_parts_that_were_not_fitted(parts, held):
     fitted, left_out = halves(marked)
     assert left_out.G[0, 0] == sum(2.0**k for k in held)
     assert fitted.G[0, 0] + left_out.G[0, 0] == 2.0**parts - 1
+
+
+def test_stlsqs_ridge_is_a_thousand_millionth_of_unit_columns():
+    """Two columns with the correlation 1 - ε: the ridge shrinks what their difference says by ε/(ε + ridge)."""
+    part = 1e-9
+    G = np.array([[1.0, 1.0 - part], [1.0 - part, 1.0]])
+    b = np.array([0.3 - part * 0.3 + part * 0.8, 0.3 - part * 0.3 - part * 0.5])
+    found = stlsq(Problem(Moments(G, b, 1.0, 500.0), (), 500.0, 1e-12, 1.0, 40, 0.1))
+    # coefficients 0.8 and -0.5: their sum stays, their difference of 1.3 is halved
+    np.testing.assert_allclose(found, [0.15 + 0.325, 0.15 - 0.325], rtol=1e-3)
+
+
+def test_two_parts_are_enough_to_hold_one_out_for_the_lassos_penalty():
+    """The second column is in the first part's signal, and in the second's with the other sign."""
+    parts = tuple(Moments(np.eye(2) / 2, np.array([0.4, second]), 0.5, 100.0) for second in (0.15, -0.15))
+    whole = total(parts)
+    held_out = Problem(whole, parts, 200.0, 1e-12, 1.0, 2, None)
+    # the path of the first ends with both columns and has but the first from λ = 0.3 on
+    np.testing.assert_allclose(lasso(held_out), [0.5, 0.0], atol=1e-12)
+    # one part is none: by the criterion the first column alone, unshrunken but for the path's end
+    for few in ((), parts[:1]):
+        alone = lasso(Problem(whole, few, 200.0, 1e-12, 1.0, 2, None))
+        np.testing.assert_allclose(alone, [0.8, 0.0], atol=1.01e-5)
+
+
+def test_what_estimators_say_of_themselves():
+    flags = {
+        name: "".join(
+            letter
+            for letter, there in (
+                ("l", kind.least_squares),
+                ("s", kind.shrinks),
+                ("p", kind.needs_parts),
+                ("a", kind.keeps_all),
+            )
+            if there
+        )
+        for name, kind in LISTED.items()
+    }
+    assert flags == {
+        **{
+            "evidence": "l",
+            "lasso": "sp",
+            "debiased_lasso": "lp",
+            "adaptive_lasso": "sp",
+            "thresholded": "lp",
+        },
+        **{"stlsq": "p", "sr3": "p", "stability": "lp", "least_squares": "a"},
+    }
+    assert (Estimator.least_squares, Estimator.shrinks, Estimator.keeps_all) == (False, False, False)
+    assert Estimator.needs_parts

@@ -1,5 +1,6 @@
 """The search for the support with the best criterion, against every support there is and every exchange by hand."""
 
+import importlib
 from itertools import combinations
 
 import numpy as np
@@ -153,3 +154,58 @@ def test_a_move_must_gain_more_than_round_off():
     again = search._improved((score, best))
     assert again[0] == score
     np.testing.assert_array_equal(again[1], best)
+
+
+@pytest.mark.parametrize(("area", "gains"), [(1.5e-7, True), (0.8e-7, False)])
+def test_two_columns_that_are_nearly_one_gain_nothing_together(area, gains):
+    """Unit columns with the correlation r, one of which sees 1 of the residual: 1/(1 - r²)."""
+    r = np.sqrt(1 - area)
+    found = _pair_gains(np.array([[[1.0, r], [r, 1.0]]]), np.array([[1.0, 0.0]]))[0]
+    assert found[0, 1] == found[1, 0] == (pytest.approx(1 / area, rel=1e-6) if gains else 0.0)
+
+
+@pytest.mark.parametrize(("own", "gains"), [(2e-9, True), (0.5e-9, False)])
+def test_a_column_that_the_support_all_but_spans_gains_nothing(own, gains):
+    """A thousand-millionth of its square must be its own."""
+    assert _gains(np.array([own, 4.0]), np.array([1e-6, 6.0])).tolist() == pytest.approx(
+        [1e-12 / own if gains else 0.0, 9.0]
+    )
+    G = np.diag([own, 4.0])[None]
+    assert (_pair_gains(G, np.array([[1e-6, 6.0]]))[0, 0, 1] > 0) == gains
+
+
+def test_so_far_it_looks(monkeypatch):
+    """A path of twice as many steps as terms; exchanges of two among the twelve weakest; pairs of 120 columns."""
+    given = problem(size=130, samples=400, max_terms=14)
+    steps, sizes, screened = [], [], []
+    searching = importlib.import_module("armloop.regression.estimators.evidence")
+    follow, pair_gains = searching.path, searching._pair_gains
+    monkeypatch.setattr(searching, "path", lambda moments, most: steps.append(most) or follow(moments, most))
+    monkeypatch.setattr(_Search, "_improved", lambda self, start: start)
+    _Search(given).run()
+    assert steps == [28]
+
+    def best(self, fit, some, added):
+        sizes.append(some.shape)
+        return np.inf, fit.support
+
+    fit = _Fit(given.moments, np.arange(14))
+    monkeypatch.setattr(
+        searching, "_pair_gains", lambda G, left: screened.append(G.shape) or pair_gains(G, left)
+    )
+    _Search(given)._best(fit, np.array([[0, 1], [2, 3]]), 2)
+    assert screened == [(2, 120, 120)]
+    monkeypatch.setattr(_Search, "_best", best)
+    for removed, added, count in ((1, 1, 14), (2, 2, 66), (3, 2, 220)):
+        sizes.clear()
+        _Search(given)._exchange(fit, removed, added)
+        assert sum(rows for rows, _ in sizes) == count and {columns for _, columns in sizes} == {removed}
+
+
+@pytest.mark.parametrize(("gain", "taken"), [(1.5e-6, True), (0.5e-6, False)])
+def test_a_better_criterion_is_better_by_a_millionth(gain, taken, monkeypatch):
+    given, support = problem(), np.array([1, 3])
+    moves = iter([[(5.0 - gain, np.array([1]))], [], []])
+    monkeypatch.setattr(_Search, "_moves", lambda self, fit: iter(next(moves)))
+    score, found = _Search(given)._improved((5.0, support))
+    assert (score, found.tolist()) == ((5.0 - gain, [1]) if taken else (5.0, [1, 3]))

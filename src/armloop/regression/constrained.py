@@ -21,7 +21,6 @@ from armloop.util.arrays import Array
 Cuts = Callable[[Array], Array]
 
 _ROUNDS = 20
-_TOLERANCE = 1e-9
 #: What a constraint may be violated by in the end, relative to the size of its addends.
 _FEASIBLE = 1e-6
 
