@@ -1,0 +1,101 @@
+"""What the laws of the catalogue add to the mass matrix, which columns are constant, and what is filtered once."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion, Samples
+from armloop.identification.reconstruction import catalogue
+from armloop.identification.reconstruction.catalogue import Law, Laws, permanent
+from armloop.robot.arm import load_arm
+
+RNG = np.random.default_rng(4)
+#: Two laws' parts of M at cos(q1) = 1, not symmetric, so that rows and columns cannot be taken for each other.
+INERTIAS = RNG.normal(size=(3, 3, 2))
+
+
+def effect(inertias: Any, **of: Any) -> Any:
+    """Torque cos(q1) A v̇ and a weight, per coefficient; the shape multiplies it."""
+
+    def columns(context: Any, shape: float) -> Any:
+        motion = context.motion
+        torque = np.einsum("ijp,nj->nip", inertias, motion.vdot) * np.cos(motion.q[:, :1, None])
+        return shape * (torque + 5.0 + motion.q[:, :, None])
+
+    flags = {"needs_model": False, "memory": False, "load": False} | of
+    return SimpleNamespace(full_columns=columns, **flags)
+
+
+def test_the_mass_matrix_is_what_an_acceleration_of_one_adds() -> None:
+    arm = three_axis()
+    q = RNG.normal(size=(4, 3))
+    laws = Laws([Law(effect(INERTIAS), 2.0, 2), Law(effect(np.zeros((3, 3, 1))), 1.0, 1)])
+    found = laws.mass(arm, q)
+    np.testing.assert_allclose(
+        found[..., :2], 2.0 * np.cos(q[:, 0])[:, None, None, None] * INERTIAS, atol=1e-12
+    )
+    assert found.shape == (4, 3, 3, 3) and laws.inertial(arm, q) == [True, True, False]
+    # one entry is inertia enough
+    one = np.zeros((3, 3, 1))
+    one[2, 2] = 0.1
+    assert Laws([Law(effect(one), 1.0, 1)]).inertial(arm, q) == [True]
+    # what knows the model, or the past, is asked for nothing
+    for flag in ("needs_model", "memory"):
+        silent = Laws([Law(effect(INERTIAS, **{flag: True}), 2.0, 2)])
+        assert silent.inertial(arm, q) == [False, False] and silent.mass(arm, q).shape == (4, 3, 3, 2)
+    assert Laws().mass(arm, q).shape == (4, 3, 3, 0)
+
+
+def test_a_column_that_is_constant_at_a_joint_and_not_zero_there() -> None:
+    columns = np.zeros((6, 3, 2))
+    columns[:, 0, 1], columns[:, 1, 0], columns[:, 2, 1] = 0.5, np.arange(6.0), [0.0, 0, 0, 0, 0, 0.9]
+    nothing: Any = None
+    assert Law.found(nothing, 1.0, columns, 0.5).constant == (0,)
+    assert Law.found(nothing, 1.0, columns[:, 1:], 0.5).constant == ()
+    columns[:, 2, 0] = -0.25
+    assert Law.found(nothing, 1.0, columns, 0.5).constant == (0, 2)
+    assert Law(nothing, 1.0, 2).constant == () and Law(nothing, 1.0, 2).gain == 0.0
+
+
+def test_laws_that_an_arm_may_have_had_all_along() -> None:
+    names = {law.name for law in permanent(load_arm("scara"))}
+    assert names == {
+        *("encoder_offset", "gravity_tilt", "joint_spring", "rotor_inertia", "time_delay"),
+        *("torque_gain", "torque_offset", "torque_ripple", "transmission_coupling"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("signs", "filtered"),
+    [
+        ((1.0, 1.0, 1.0), 1),
+        ((1.0, -1.0, 1.0), 1),
+        ((0.0, 1.0, -1.0), 1),
+        ((1.0, 0.0, 2.0), 2),
+        ((2.0, 1.0, 1.0), 3),
+    ],
+)
+def test_what_acts_alike_on_several_joints_is_filtered_once(
+    signs: tuple[float, ...], filtered: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+
+    def smooth(samples: Any, x: Any) -> Any:
+        calls.append(x.shape)
+        return 0.5 * x + np.roll(x, 1, axis=0)
+
+    monkeypatch.setattr(catalogue, "smooth", smooth)
+    motion = Motion(np.arange(8.0), *np.zeros((3, 8, 3)), np.array([0]))
+    samples = Samples(motion, np.zeros((8, 3)), np.ones((8, 3), dtype=bool), 1.0)
+    wave = RNG.normal(size=(8, 2))
+    columns = np.stack([sign * wave for sign in signs], axis=1)
+    law: Any = SimpleNamespace(full_columns=lambda context, shape: shape * columns)
+    found = catalogue._Columns(three_axis(), samples).smoothed(law, 3.0)
+    expected = np.stack([3.0 * sign * (0.5 * wave + np.roll(wave, 1, axis=0)) for sign in signs], axis=1)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert calls == [(8, 2)] * filtered
