@@ -10,7 +10,7 @@ import json
 import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -154,9 +154,12 @@ def _drawn(
         tau[:, j] *= gain
         return [{**effect, "parameters": {"gain": gain}}], tau, ""
     if name == "time_delay":
-        seconds = 0.001 * np.round(1000 * rng.uniform(0.008, 0.02))
-        tau = np.column_stack([np.interp(log.time - seconds, log.time, x) for x in log.tau.T])
-        return [{**effect, "joint": None, "parameters": {"seconds": float(seconds)}}], tau, ""
+        # the joint that feels it most by its motion, not by its noise, does so by its size
+        slow = Smooth.of(replace(log, q=log.tau)).q
+        share = float((np.sqrt(np.mean((_late(log.time, slow, 0.01) - slow) ** 2, axis=0)) / level).max())
+        seconds = round(0.01 * size / share, 3)
+        tau = _late(log.time, log.tau, seconds)
+        return [{**effect, "joint": None, "parameters": {"seconds": seconds}}], tau, ""
     if name in ("payload", "gravity_tilt"):
         unit = 1.0 if name == "payload" else 0.02
         torque = _difference(urdf, run, **{"mass" if name == "payload" else "tilt": unit})
@@ -168,6 +171,10 @@ def _drawn(
     column, key, rest = _OF_JOINT[name](run, j, rng)
     factor, added[:, j] = _of_size(column, size * level[j])
     return [{**effect, "parameters": {key: factor, **rest}}], log.tau + added, ""
+
+
+def _late(time: Array, tau: Array, seconds: float) -> Array:
+    return np.column_stack([np.interp(time - seconds, time, x) for x in tau.T])
 
 
 def _of_size(column: Array, rms: float) -> tuple[float, Array]:

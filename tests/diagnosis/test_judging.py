@@ -26,7 +26,7 @@ def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = Non
     rows = len(held_out)
     joint = np.zeros(rows, dtype=np.intp) if joint is None else joint
     stacked = Stacked(np.zeros((rows, 0)), held_out, block, block % 2, joint, int(joint.max()) + 1, joint)
-    return Fit((), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
+    return Fit((), (), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
 
 
 def test_a_gain_that_lies_in_few_blocks_is_no_chance() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -88,10 +89,16 @@ class TestJudgement:
         assert found.block_errors.tolist() == [1.0, 29.0] and found.block_rows.tolist() == [1.0, 3.0]
 
 
+class Named(str):
+    """An effect that is no more than its name, and of one joint."""
+
+    other_joint = None
+
+
 class TestSearch:
     @staticmethod
     def search(trials: list[Any], monkeypatch: pytest.MonkeyPatch) -> Any:
-        monkeypatch.setattr(searching, "is_worth", lambda evidence, current, trial: trial.error < 1008)
+        monkeypatch.setattr(searching, "is_worth", lambda evidence, now, trial, joints: trial.error < 1008)
         monkeypatch.setattr(
             searching, "simplest_of_equals", lambda current, trials: int(np.argmin([t.error for t in trials]))
         )
@@ -103,7 +110,7 @@ class TestSearch:
 
     @staticmethod
     def trial(name: str, *energy: float) -> Any:
-        return SimpleNamespace(effect=name, shape=name.upper(), score=score(*energy))
+        return SimpleNamespace(effect=Named(name), shape=name.upper(), score=score(*energy))
 
     def test_the_best_with_its_rivals_and_its_share_of_what_could_be_explained(
         self, monkeypatch: pytest.MonkeyPatch
@@ -217,7 +224,8 @@ class TestOutcomes:
 
     @staticmethod
     def outcome(*names: str) -> Any:
-        found = [SimpleNamespace(effect=SimpleNamespace(place=name), shape=name) for name in names]
+        effects = [SimpleNamespace(place=name, other_joint=2 if name in "xyz" else None) for name in names]
+        found = [SimpleNamespace(effect=e, shape=name) for e, name in zip(effects, names, strict=True)]
         return searching.Outcome(found, None, SimpleNamespace(score="all"), None)  # type: ignore[arg-type]
 
     @pytest.fixture(autouse=True)
@@ -232,18 +240,45 @@ class TestOutcomes:
     ) -> None:
         nothing: Any = None
 
-        def kept(worth: dict[tuple[str, str], bool], *names: str) -> str:
+        def kept(worth: dict[tuple[str, str, int], bool], *names: str) -> str:
             monkeypatch.setattr(
-                searching, "is_worth", lambda e, others, after: worth.get((others, after), True)
+                searching,
+                "is_worth",
+                lambda e, others, after, joints: worth.get((others, after, joints), True),
             )
             made = searching.pruned(nothing, self.outcome(*names))
             return "".join(f.shape for f in made.found)
 
         assert kept({}, "a", "b", "c") == "abc"
-        assert kept({("ac", "all"): False}, "a", "b", "c") == "ac"
-        assert kept({("ac", "all"): False, ("c", "ac"): False}, "a", "b", "c") == "c"
+        assert kept({("ac", "all", 1): False}, "a", "b", "c") == "ac"
+        assert kept({("ac", "all", 1): False, ("c", "ac", 1): False}, "a", "b", "c") == "c"
         # either would go, but not both
-        assert kept({("b", "all"): False, ("a", "all"): False}, "a", "b") == "b"
+        assert kept({("b", "all", 1): False, ("a", "all", 1): False}, "a", "b") == "b"
+        # a pair must be worth it on both
+        assert kept({("a", "all", 2): False}, "a", "x") == "a"
+
+    def test_effects_without_a_significant_coefficient_go_the_least_first(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Errors are those of what is fitted together: without the least, another may be clear."""
+        errors = {"abc": (4.0, 2.0, 2.9), "ac": (3.0, 3.1), "ab": (2.9, 5.0), "a": (1.0,), "": ()}
+
+        def known(evidence: Any, found: Any) -> Any:
+            return SimpleNamespace(fit=SimpleNamespace(clear=errors["".join(f.shape for f in found)]))
+
+        monkeypatch.setattr(searching, "_known", known)
+
+        def kept(*names: str) -> tuple[str, Any]:
+            given = self.outcome(*names)
+            fitted: Any = SimpleNamespace(clear=errors["".join(names)])
+            made = searching.clear(cast(Any, None), replace(given, after=fitted))
+            return "".join(f.shape for f in made.found), made.after.clear
+
+        assert kept("a", "b", "c") == ("ac", (3.0, 3.1))
+        assert kept("a", "c") == ("ac", (3.0, 3.1))
+        errors["b"] = (3.5,)
+        assert kept("a", "b") == ("b", (3.5,))
+        assert kept("a") == ("", ())
 
     def test_the_strength_of_an_effect_is_what_the_others_leave(
         self, monkeypatch: pytest.MonkeyPatch

@@ -71,6 +71,20 @@ def test_a_torque_that_comes_and_goes_smoothly_is_an_event(model: ReconstructedM
     assert 0.8 < torque < 2.1
 
 
+def test_an_event_smaller_than_what_the_model_gets_wrong_all_the_time_stands_out_beside_it(
+    model: ReconstructedModel,
+) -> None:
+    """A reading that wanders by four deviations of the baseline in seconds."""
+    log = run(5, 30.0, event=(2, 16.0, 16.7, 0.4))
+    wanders = 0.1 * np.sin(2 * np.pi * log.time / 7.0)[:, None] * [0.0, 1.0, 0.0]
+    assert events(model, replace(run(5, 30.0), tau=run(5, 30.0).tau + wanders)) == []
+    (found,) = events(model, replace(log, tau=log.tau + wanders))
+    assert (found.added.effect.name, found.added.effect.joint) == ("external_torque", 2)
+    start, end, torque = (float(found.added.parameters[key].value) for key in ("start", "end", "torque"))
+    assert 15.95 < start < 16.35 < end < 16.75
+    assert 0.15 < torque < 0.41
+
+
 @pytest.mark.parametrize("seed", [6, 7])
 def test_a_run_like_the_baseline_has_no_event(model: ReconstructedModel, seed: int) -> None:
     assert events(model, run(seed, 30.0)) == []
@@ -235,6 +249,7 @@ def test_what_hardly_exceeds_the_rest_of_the_run_is_no_event(
         return np.arange(len(time)), level
 
     monkeypatch.setattr("armloop.diagnosis.contacts.novelty", seen)
+    monkeypatch.setattr("armloop.diagnosis.contacts.pulses", lambda *_: [])
     assert len(events(model, run(18, 30.0, event=(2, 12.0, 13.0, 2.0)))) == found
 
 

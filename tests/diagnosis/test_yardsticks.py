@@ -162,7 +162,7 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
-    return Fit(cast(Any, effects), (), (), outside, stacked).score
+    return Fit(cast(Any, effects), (), (), (), outside, stacked).score
 
 
 def test_only_what_was_held_out_judges() -> None:
@@ -215,6 +215,9 @@ def test_a_gain_must_be_significant_and_more_than_the_model_itself_is_wrong_by()
     # 2.1² - 1.2² is 2.97 baselines
     assert not is_worth(evidence, before, left(spread(1.2), BLOCK))
     assert not is_worth(evidence, left(spread(1.0), BLOCK), before)
+    # a law that ties two joints: more than twice as much
+    assert not is_worth(evidence, before, left(spread(1.0), BLOCK), joints=2)
+    assert is_worth(evidence, left(spread(2.7), BLOCK), left(spread(1.0), BLOCK), joints=2)
     # by one row alone, out of two blocks, it is chance
     once = spread(1.0)[:20]
     once[0] = 9.0

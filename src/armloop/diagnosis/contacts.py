@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
@@ -41,6 +42,8 @@ class Burst:
 
     rows: slice
     joints: frozenset[int]
+    #: Whether it is told by what is left before and after it.
+    beside: bool = False
 
 
 def is_event(added: AddedEffect) -> bool:
@@ -88,6 +91,14 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
             and not _strays(far, burst)
         ]
         bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
+        for pulse in pulses(evidence.samples, innovation, ~far & ~known[:, None]):
+            burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
+            if (
+                not any(_meet(motion, burst, other) for other in bursts)
+                and not _comes_back(evidence, rows, pulse.level[rows], burst)
+                and not _sticks(evidence, burst)
+            ):
+                bursts.append(burst)
     else:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
@@ -107,7 +118,8 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         counted, own = tells.copy(), sorted(burst.joints)
         counted[:, own] |= ~turns[:, own]
         counted[:, sorted(others)] = False
-        found.append(push(evidence, residual, burst.rows, counted, own))
+        left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
+        found.append(push(evidence, left, burst.rows, counted, own))
     return _distinct(motion, [contact for contact in found if contact and _seen_whole(motion, contact)])
 
 

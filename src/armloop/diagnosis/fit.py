@@ -44,6 +44,7 @@ class Fit:
     Attributes:
         effects, shapes: what was fitted.
         parameters: one dict of estimates per effect, from all blocks.
+        clear: per effect, how many standard errors the clearest of its coefficients is from zero.
         outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
         stacked: the rows.
     """
@@ -51,6 +52,7 @@ class Fit:
     effects: tuple[Effect, ...]
     shapes: tuple[Shape, ...]
     parameters: tuple[dict[str, Estimate], ...]
+    clear: tuple[float, ...]
     outside: Array
     stacked: Stacked
 
@@ -76,12 +78,13 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
     spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block, stacked.cell)
-    parameters, start = [], 0
+    parameters, clear, start = [], [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
         parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
+        clear.append(float(np.max(np.abs(free) / np.sqrt(np.diag(spread)[block] + 1e-300), initial=0.0)))
         start += len(free)
-    return Fit(tuple(effects), tuple(shapes), tuple(parameters), np.array(outside), stacked)
+    return Fit(tuple(effects), tuple(shapes), tuple(parameters), tuple(clear), np.array(outside), stacked)
 
 
 class _Problem:

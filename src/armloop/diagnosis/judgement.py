@@ -31,11 +31,14 @@ def gain(current: Score, trial: Score) -> float:
     return current.error - trial.error
 
 
-def is_worth(evidence: Evidence, current: Score, trial: Score) -> bool:
-    """Whether the gain is significant over blocks and larger than the model's own shortcomings."""
+def is_worth(evidence: Evidence, current: Score, trial: Score, joints: int = 1) -> bool:
+    """Whether the gain is significant over blocks and larger than the model's own shortcomings of so many joints.
+
+    A law that ties joints together may take what the model gets wrong of any of them.
+    """
     if gain(current, trial) <= 0 or lead(current, trial) <= SIGNIFICANCE:
         return False
-    return times_enough(evidence, current, trial) > 1.0
+    return times_enough(evidence, current, trial) > joints
 
 
 def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:

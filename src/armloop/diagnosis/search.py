@@ -13,7 +13,15 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.judgement import gain, is_behind, is_worth, lead, simplest_of_equals, times_enough
+from armloop.diagnosis.judgement import (
+    SIGNIFICANCE,
+    gain,
+    is_behind,
+    is_worth,
+    lead,
+    simplest_of_equals,
+    times_enough,
+)
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
@@ -118,7 +126,7 @@ class _Search:
             if places in seen:
                 break
             seen.add(places)
-        return Outcome(found, self.nothing.fit, known.fit, self.nothing.residual)
+        return clear(self.evidence, Outcome(found, self.nothing.fit, known.fit, self.nothing.residual))
 
     def _best(self, beside: Sequence[Found]) -> Found | None:
         """The simplest of the best further effects, with its rivals; None where none is worth it."""
@@ -132,7 +140,7 @@ class _Search:
         trials = [
             trial
             for trial in self.panel.tried(known, paced(self.progress))
-            if is_worth(self.evidence, current, trial.score)
+            if is_worth(self.evidence, current, trial.score, _tied(trial.effect))
             and (current.energy - trial.score.energy >= LEAST_SHARE * self.explainable).any()
         ]
         if not trials:
@@ -208,9 +216,27 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     for k in range(len(outcome.found)):
         others = [f for i, f in enumerate(outcome.found) if i != k]
         known = _known(evidence, others)
-        if not is_worth(evidence, known.fit.score, outcome.after.score):
+        if not is_worth(evidence, known.fit.score, outcome.after.score, _tied(outcome.found[k].effect)):
             return pruned(evidence, Outcome(others, outcome.before, known.fit, outcome.residual))
     return outcome
+
+
+def clear(evidence: Evidence, outcome: Outcome) -> Outcome:
+    """The outcome without effects no coefficient of which is significant by its stated error (Wald test), the least first.
+
+    What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that.
+    """
+    found, fitted = outcome.found, outcome.after
+    while found and min(fitted.clear) < SIGNIFICANCE:
+        least = int(np.argmin(fitted.clear))
+        found = [f for k, f in enumerate(found) if k != least]
+        fitted = _known(evidence, found).fit
+    return Outcome(found, outcome.before, fitted, outcome.residual)
+
+
+def _tied(effect: Effect) -> int:
+    """How many joints a law of its own ties together."""
+    return 1 if effect.other_joint is None else 2
 
 
 def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:

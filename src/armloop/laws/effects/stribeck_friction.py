@@ -25,6 +25,6 @@ class StribeckFriction(Law):
         assert self.joint is not None
         speed = np.abs(context.motion.v[:, self.joint - 1])
         slowest, fastest = np.quantile(speed, 0.02), np.quantile(speed, 0.98)
-        # Below the slowest speeds an exponential cannot be seen, beyond half the fastest it is a level with drag.
-        low, high = max(float(slowest), 1e-3 * float(fastest)), 0.5 * float(fastest)
+        # Below the slowest speeds an exponential cannot be seen, beyond the fastest it is a level with drag.
+        low, high = max(float(slowest), 1e-3 * float(fastest)), float(fastest)
         return [] if high <= low else [float(v) for v in np.geomspace(low, high, 16)]
