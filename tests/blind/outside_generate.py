@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,17 @@ SIZES = (0.04, 0.08, 0.2)
 _ATTEMPTS = 5
 
 
-def generate_outside(seed: int, cases: int, logs: Path, answers: Path, seconds: float = 30.0) -> None:
-    """Write one arm's cases; joints, sample rate, noise and controller are drawn from the seed, too."""
+def generate_outside(
+    seed: int,
+    cases: int,
+    logs: Path,
+    answers: Path,
+    numbers: Sequence[int] = (2, 3, 3, 4),
+    seconds: float = 30.0,
+) -> None:
+    """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too."""
     rng = np.random.default_rng([seed, 0x0575])
-    joints = int(rng.choice([2, 3, 3, 4]))
+    joints = int(rng.choice(numbers))
     arm = random_arm(seed, joints, sliding=rng.random() < 0.15)
     how = {
         "rate": float(rng.choice([100, 200, 250, 500, 1000])),

@@ -37,18 +37,18 @@ from armloop.util.errors import InputError
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path, outside: bool = False, measured: Path | None = None) -> str:
+def make(seed: int, cases: int, place: Path, outside: list[int] | None, measured: Path | None) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
         if measured is not None:
             generate_measured(seed, cases, measured, place / "logs", place / "answers")
             return ""
-        if outside:
+        if outside is not None:
             sys.path.insert(0, str(Path(__file__).parents[1]))
             from outside_generate import generate_outside
 
-            generate_outside(seed, cases, place / "logs", place / "answers")
+            generate_outside(seed, cases, place / "logs", place / "answers", outside)
             return ""
         generate(seed, range(cases), load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
@@ -79,7 +79,13 @@ def main() -> int:
     parser.add_argument("--arms", type=int, default=20)
     parser.add_argument("--cases", type=int, default=16, help="runs per arm")
     parser.add_argument("--first", type=int, default=1, help="seed of the first arm")
-    parser.add_argument("--outside", action="store_true", help="arms simulated by MuJoCo instead of our own")
+    parser.add_argument(
+        "--outside",
+        nargs="*",
+        type=int,
+        metavar="JOINTS",
+        help="arms simulated by MuJoCo instead of our own, with one of these numbers of joints (2 3 3 4)",
+    )
     parser.add_argument(
         "--measured",
         default=None,
@@ -91,6 +97,7 @@ def main() -> int:
     parser.add_argument("--keep", default=None, metavar="DIR", help="keep logs, models and answers here")
     parser.add_argument("--again", default=None, metavar="DIR", help="judge the kept logs of DIR once more")
     options = parser.parse_args()
+    outside = (options.outside or [2, 3, 3, 4]) if options.outside is not None else None
     with (
         tempfile.TemporaryDirectory() as temporary,
         ProcessPoolExecutor(options.processes, get_context("fork")) as workers,
@@ -106,7 +113,7 @@ def main() -> int:
             seeds = range(options.first, options.first + arms)
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
-                s: workers.submit(make, s, options.cases, place, options.outside, options.measured)
+                s: workers.submit(make, s, options.cases, place, outside, options.measured)
                 for s in seeds
                 if reasons[s] is None
             }
