@@ -94,7 +94,9 @@ class TestFinding:
 
         def push(evidence: Any, residual: Any, rows: slice, counted: Any, own: list[int]) -> None:
             asked.append((rows.start, rows.stop, own, counted.sum(axis=0).tolist()))
+            self.left.append(float(residual[0, 0]))
 
+        self.left: list[float] = []
         by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
         following = iter(by_joint)
         monkeypatch.setattr(contacts, "innovations", lambda evidence, residual: (innovation, None))
@@ -109,6 +111,11 @@ class TestFinding:
         monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
         monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
         monkeypatch.setattr(contacts, "push", push)
+        scanned = [
+            SimpleNamespace(rows=slice(a, b), joint=j, level=innovation) for a, b, j in of.get("beside", ())
+        ]
+        monkeypatch.setattr(contacts, "pulses", lambda *_: scanned)
+        monkeypatch.setattr(contacts, "beside", lambda samples, residual, rows: residual + rows.start)
         rows = np.full((100, 2), of.get("judged", True))
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=given, moving=None),
@@ -137,6 +144,16 @@ class TestFinding:
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, back=[20])] == [40, 60]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, sticks=[60])] == [20, 40]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, strays=[40])] == [20, 60]
+
+    def test_what_differs_from_before_and_after_is_explained_less_what_is_there(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Unless it comes back, sticks, or lies within 0.3 s of what stands out already."""
+        bursts, scanned = [(20, 30, 0)], [(32, 36, 1), (34, 38, 1), (60, 64, 1), (80, 84, 0)]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned)] == [20, 34, 60, 80]
+        assert self.left == [0.0, 34.0, 60.0, 80.0]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, back=[60])] == [20, 34, 80]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, sticks=[80])] == [20, 34, 60]
 
     def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # of 9.9 s: 3.9 s and 4.0 s
