@@ -1,0 +1,85 @@
+"""What held-out samples add to a tally, sample by sample."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion, Samples
+from armloop.identification.reconstruction import tally
+from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.tally import Tally
+
+N = 48
+RNG = np.random.default_rng(1)
+LEFT, TAU = RNG.normal(size=(2, N, 2))
+MOVING = RNG.random((N, 2)) < 0.6
+BLOCKS = 3 + np.arange(N) // 4
+CONDITION = np.arange(N) // 10
+
+
+def chunk(cutoff_hz: float, held_out: Any = None) -> Chunk:
+    """Blocks of four samples, the first numbered 3, of which every fifth is held out."""
+    motion = Motion(np.arange(float(N)), *np.zeros((3, N, 2)), np.array([0]))
+    samples = Samples(motion, TAU, MOVING, 1.0, cutoff_hz)
+    nobody = np.zeros(N, dtype=bool)
+    return Chunk(samples, BLOCKS, BLOCKS % 5 == 0 if held_out is None else held_out, nobody, ~nobody)
+
+
+@pytest.mark.parametrize("part", ["all", "selection", "test"])
+@pytest.mark.parametrize("sorted_", [True, False])
+def test_squares_by_condition_and_by_block(part: Any, sorted_: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
+    model: Any = None
+    sorter: Any = (lambda motion: CONDITION) if sorted_ else None
+    found = Tally.of(chunk(1.0), model, sorter, part)
+    # blocks 5 and 10; every other block that is held out chooses the library
+    judges = {"all": (5, 10), "selection": (10,), "test": (5,)}[part]
+    rows = [k for k in range(N) if BLOCKS[k] in judges]
+    sums: dict[int, Any] = {}
+    for k in rows:
+        own = sums.setdefault(int(CONDITION[k]) if sorted_ else 0, np.zeros((2, 3, 2)))
+        for j in range(2):
+            own[int(MOVING[k, j]), :, j] += LEFT[k, j] ** 2, TAU[k, j] ** 2, 1
+    assert found.sums.keys() == sums.keys() and found.samples == len(rows)
+    for label, values in sums.items():
+        np.testing.assert_allclose(found.sums[label], values)
+    blocks = np.zeros((len(judges), 2, 2))
+    for place, block in enumerate(judges):
+        for k in np.flatnonzero(BLOCKS == block):
+            blocks[place] += np.array([LEFT[k] ** 2, np.ones(2)]) * MOVING[k]
+    np.testing.assert_allclose(found.blocks, blocks)
+    # samples that are no time series have no blocks
+    assert Tally.of(chunk(0.0), model, sorter, part).blocks.shape == (0, 2, 2)
+
+
+def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
+    model: Any = None
+    whole = Tally.of(chunk(1.0), model, None)
+    pieces = Tally.of(chunk(1.0), model, None, seconds=2.0)
+    assert len(whole.blocks) == 2 and len(pieces.blocks) > 2
+    np.testing.assert_allclose(pieces.blocks.sum(axis=0), whole.blocks.sum(axis=0))
+    # pieces do not go on from one held-out block into another
+    assert len(Tally.of(chunk(1.0), model, None, seconds=1e3).blocks) == 2
+    every = Tally.fitted(chunk(1.0), model, None, 8.0)
+    assert every.samples == N and every.blocks[:, 1].sum() == MOVING.sum()
+    none = Tally.of(chunk(1.0, np.zeros(N, dtype=bool)), model, None)
+    assert (none.samples, none.sums, none.blocks.shape) == (0, {}, (0, 2, 2))
+
+
+def test_samples_within_a_margin_of_what_was_fitted_do_not_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
+    model: Any = None
+    # of a block's four samples the two in its middle are two seconds from the others
+    assert Tally.of(chunk(1.0), model, None, margin=1.0).samples == 4
+
+
+def test_relative_to_the_torque_where_a_joint_has_any() -> None:
+    blocks = np.array([[[40.0, 60.0], [20.0, 20.0]]])
+    sums = np.zeros((2, 3, 2))
+    sums[1] = [[40.0, 60.0], [80.0, 0.0], [20.0, 20.0]]
+    # a joint without torque has no relative error: the other one's alone
+    assert Tally({0: sums}, blocks, 20).relative_blocks().tolist() == [0.5]
