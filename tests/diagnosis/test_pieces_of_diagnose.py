@@ -1,0 +1,278 @@
+"""The order in which a run is judged: what is asked of whom, and what verdict comes of the answers."""
+
+from __future__ import annotations
+
+import importlib
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.diagnosis.diagnose import Diagnosis, _null, diagnose
+from armloop.diagnosis.unlisted import Unlisted
+from armloop.util.errors import InputError
+
+module: Any = importlib.import_module("armloop.diagnosis.diagnose")
+ROWS = np.ones((4, 3), dtype=bool)
+
+
+@dataclass
+class Standing:
+    """What is stated of the joints."""
+
+    reasons: list[str]
+    joints: list[Any] = field(default_factory=list)
+    unknown: bool = False
+
+
+class Evidence(SimpleNamespace):
+    """A run of three joints, four samples."""
+
+    def residual(self, known: Any) -> str:
+        return f"residual of {self.name}"
+
+    def only(self, rows: Any) -> Evidence:
+        return Evidence(name=self.name, rows=rows, blocks=self.blocks)
+
+
+class Answers:
+    """Stands for every part of the diagnosis; keeps what it is asked."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **of: Any) -> None:
+        self.asked: dict[str, Any] = {}
+        given = {
+            "contacts": [],
+            "still": False,
+            "found": [],
+            "unlisted": None,
+            "turned": False,
+            "unknown": False,
+        }
+        self.given = given | {"known": False, "moving": False} | of
+        whole = Evidence(name="whole", rows=ROWS.copy(), blocks=np.array([0, 0, 1, 1]))
+        self.left = Evidence(name="left", rows=ROWS.copy(), blocks=np.array([0, 0, 1, 1]))
+        self.account = Evidence(name="account", rows=ROWS.copy(), blocks=whole.blocks)
+        samples = SimpleNamespace(tau=np.ones((4, 3)))
+        parts: dict[str, Any] = {
+            "require_different": lambda logs: None,
+            "settled": lambda model, logs: (logs, np.full((1, 3), 0.1)),
+            "sentences": lambda model, names, zeros: [f"zeros of {names}"],
+            "preprocess": lambda logs, how: samples,
+            "hypotheses": lambda arm: ["one", "two"],
+            "find_contacts": lambda evidence, residual: self.note(
+                "contacts", residual, self.given["contacts"]
+            ),
+            "without": self.without,
+            "too_still": self.still,
+            "fit": lambda *_: "nothing",
+            "known_contacts": lambda evidence: np.array([self.given["known"], False]),
+            "standing": self.standing,
+            "Hypotheses": lambda evidence, jobs: nullcontext((evidence.name, jobs)),
+            "best_account": self.best,
+            "judge_reversals": self.reversals,
+            "strengths": lambda evidence, outcome: [evidence.name, outcome],
+        }
+        for name, part in parts.items():
+            monkeypatch.setattr(module, name, part)
+        monkeypatch.setattr(module.Evidence, "of", lambda *_: whole)
+        monkeypatch.setattr(Diagnosis, "errors", lambda self: {"after": "errors"})
+
+    def note(self, name: str, asked: Any, answer: Any) -> Any:
+        self.asked[name] = asked
+        return answer
+
+    def without(self, evidence: Evidence, contacts: Any) -> Evidence:
+        return evidence if "best" in self.asked else self.left
+
+    def still(self, evidence: Evidence) -> str:
+        return (
+            "still" if self.given["still"] and not (evidence.name == "whole" and self.given["moving"]) else ""
+        )
+
+    def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
+        self.asked["standing"] = (evidence.name, model, errors, list(joints))
+        return Standing(["stands"], unknown=self.given["unknown"])
+
+    def outcome(self, name: str) -> Any:
+        return SimpleNamespace(name=name, found=self.given["found"], added=lambda: [*self.given["found"]])
+
+    def best(self, whole: Evidence, contacts: Any, moving: bool, progress: Any, panel: Any) -> Any:
+        self.asked["best"] = (whole.name, contacts, moving, panel)
+        return SimpleNamespace(
+            contacts=contacts,
+            evidence=self.account,
+            outcome=self.outcome("account"),
+            unlisted=self.given["unlisted"],
+        )
+
+    def reversals(self, evidence: Evidence, outcome: Any, kept: Any, progress: Any) -> Any:
+        self.asked["kept"] = kept
+        if not self.given["turned"]:
+            return None
+        return SimpleNamespace(outcome=self.outcome("turned"), evidence=Evidence(name="turned", rows=ROWS))
+
+
+def judged(jobs: int | None = None) -> Any:
+    """The diagnosis of a log of three joints."""
+    model: Any = SimpleNamespace(
+        recorded={"unit": "N*m", "drive_gains": None},
+        arm=SimpleNamespace(n=3, name="arm"),
+        conditioning=None,
+        with_effects=lambda added: ("with", *added),
+    )
+    logs: Any = [SimpleNamespace(name="run", joints=3)]
+    return diagnose(model, logs, jobs=jobs)
+
+
+CONTACT = SimpleNamespace(added="push", rows=np.zeros(4, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("contacts", "known", "verdict"),
+    [([], False, "cannot_tell"), ([], True, "no_effect"), ([CONTACT], False, "effects_found")],
+)
+def test_a_run_that_rests_is_judged_by_its_events_alone(
+    contacts: list[Any], known: bool, verdict: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = Answers(monkeypatch, still=True, contacts=contacts, known=known)
+    found = judged()
+    assert found.verdict == verdict and found.unlisted is None and found.contacts == contacts
+    # of no joint is it known what it lacks
+    model = ("with", *(["push"] if contacts else []))
+    assert answers.asked["standing"] == ("left", model, "errors", [1, 2, 3]) and found.model == model
+    assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
+    assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
+    assert found.outcome.residual == "residual of left" and found.evidence.name == "left"
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("found", "contacts", "unlisted", "unknown", "verdict"),
+    [
+        ([], [], None, False, "no_effect"),
+        ([], [], None, True, "cannot_tell"),
+        (["spring"], [], None, True, "effects_found"),
+        ([], [CONTACT], None, True, "effects_found"),
+        ([], [], 2, False, "unlisted_effect"),
+        ([], [], 2, True, "unlisted_effect"),
+        (["spring"], [], 3, False, "effects_found"),
+    ],
+)
+def test_a_run_that_moves_is_searched(
+    found: list[Any],
+    contacts: list[Any],
+    unlisted: int | None,
+    unknown: bool,
+    verdict: str,
+    turned: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    law = None if unlisted is None else SimpleNamespace(joint=unlisted)
+    answers = Answers(
+        monkeypatch, found=found, contacts=contacts, unlisted=law, turned=turned, unknown=unknown
+    )
+    made = judged(jobs=2)
+    assert made.verdict == verdict and made.unlisted is law and made.contacts == contacts
+    assert answers.asked["best"] == ("whole", contacts, True, ("whole", 2))
+    # what is regressed at reversals is not asked of the joint with an unlisted law
+    assert answers.asked["kept"].tolist() == [[j + 1 != unlisted for j in range(3)]] * 4
+    name = "turned" if turned else "account"
+    assert (made.outcome.name, made.evidence.name) == (name, name) and made.strengths[0] == name
+    assert (made.reversals is not None) == turned
+    model = ("with", *found, *(["push"] if contacts else []))
+    assert made.model == model
+    assert answers.asked["standing"] == (name, model, "errors", [] if unlisted is None else [unlisted])
+    assert made.reasons == ["stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
+
+
+def test_what_moves_only_beside_its_events_is_told_to_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = Answers(monkeypatch)
+    monkeypatch.setattr(module, "too_still", lambda evidence: "still" if evidence.name == "whole" else "")
+    judged()
+    assert answers.asked["best"][2] is False
+
+
+def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    Answers(monkeypatch)
+    arm = SimpleNamespace(n=3, name="arm")
+    for unit, gains, joints, says in (
+        ("A", None, 3, "reconstruct it with --drive-gains"),
+        ("A", [1.0], 2, "run: 2 joints, but the model's arm arm has 3"),
+        ("N*m", None, 4, "run: 4 joints"),
+    ):
+        model: Any = SimpleNamespace(recorded={"unit": unit, "drive_gains": gains}, arm=arm)
+        logs: Any = [SimpleNamespace(name="run", joints=joints)]
+        with pytest.raises(InputError, match=says):
+            diagnose(model, logs)
+
+
+def of(**given: Any) -> Diagnosis:
+    """A diagnosis of three joints, of which the second is without rows: three rows of the first, two of the third."""
+    rows = np.array([[1, 0, 0], [1, 0, 1], [1, 0, 1]], dtype=bool)
+    stacked = SimpleNamespace(joint=np.array([0, 0, 2, 0, 2]), joints=3, y=np.zeros(5))
+    before, after = (
+        SimpleNamespace(stacked=stacked, held_out=np.array(x))
+        for x in ([3.0, 4.0, 2.0, 5.0, 4.0], [1.0, 1.0, 3.0, 2.0, 1.0])
+    )
+    tau = np.array([[2.0, 9, 9], [4.0, 9, 6.0], [4.0, 9, 8.0]])
+    evidence: Any = SimpleNamespace(
+        scale=np.array([0.5, 1.0, 2.0]), rows=rows, samples=SimpleNamespace(tau=tau)
+    )
+    model: Any = SimpleNamespace(
+        arm=SimpleNamespace(torque_units=["N*m"] * 3),
+        with_effects=lambda law: SimpleNamespace(arm=model.arm, effects=law),
+    )
+    outcome: Any = SimpleNamespace(before=before, after=after, found=[])
+    values = {"verdict": "no_effect", "outcome": outcome, "model": model, "unlisted": None}
+    return Diagnosis(**(values | {"evidence": evidence, "contacts": []} | given))
+
+
+def law(rmse: float, added: list[Any]) -> Any:
+    made = object.__new__(Unlisted)
+    for name, value in {"joint": 3, "rmse_with_form": rmse}.items():
+        object.__setattr__(made, name, value)
+    object.__setattr__(made, "added", lambda: added)
+    return made
+
+
+def test_errors_are_root_mean_squares_of_held_out_rows_in_the_torques_unit() -> None:
+    errors = of().errors()
+    before = [0.5 * np.sqrt(50 / 3), np.nan, 2.0 * np.sqrt(10)]
+    after = [0.5 * np.sqrt(2), np.nan, 2.0 * np.sqrt(5)]
+    np.testing.assert_allclose(errors["before"], before)
+    np.testing.assert_allclose(errors["after"], after)
+    size = np.array([np.sqrt(36 / 3), np.nan, np.sqrt(50)])
+    np.testing.assert_allclose(errors["nrmse"]["before"], before / size)
+    np.testing.assert_allclose(errors["nrmse"]["after"], after / size)
+    assert (
+        errors["noise_floor"] == [0.5, 1.0, 2.0] and errors["held_out"] is True and "reversals" not in errors
+    )
+    turned: Any = SimpleNamespace(before=np.array([1.0, np.nan, 3.0]), after=np.array([0.5, np.nan, 1.0]))
+    assert _null(of(reversals=turned).errors()["reversals"]) == {
+        "before": [1.0, None, 3.0],
+        "after": [0.5, None, 1.0],
+    }
+
+
+def test_a_law_without_a_name_is_in_the_model_once_it_is_adopted() -> None:
+    found = law(0.7, ["law"])
+    plain = of(unlisted=found)
+    assert plain.errors()["after"][2] == pytest.approx(2.0 * np.sqrt(5))
+    adopted = plain.adopt()
+    assert adopted.adopted and adopted.model.effects == ["law"] and adopted.errors()["after"][2] == 0.7
+    assert adopted.adopt() is adopted
+    for nothing in (of(), of(unlisted=law(0.7, []))):
+        assert nothing.adopt() is nothing
+    assert of().zeros.shape == (0, 0)
+    assert of(adopted=True).errors()["after"][2] == pytest.approx(2.0 * np.sqrt(5))
+
+
+def test_what_friction_is_at_reversals_alone() -> None:
+    one, other = SimpleNamespace(effect=1), SimpleNamespace(effect=2)
+    turned: Any = SimpleNamespace(found=[one])
+    made = of(reversals=turned)
+    assert made._only_at_reversals(one) and not made._only_at_reversals(other)  # type: ignore[arg-type]
+    assert not of()._only_at_reversals(one)  # type: ignore[arg-type]
