@@ -195,9 +195,8 @@ def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst:
 
 def _meet(motion: Motion, one: Burst, other: Burst) -> bool:
     """Whether one comes so near another that their margins overlap."""
-    gap = max(one.rows.start, other.rows.start) - min(one.rows.stop, other.rows.stop)
     late, early = max(one.rows.start, other.rows.start), min(one.rows.stop, other.rows.stop) - 1
-    return gap <= 0 or float(motion.time[late] - motion.time[early]) <= PAUSE
+    return float(motion.time[late] - motion.time[early]) <= PAUSE
 
 
 def _together(bursts: list[list[slice]]) -> list[Burst]:

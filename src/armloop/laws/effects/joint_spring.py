@@ -20,8 +20,8 @@ class JointSpring(Law):
     parameters = (Parameter("stiffness", "TAU/POS", least=0.0, positive=True), Parameter("rest", "POS"))
     law = "k (q - q0)"
     elements = (
-        Element(lambda x, p, f: x.q, "q{j}", 1, part="position"),
-        Element(lambda x, p, f: -1.0, "-1", 1, part="position"),
+        Element(lambda x, p, f: x.q, "q{j}", part="position"),
+        Element(lambda x, p, f: -1.0, "-1", part="position"),
     )
     load = True
     alike: ClassVar = {

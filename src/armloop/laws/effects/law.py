@@ -32,7 +32,7 @@ from armloop.robot.arm import Arm
 from armloop.util.functions import MATH
 
 #: Multiplies the acceleration.
-INERTIA = Element(lambda x, p, f: 1.0, "vdot{j}", 3, part="inertia")
+INERTIA = Element(lambda x, p, f: 1.0, "vdot{j}", part="inertia")
 
 
 class Law(Effect):

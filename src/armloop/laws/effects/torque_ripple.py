@@ -22,8 +22,8 @@ class TorqueRipple(Law):
     )
     law = "A sin(N q + phi)"
     elements = (
-        Element(lambda x, p, f: f.sin(p * x.q), "sin({p:g}*q{j})", 1, part="position"),
-        Element(lambda x, p, f: f.cos(p * x.q), "cos({p:g}*q{j})", 1, part="position"),
+        Element(lambda x, p, f: f.sin(p * x.q), "sin({p:g}*q{j})", part="position"),
+        Element(lambda x, p, f: f.cos(p * x.q), "cos({p:g}*q{j})", part="position"),
     )
 
     #: Low orders belong to gravity, whose harmonics of the angle are 1 to 3.

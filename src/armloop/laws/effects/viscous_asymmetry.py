@@ -21,7 +21,7 @@ class ViscousAsymmetry(Law):
     name = "viscous_asymmetry"
     parameters = (Parameter("coefficient", "TAU*s/POS"),)
     law = "c |v|"
-    elements = (Element(lambda x, p, f: abs(x.v), "abs(v{j})", 2),)
+    elements = (Element(lambda x, p, f: abs(x.v), "abs(v{j})"),)
     alike: ClassVar = {
         "friction_asymmetry": (
             "at one speed both are one level; a run at several speeds, both ways, would tell them apart"
