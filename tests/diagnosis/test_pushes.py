@@ -104,9 +104,10 @@ class TestParameters:
         )
         columns = kind.columns(evidence, given)
         residual = columns @ np.full(columns.shape[2], 2.0) * of.get("size", 1.0)
-        found = pushes._trial(
-            evidence, residual, np.ones((samples, arm.n)), slice(7, 30), kind, of.get("shown", [0])
-        )
+        weight = np.ones((samples, arm.n))
+        weight[of.get("silent", slice(0)), 0] = 0.0
+        burst = slice(7, of.get("end", 30))
+        found = pushes._trial(evidence, residual, weight, burst, kind, of.get("shown", [0]))
         # interval and size are found in turn three times
         assert [b.start for b in moved] == [7, 8, 9]
         return found
@@ -141,6 +142,16 @@ class TestParameters:
         assert force.unit == "N" and found.share == pytest.approx(1.0) and found.own == pytest.approx(1.0)
         assert ("link" in found.added.parameters) == (link > 0)
         assert link == 0 or found.added.parameters["link"].value == 3.0
+
+    def test_of_the_pieces_that_tell_of_it_every_other_is_held_out(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Three pieces, in the middle one of which the joint turns round: the first judges the last, and the last the first."""
+        kind = pushes._Kind(effect("external_torque", 1))
+        found = self.trial(monkeypatch, kind, three_axis(), end=38, silent=slice(19, 28))
+        assert found.share == found.own == pytest.approx(1.0)
+        # one piece alone judges nothing
+        assert self.trial(monkeypatch, kind, three_axis(), end=38, silent=slice(19, 38)).share == 0.0
 
     def test_what_no_joint_showed_has_no_own_part(self, monkeypatch: pytest.MonkeyPatch) -> None:
         kind = pushes._Kind(effect("external_torque", 1))
