@@ -146,7 +146,7 @@ class TestParameters:
     def test_of_the_pieces_that_tell_of_it_every_other_is_held_out(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Three pieces, in the middle one of which the joint turns round: the first judges the last, and the last the first."""
+        """Three pieces, in the middle one of which the joint turns round: the first judges the last, and conversely."""
         kind = pushes._Kind(effect("external_torque", 1))
         found = self.trial(monkeypatch, kind, three_axis(), end=38, silent=slice(19, 28))
         assert found.share == found.own == pytest.approx(1.0)
