@@ -62,7 +62,7 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
             "--arm",
             urdf(f"<robot name='a'>{links('base', 'l')}{joints(('j', 'planar', 'base', 'l'))}</robot>"),
         ),
-        r"bad\.urdf: joint 'j' is planar",
+        r"bad\.urdf: joint 'j': type 'planar'",
     ),
     "a joint to nowhere": (
         (

@@ -43,6 +43,16 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("arm", "joints", 1, "upper"), ["high", None, -1e300, -9.0], r"joints\[2\]\.upper|lower below upper"),
     (("arm", "joints", 2, "velocity"), [-1.0, "fast", None, 1e300], r"joints\[3\]\.velocity"),
     (("arm", "joints", 2, "effort"), [-1.0, "strong", None], r"joints\[3\]\.effort"),
+    (("arm", "X_PF", 1, 0, 0), [2.0, -1.0, 1e12, 1e-300], r"arm\.X_PF\[2\] is no pose"),
+    (("arm", "X_PF", 2, 3), [[0, 0, 0, 2], [1, 0, 0, 1], [0, 0, 0, 0]], r"arm\.X_PF\[3\] is no pose"),
+    (("arm", "X_tool", 1, 2), [0.5, -1e12], r"arm\.X_tool is no pose"),
+    (("arm", "inertia", 1, 2, 2), [-1.0, -1e12], r"arm\.inertia\[2\] is no inertia"),
+    (("arm", "inertia", 0, 0, 1), [0.5], r"arm\.inertia\[1\] is no inertia: it must be symmetric"),
+    (
+        ("arm", "joints", 0, "name"),
+        ["a\x1b[31m", "a\u202eb", "a\nb"],
+        r"arm\.joints\[1\]\.name is .* cannot be shown",
+    ),
     (("arm", "X_PF"), [None, [], [1.0, 2.0], [[[0.0]]]], r"X_PF"),
     (("arm", "axis", 0), [[0.0, 0.0, 0.0], [0.0, 0.0], [0, 0, 2], "z", None], r"axis\[1\]"),
     (("arm", "mass", 0), [-1.0, "1kg", None, 1e300], r"mass\[1\]"),
@@ -67,6 +77,16 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     ((*PAYLOAD, "mass", "value"), [-0.4, 0.0, "x", None, 1e300, [], ...], "mass|payload"),
     ((*PAYLOAD, "mass", "std_error"), [-0.1, "x", {}, 1e300, ...], "std_error"),
     ((*PAYLOAD, "mass", "unit"), [None, 3, ...], "unit"),
+    (
+        (*PAYLOAD, "mass", "unit"),
+        ["g", "x", "lb"],
+        r"effect payload: the unit of mass is '.+'; it must be 'kg'",
+    ),
+    (
+        (*OFFSET, "unit"),
+        ["mN*m"],
+        r"torque_offset at joint 2: the unit of offset is 'mN\*m'; it must be 'N\*m'",
+    ),
     ((*PAYLOAD, "com", "value"), [[0.0, "x", 0.0], [99.0, 0.0, 0.0], None, "x"], "com|payload"),
     ((*PAYLOAD, "com", "std_error"), [[0.1, 0.1], "x", [-1.0] * 3], "std_error|com"),
     ((*OFFSET, "value"), ["x", None, 1e300, ...], "offset|value"),
@@ -132,6 +152,24 @@ SENSORS: dict[str, tuple[str, int | None, dict[str, float]]] = {
 }
 
 
+#: Parts of a sum: two of them would count twice.
+TWICE: dict[str, tuple[str | int, ...]] = {
+    "the rigid body": ("components",),
+    "a term of friction": ("friction", 1),
+}
+
+
+def again(*keys: str | int) -> Callable[[Any], None]:
+    """Put the first of a list at its end once more."""
+
+    def change(data: Any) -> None:
+        for key in keys:
+            data = data[key]
+        data.append(data[0])
+
+    return change
+
+
 RANGE = {
     key: [-1.0] * 3 if key.endswith("low") else [1.0] * 3 for key in ("q_low", "q_high", "v_low", "v_high")
 }
@@ -152,6 +190,8 @@ def cases() -> Iterator[tuple[str, Callable[[Any], None], str]]:
         for value in values:
             name = "gone" if value is ... else repr(value)[:30]
             yield f"{'.'.join(map(str, keys))} {name}", at(*keys)(value), said
+    for name, keys in TWICE.items():
+        yield f"twice: {name}", again(*keys), "stands twice"
     for name, (change, said) in TERMS.items():
         yield f"terms: {name}", lambda data, c=change: data["components"].append({**STEP, **c}), said
     for name, (effect, joint, values) in SENSORS.items():

@@ -19,7 +19,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
-from armloop.laws.effects.base import Placed
+from armloop.laws.effects.base import Placed, fill
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import Acting, FrictionLaw
 from armloop.model.components import COMPONENTS, Component
@@ -355,6 +355,15 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
         if not plausible:
             values = ", ".join(f"{key} {e.value}" for key, e in added.parameters.items())
             raise ModelError(f"effect {added.effect.label()}: {values} cannot be; correct it or leave it out")
+        for parameter in added.effect.parameters:
+            given, unit = (
+                added.parameters.get(parameter.name),
+                fill(arm, parameter.unit, added.effect.joint),
+            )
+            if given is not None and given.unit not in ("", unit):  # one without a unit has the right one
+                raise ModelError(
+                    f"effect {added.effect.label()}: the unit of {parameter.name} is {given.unit!r:.40}; it must be {unit!r}"
+                )
     half = np.full((1, arm.n), 0.5)
     probe = Motion(np.zeros(1), half, half, half, np.array([0]))
     with np.errstate(all="ignore"):  # the line below says it

@@ -31,6 +31,8 @@ SCHEMA = "armloop/model/2"
 #: Hz; a filter of a lower corner would need hours of a log.
 LOWEST_CORNER = 1e-3
 _SUM = Annotated[float, Meta(ge=-1e12, le=1e12, description="SI units")]
+#: Relative error of what a file of decimal numbers may have lost.
+_ROUNDED = 1e-6
 _Joints = Meta(min_length=1, max_length=MOST_JOINTS)
 _Terms = Meta(max_length=MOST_TERMS)
 
@@ -274,26 +276,8 @@ def _agree(model: ModelData) -> None:
     inertial = model.history.inertial
     if inertial is not None and len(inertial) != 10 * n:
         raise ModelError(f"history.inertial: {len(inertial)} parameters, {n} links have {10 * n}")
-    for k, axis in enumerate(arm.axis):
-        if abs(sum(x * x for x in axis) - 1.0) > 1e-6:
-            raise ModelError(f"arm.axis[{k + 1}] is {axis}; an axis must have the length 1")
-    for k, mass in enumerate(arm.mass):
-        if mass < 0:
-            raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
-    names = [joint.name for joint in arm.joints]
-    for k, name in enumerate(names):
-        if not name.strip() or name in names[:k]:
-            fault = "is used twice" if name.strip() else "is empty"
-            raise ModelError(
-                f"arm.joints[{k + 1}].name is {name!r:.60}, which {fault}; give each joint a name of its own"
-            )
-    for joint in arm.joints:
-        low = float("-inf") if joint.lower is UNSET else joint.lower
-        high = float("inf") if joint.upper is UNSET else joint.upper
-        if not low < high:
-            raise ModelError(
-                f"arm: joint {joint.name!r:.60} goes from {low:g} to {high:g}; give lower below upper"
-            )
+    _check_arm(arm)
+    _check_sums(model)
     for k, effect in enumerate(model.effects):
         for joint_number in (effect.joint, effect.other_joint):
             if joint_number is not None and joint_number > n:
@@ -307,3 +291,71 @@ def _agree(model: ModelData) -> None:
             }
             if len(sizes) > 1:
                 raise ModelError(f"effects[{k + 1}]: {name}: value and std_error are not of one length")
+
+
+def _dot(x: list[float], y: list[float]) -> float:
+    return sum(a * b for a, b in zip(x, y, strict=True))
+
+
+def _check_arm(arm: ArmData) -> None:
+    """Raise ``ModelError`` where numbers of an arm, each right in itself, are no arm's together."""
+    poses = [*((f"arm.X_PF[{k + 1}]", pose) for k, pose in enumerate(arm.X_PF)), ("arm.X_tool", arm.X_tool)]
+    for place, pose in poses:
+        x, y, z = (row[:3] for row in pose[:3])
+        across = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+        turned = max(
+            abs(_dot(x, x) - 1),
+            abs(_dot(y, y) - 1),
+            abs(_dot(x, y)),
+            *(abs(a - b) for a, b in zip(across, z, strict=True)),
+        )
+        if turned > _ROUNDED or pose[3] != [0.0, 0.0, 0.0, 1.0]:
+            raise ModelError(f"{place} is no pose: a rotation and a place (m) above a row 0, 0, 0, 1")
+    for k, axis in enumerate(arm.axis):
+        if abs(sum(x * x for x in axis) - 1.0) > 1e-6:
+            raise ModelError(f"arm.axis[{k + 1}] is {axis}; an axis must have the length 1")
+    for k, rows in enumerate(arm.inertia):
+        largest = max(abs(x) for row in rows for x in row)
+        skew = max(abs(rows[i][j] - rows[j][i]) for i in range(3) for j in range(3))
+        if skew > _ROUNDED * largest or any(rows[i][i] < -_ROUNDED * largest for i in range(3)):
+            raise ModelError(
+                f"arm.inertia[{k + 1}] is no inertia: it must be symmetric, and no moment negative"
+            )
+    for k, mass in enumerate(arm.mass):
+        if mass < 0:
+            raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
+    names = [joint.name for joint in arm.joints]
+    for k, name in enumerate(names):
+        if not name.strip() or name in names[:k] or not name.isprintable():
+            fault = (
+                "is used twice"
+                if name in names[:k]
+                else "is empty"
+                if not name.strip()
+                else "cannot be shown"
+            )
+            raise ModelError(
+                f"arm.joints[{k + 1}].name is {name!r:.60}, which {fault}; give each joint a name of its own"
+            )
+    for joint in arm.joints:
+        low = float("-inf") if joint.lower is UNSET else joint.lower
+        high = float("inf") if joint.upper is UNSET else joint.upper
+        if not low < high:
+            raise ModelError(
+                f"arm: joint {joint.name!r:.60} goes from {low:g} to {high:g}; give lower below upper"
+            )
+
+
+def _check_sums(model: ModelData) -> None:
+    """Raise ``ModelError`` where a sum has the same part twice: it would count twice."""
+    bodies = [part for part in model.components if not isinstance(part, TermsData)]
+    steps = [part.step for part in model.components if isinstance(part, TermsData)]
+    if len(bodies) > 1 or len(set(steps)) < len(steps):
+        raise ModelError(
+            "components: one of them stands twice; a sum has one rigid_body or lagrangian, and terms of a step once"
+        )
+    for k, terms in enumerate(model.friction):
+        given = [(term.kind, term.parameter) for term in terms]
+        for i, (kind, parameter) in enumerate(given):
+            if (kind, parameter) in given[:i]:
+                raise ModelError(f"friction[{k + 1}]: {kind!r:.60} of parameter {parameter:g} stands twice")
