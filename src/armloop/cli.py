@@ -41,6 +41,9 @@ COMMANDS = (
 )
 
 
+NO_MEMORY = "not enough memory for this; give shorter logs, fewer terms or a lower order"
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like those of every other fault."""
 
@@ -110,13 +113,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = f"{error.filename}: " if error.filename is not None else ""
         return _fault(f"{place}{error.strerror or error}; check that it is there and may be used", 2)
     except MemoryError:
-        return _fault("not enough memory for this; give shorter logs, fewer terms or a lower order", 1)
+        return _fault(NO_MEMORY, 1)
     except RuntimeError as error:
         if type(error).__name__ != "BrokenProcessPool":
             raise
         return _fault("a worker process was ended from outside, perhaps for want of memory; run again", 1)
     except (KeyboardInterrupt, _Ended, ImportError) as error:
         ended = _end_of(error)
+        if ended is None and isinstance(error, ImportError) and "failed to map" in str(error):
+            return _fault(NO_MEMORY, 1)
         if ended is None:
             raise
         return ended

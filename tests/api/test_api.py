@@ -231,3 +231,38 @@ def test_the_bare_import_is_cheap():
     program = "import armloop, sys; dir(armloop); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert not {"numpy", "pydrake", "matplotlib", "scipy"} & set(done.stdout.split())
+
+
+def test_what_is_no_log_and_no_model_is_said(model) -> None:
+    run = model.logs[0]
+    for logs in ("run.csv", None, [run, "other.csv"], run.q, 3):
+        for given in (
+            lambda logs=logs: al.reconstruct(logs, "three_axis"),
+            lambda logs=logs: al.evaluate(model, logs),
+            lambda logs=logs: al.diagnose(model, logs),
+        ):
+            with pytest.raises(InputError, match="a log must be a MotionLog"):
+                given()
+    with pytest.raises(InputError, match="a model must be one"):
+        al.evaluate("model.json", run)
+    for what in (al.evaluate, al.diagnose):
+        with pytest.raises(InputError, match="there is no log"):
+            what(model, [])
+        with pytest.raises(InputError, match="once more"):
+            what(model, [run, run])
+
+
+def test_a_run_that_is_fitted_is_not_held_out(model) -> None:
+    run = model.logs[0]
+    with pytest.raises(InputError, match="is one of the logs diagnosed"):
+        al.diagnose(model, run, held_out=run)
+    with pytest.raises(InputError, match="jobs 0: give 1 or more"):
+        al.diagnose(model, run, jobs=0)
+
+
+def test_masked_samples_are_no_samples(model) -> None:
+    run = model.logs[0]
+    masked = np.ma.masked_greater(run.q, np.quantile(run.q, 0.9))
+    with pytest.raises(InputError, match="some are masked"):
+        al.MotionLog(run.time, masked, run.v, run.tau)
+    assert al.MotionLog(run.time, np.ma.array(run.q), run.v, run.tau).samples == run.samples

@@ -15,7 +15,7 @@ from armloop.cli import main
 from armloop.convert import Answers, convert
 from armloop.convert.joints import match
 from armloop.data.log import MotionLog, read_log
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, InputWarning
 
 TORQUE = Answers(tau_unit="N*m")
 
@@ -289,10 +289,18 @@ def test_matlab_and_numpy_arrays(tmp_path, log, sideways):
 
 def test_sources_follow_each_other_as_runs(tmp_path, log):
     rtde(tmp_path / "a.csv", log)
-    rtde(tmp_path / "b.csv", log)
+    other = replace(log, q=log.q + 0.01)
+    rtde(tmp_path / "b.csv", other)
     found = convert([tmp_path / "a.csv", tmp_path / "b.csv"], answers=Answers(drive_gains=[10, 10, 10]))
     assert [run.start for run in found.log.runs()] == [0, log.samples]
-    np.testing.assert_allclose(found.log.q[log.samples :], log.q, atol=1e-8)
+    np.testing.assert_allclose(found.log.q[log.samples :], other.q, atol=1e-8)
+
+
+def test_a_source_given_twice_is_said(tmp_path, log):
+    rtde(tmp_path / "a.csv", log)
+    rtde(tmp_path / "b.csv", log)
+    with pytest.warns(InputWarning, match=r"b\.csv: holds the measurement of .*a\.csv once more"):
+        convert([tmp_path / "a.csv", tmp_path / "b.csv"], answers=Answers(drive_gains=[10, 10, 10]))
 
 
 def test_faults_of_tables_name_the_place(tmp_path, log, capsys):

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from faults.conftest import contents
+from faults.conftest import contents, one_line
 
 from armloop.cli import main
 
@@ -39,6 +39,16 @@ WRONG: dict[str, tuple[str, str]] = {
     "order 99": (f"{RECONSTRUCT} --max-order 99", "--max-order 99"),
     "a negative cutoff": (f"{RECONSTRUCT} --cutoff -1", "--cutoff -1"),
     "a cutoff of nan": (f"{RECONSTRUCT} --cutoff nan", "--cutoff nan"),
+    "a cutoff of hours": (
+        f"{RECONSTRUCT} --cutoff 1e-9",
+        "--cutoff 1e-09: give a frequency of 0.001 Hz or more",
+    ),
+    "a home that no shell put there": (
+        "reconstruct run.csv --arm three_axis --out ~/m.json",
+        "~/m.json: ~ stands for no folder",
+    ),
+    "a folder in such a home": ("collect three_axis --out ~/logs", "~/logs: ~ stands for no folder"),
+    "a path longer than any": (f"{RECONSTRUCT} --report {'d/' * 2100}r.html", "d/d/.* … .*too long"),
     "an infinite cutoff": (f"{RECONSTRUCT} --cutoff inf", "--cutoff inf"),
     "an unknown estimator": (f"{RECONSTRUCT} --estimator magic", "unknown estimator 'magic'"),
     "an unknown option": (f"{RECONSTRUCT} --magic", "unrecognized arguments: --magic"),
@@ -67,6 +77,14 @@ WRONG: dict[str, tuple[str, str]] = {
     "noise of nan": (f"{EXCITE} --noise nan,1,1", "--noise"),
     "another suffix": ("excite three_axis --out r.txt", "a reference ends in"),
     "a negative seed": (f"{EXCITE} --seed -1", "no seed"),
+    "a seed of more than 32 bits": (
+        "cluster run.csv --seed 4294967296",
+        "from 0 to 4294967295",
+    ),
+    "a seed without end": (f"cluster run.csv --seed {'9' * 5000}", "no seed"),
+    "no noise": (f"{EXCITE} --noise 0,1,1", "noise must be 3 positive numbers"),
+    "noise without end": (f"{EXCITE} --noise 1e300,1,1", "noise must be 3 positive numbers"),
+    "a log twice": ("cluster run.csv ./run.csv", "holds the measurement of run once more"),
     "half a seed": ("collect three_axis --out c --seed 0.5", "no seed"),
     "an unknown plan": ("collect three_axis --out c --plan huge", "there are: dwell, paper, quick"),
     "an unknown arm": ("collect puma --out c", "puma: no such file and no built-in arm"),
@@ -112,3 +130,28 @@ def test_an_option_that_cannot_be(name: str, place: Path, capsys: pytest.Capture
     assert answer.err.startswith("armloop: ") and answer.err.count("\n") == 1, answer.err
     assert re.search(said, answer.err), answer.err
     assert contents(place) == before
+
+
+def test_a_variable_of_the_shell_that_is_not_set(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It leaves text of nothing, which must not pass for an option that was left out."""
+    empty: dict[str, list[str]] = {
+        "--arm": ["evaluate", "model.json", "run.csv", "--arm", ""],
+        "LOG": ["evaluate", "model.json", "run.csv", ""],
+        "MODEL.json": ["evaluate", "", "run.csv"],
+        "--out": ["track", "scenario.yaml", "--out", " "],
+        "--report": [*RECONSTRUCT.split(), "--report", ""],
+        "--ranges": [*DIAGNOSE.split(), "--next-run", "n.csv", "--ranges", ""],
+        "--logs": ["watch", "--models", "model.json", "--logs", "", "--store", "s"],
+    }
+    before = contents(place)
+    for name, words in empty.items():
+        assert main(words) == 2
+        one_line(capsys.readouterr().err, f"{name} is empty; give a value, or leave it out")
+    assert contents(place) == before
+
+
+def test_an_output_without_a_name(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("", " "):
+        for words in (RECONSTRUCT.split()[:-1], "collect three_axis --out".split()):
+            assert main([*words, name]) == 2
+            one_line(capsys.readouterr().err, "--out is empty; give a value, or leave it out")

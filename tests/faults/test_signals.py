@@ -130,6 +130,15 @@ sys.exit(cli.main(["evaluate", "model.json", "run.csv"]))
     assert done.stderr.startswith("armloop: not enough memory") and done.stderr.count("\n") == 1
 
 
+def test_too_little_memory_for_a_library_is_one_line(monkeypatch, capsys) -> None:
+    def missing(options: object) -> None:
+        raise ImportError("libopenblas.so: failed to map segment from shared object")
+
+    monkeypatch.setattr("armloop.commands.cluster.run", missing)
+    assert main(["cluster", "run.csv"]) == 1
+    assert capsys.readouterr().err.startswith("armloop: not enough memory")
+
+
 def test_an_end_during_a_compiled_modules_import_is_no_fault(monkeypatch, capsys) -> None:
     """Such a module's import calls whatever interrupts it an ImportError."""
 

@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armloop.api.model import Model
-from armloop.api.reading import as_logs
+from armloop.api.reading import as_logs, require_some
 from armloop.api.score import logs_for
 from armloop.api.shown import displayed, page
 from armloop.commands.diagnose import Diagnose as Command
 from armloop.data.log import MotionLog
+from armloop.data.repeats import require_not_fitted
 from armloop.diagnosis import Diagnosis as Found
 from armloop.diagnosis import close
 from armloop.diagnosis import diagnose as run
 from armloop.diagnosis.compensation import Closing
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.util.errors import InputError
 from armloop.util.files import write_json, write_text
 from armloop.util.progress import Progress, silent
 
@@ -104,9 +106,13 @@ def diagnose(
     Raises:
         InputError: a log does not fit the model.
     """
-    runs = logs_for(model, as_logs(logs))
+    runs, after = (logs_for(model, as_logs(each)) for each in (logs, held_out))
+    require_some(runs)
+    require_not_fitted(after, runs, [log.name for log in after])
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs {jobs}: give 1 or more processes, or None for as many as there are cores")
     plain = Model.of(model).plain()
     found = run(plain, runs, progress, jobs)
     found = found.adopt() if adopt else found
-    closing = close(plain, found.model, found.samples, logs_for(model, as_logs(held_out)))
+    closing = close(plain, found.model, found.samples, after)
     return Diagnosis(found, model, runs, closing)

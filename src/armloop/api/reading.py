@@ -8,8 +8,9 @@ from pathlib import Path
 
 from armloop.data.log import MotionLog
 from armloop.data.log import read_log as read_file
+from armloop.data.repeats import require_different
 from armloop.robot.arm import Arm, load_arm
-from armloop.util.errors import LogError
+from armloop.util.errors import InputError, LogError
 
 
 def read_log(
@@ -65,6 +66,19 @@ def as_arm(arm: Arm | str | Path) -> Arm:
     return arm if isinstance(arm, Arm) else load_arm(arm)
 
 
+def require_some(logs: Sequence[MotionLog]) -> None:
+    """Raise ``InputError`` where there is no log, or one twice."""
+    if not logs:
+        raise InputError("there is no log; give one at least")
+    require_different(logs)
+
+
 def as_logs(logs: MotionLog | Sequence[MotionLog]) -> list[MotionLog]:
-    """One log or several, as a list."""
-    return [logs] if isinstance(logs, MotionLog) else list(logs)
+    """One log or several, as a list; raises ``InputError`` for what is none."""
+    several = [logs] if isinstance(logs, MotionLog | str) or not isinstance(logs, Iterable) else list(logs)
+    for log in several:
+        if not isinstance(log, MotionLog):
+            raise InputError(
+                f"a log must be a MotionLog, such as of armloop.read_log; this is of type {type(log).__name__}"
+            )
+    return several

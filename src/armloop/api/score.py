@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.api.reading import as_logs
+from armloop.api.reading import as_logs, require_some
 from armloop.api.shown import displayed, page
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
@@ -81,6 +81,10 @@ def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -
 
 def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[MotionLog]:
     """The logs in the unit that the model predicts; raises ``InputError`` where they cannot be."""
+    if not isinstance(model, ReconstructedModel):
+        raise InputError(
+            f"a model must be one, such as of armloop.load_model; this is of type {type(model).__name__}"
+        )
     gains = model.recorded["drive_gains"]
     predicts = "A" if model.recorded["unit"] == "A" and gains is None else "N*m"
     fitting = []
@@ -100,5 +104,7 @@ def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[Motio
 
 
 def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples:
-    """The logs conditioned as the model's training logs were."""
-    return preprocess(logs_for(model, logs), model.conditioning)
+    """The logs conditioned as the model's training logs were; raises ``InputError`` where there is none."""
+    found = logs_for(model, logs)
+    require_some(found)
+    return preprocess(found, model.conditioning)

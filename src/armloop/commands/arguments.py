@@ -11,7 +11,9 @@ _LOG_HELP = "motion logs, CSV or Parquet: time,q1..qn,v1..vn,tau1..taun (SI unit
 ARM_HELP = "a built-in arm (three_axis, scara) or the path of a URDF"
 
 MAX_ORDER = within(1, 6, "give an order from 1 to 6")
-CUTOFF = Check(lambda hz: 0 <= hz < 1e4, "give a frequency in Hz, or 0 for no filter")
+CUTOFF = Check(
+    lambda hz: hz == 0 or 1e-3 <= hz < 1e4, "give a frequency of 0.001 Hz or more, or 0 for no filter"
+)
 REFUSE_OTHERS = "refuse the model unless it was made for this arm"
 METHOD_HELP = "stepwise, or sindy: one regression of everything, the reference method (%(default)s)"
 CUTOFF_HELP = "low-pass in Hz, 0 for none (default: by held-out error, at most 10)"
@@ -91,8 +93,10 @@ class Json(Options):
 
 def seed(text: str) -> int:
     """A seed of a random generator, from 0."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is no seed; give a whole number from 0")
+    if not (text.isascii() and text.isdecimal()) or len(text) > 10 or int(text) >= 1 << 32:
+        raise argparse.ArgumentTypeError(
+            f"{text!r:.60} is no seed; give a whole number from 0 to {(1 << 32) - 1}"
+        )
     return int(text)
 
 

@@ -24,6 +24,7 @@ def run(options: Cluster) -> None:
     """Sort the samples of logs by condition."""
     from armloop.commands.shared import TORQUE, print_json, read_logs
     from armloop.data.regimes import sort_samples
+    from armloop.data.repeats import require_different
     from armloop.data.signals import Conditioning, preprocess
     from armloop.reports.tables import table
     from armloop.reports.words import percent
@@ -33,6 +34,7 @@ def run(options: Cluster) -> None:
     widths = {log.joints for log in logs}
     if len(widths) > 1:
         raise InputError(f"the logs have {sorted(widths)} joints; give logs of one arm")
+    require_different(logs)
     samples = preprocess(logs, Conditioning())
     clusters = sort_samples(samples.motion, options.indicator, options.seed)
     if options.json:

@@ -118,6 +118,7 @@ class Options:
     def __init__(self, given: Mapping[str, Any]) -> None:
         vars(self).update(given)
         for _, name, each in self._all():
+            _check_given(each, name, given.get(name))
             _checked(each, f"--{name.replace('_', '-')}", getattr(self, name))
 
     @classmethod
@@ -157,6 +158,14 @@ class Options:
         for part, name, _ in found:
             if part is first[name]:
                 yield part, name, stated[name]
+
+
+def _check_given(each: Option, name: str, value: Any) -> None:
+    """Raise ``InputError`` for text of nothing, as a variable of a shell that is not set leaves it."""
+    for text in value if isinstance(value, list) else [value]:
+        if isinstance(text, str) and not text.strip():
+            label = each.more.get("metavar") or name if each.positional else f"--{name.replace('_', '-')}"
+            raise InputError(f"{label} is empty; give a value, or leave it out")
 
 
 def _checked(each: Option, said: str, value: Any) -> None:

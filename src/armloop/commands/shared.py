@@ -11,7 +11,7 @@ from typing import Any
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
 from armloop.commands.options import Options
 from armloop.data.log import GAINS, MotionLog, read_log
-from armloop.data.repeats import same_measurement
+from armloop.data.repeats import require_not_fitted
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm
@@ -128,18 +128,7 @@ def model_and_logs(options: OfModel) -> tuple[ReconstructedModel, list[MotionLog
 def held_out_logs(options: HeldOut, model: ReconstructedModel, fitted: list[MotionLog]) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
     logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
-    for path, log in zip(options.held_out, logs, strict=True):
-        for other in fitted:
-            if same_measurement(log, other):
-                raise InputError(
-                    f"{path}: is one of the logs diagnosed (it holds the measurement of {other.name}); "
-                    "--held-out takes runs that are not fitted"
-                )
-    for k, log in enumerate(logs):
-        for other in logs[:k]:
-            if same_measurement(log, other):
-                raise InputError(
-                    f"{options.held_out[k]}: holds the measurement of {other.name} once more; give each run once"
-                )
+    require_not_fitted(logs, fitted, options.held_out)
+    for log in logs:
         preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work
     return logs

@@ -13,7 +13,9 @@ from armloop.convert.detect import read_source
 from armloop.convert.mapping import Mapping
 from armloop.convert.recording import Array, Recording
 from armloop.data.log import MotionLog, check_log
+from armloop.data.repeats import same_measurement
 from armloop.robot.arm import Arm
+from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 
 
@@ -88,6 +90,10 @@ def convert(
         raise LogError(
             f"{paths[-1]}: has {parts[-1].log.joints} joints, {paths[0]} {parts[0].log.joints}; give logs of one arm"
         )
+    for k, one in enumerate(parts):
+        for j, other in enumerate(parts[:k]):
+            if same_measurement(one.log, other.log):
+                warn(f"{paths[k]}: holds the measurement of {paths[j]} once more; give each measurement once")
     log, extra = joined(parts)
     check_log(Path(paths[0]), log)
     notes = []

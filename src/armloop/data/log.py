@@ -385,6 +385,8 @@ def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
         numbers = np.asarray(values)
         if numbers.dtype.kind not in "fiu":
             raise ValueError(f"it holds {numbers.dtype}")
+        if np.ma.is_masked(values):
+            raise ValueError("some are masked")
         return np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]})") from error

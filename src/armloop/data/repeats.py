@@ -26,6 +26,22 @@ def require_different(logs: Sequence[MotionLog]) -> None:
                 )
 
 
+def require_not_fitted(
+    held_out: Sequence[MotionLog], fitted: Sequence[MotionLog], names: Sequence[str]
+) -> None:
+    """Raise `LogError` where a log that is held out holds a measurement that is fitted, or that of another held out."""
+    for k, (log, name) in enumerate(zip(held_out, names, strict=True)):
+        for other in fitted:
+            if same_measurement(log, other):
+                raise LogError(
+                    f"{name}: is one of the logs diagnosed (it holds the measurement of {other.name}); held out are runs "
+                    "that are not fitted"
+                )
+        for other in held_out[:k]:
+            if same_measurement(log, other):
+                raise LogError(f"{name}: holds the measurement of {other.name} once more; give each run once")
+
+
 def same_measurement(one: MotionLog, other: MotionLog) -> bool:
     """Whether more than half of the shorter log's rows are in the other, to the last digit, whatever the times."""
     return _mostly_shared(np.unique(one.rows_digest()), np.unique(other.rows_digest()))

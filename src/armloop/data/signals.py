@@ -20,6 +20,9 @@ from armloop.data.motion import Motion, Samples
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
+#: Hz; a filter of a lower corner would need hours of a log.
+LOWEST_CORNER = 1e-3
+
 
 @dataclass(frozen=True)
 class Conditioning:
@@ -47,6 +50,10 @@ class Conditioning:
         for name, value in self.to_dict().items():
             if not isinstance(value, int | float) or not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
+        if 0 < self.cutoff_hz < LOWEST_CORNER:
+            raise ValueError(
+                f"cutoff_hz must be 0 for no filter, or at least {LOWEST_CORNER:g}, not {self.cutoff_hz!r}"
+            )
         if self.oversampling == 0:
             raise ValueError("oversampling must be positive")
 

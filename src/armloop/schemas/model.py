@@ -28,8 +28,6 @@ from armloop.schemas.types import (
 from armloop.util.errors import ModelError
 
 SCHEMA = "armloop/model/2"
-#: Hz; a filter of a lower corner would need hours of a log.
-LOWEST_CORNER = 1e-3
 _SUM = Annotated[float, Meta(ge=-1e12, le=1e12, description="SI units")]
 #: Relative error of what a file of decimal numbers may have lost.
 _ROUNDED = 1e-6
@@ -267,10 +265,6 @@ def _agree(model: ModelData) -> None:
     for place, values in lengths:
         if values is not None and len(values) != n:
             raise ModelError(f"{place}: {len(values)} joints, the arm has {n}")
-    if 0 < model.conditioning.cutoff_hz < LOWEST_CORNER:
-        raise ModelError(
-            f"conditioning.cutoff_hz is {model.conditioning.cutoff_hz:g}; it must be 0, or at least {LOWEST_CORNER:g} Hz"
-        )
     if any(x < 0 for row in (model.history.range or [])[:3] for x in row):
         raise ModelError("history.range: half ranges, velocities and accelerations must not be negative")
     inertial = model.history.inertial
@@ -324,6 +318,8 @@ def _check_arm(arm: ArmData) -> None:
     for k, mass in enumerate(arm.mass):
         if mass < 0:
             raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
+    if not arm.name.isprintable():
+        raise ModelError(f"arm.name is {arm.name!r:.60}, which cannot be shown; give it a name of its own")
     names = [joint.name for joint in arm.joints]
     for k, name in enumerate(names):
         if not name.strip() or name in names[:k] or not name.isprintable():

@@ -4,11 +4,16 @@ All errors mean that the input is at fault. Their message is one line that names
 row, says what is wrong and what would be right; the command line prints it and ends with status 2.
 """
 
+#: Characters of a message; of one that a file's name makes longer the middle is left out.
+_LONGEST = 960
+
 
 def one_line(text: str) -> str:
     """The text in one line; characters that a terminal would obey (a file's name may hold them) are spelt out."""
     text = " ".join(text.split())
-    return "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in text)
+    text = "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in text)
+    half = _LONGEST // 2
+    return text if len(text) <= _LONGEST else f"{text[:half]} … {text[-half:]}"
 
 
 class InputError(ValueError):

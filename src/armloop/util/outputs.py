@@ -79,6 +79,7 @@ def target(path: str | Path, option: str = "") -> Path:
         InputError: it is a folder or a device, it is read, or this command has not written it.
     """
     where, name = str(path), option or "the output"
+    _check_name(where, name)
     try:
         real = Path(path).resolve()
         found = _status(real)
@@ -96,7 +97,13 @@ def target(path: str | Path, option: str = "") -> Path:
             raise InputError(
                 f"{where}: is read by this command and would be replaced; choose another name, or add --force"
             )
-        if not _own(real, _guard.command):
+        try:
+            own = _own(real, _guard.command)
+        except OSError as error:
+            raise InputError(
+                f"{where}: cannot be read ({error.strerror}); choose another name for {name}"
+            ) from error
+        if not own:
             raise InputError(
                 f"{where}: exists, and `armloop {_guard.command}` has not written it; choose another name, or add "
                 "--force"
@@ -131,6 +138,7 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
         InputError: it cannot be made or written to, another run writes into it, or a file in it is not to be replaced.
     """
     folder = Path(path)
+    _check_name(str(path), option)
     try:
         existing = folder
         while _status(existing) is None:
@@ -176,6 +184,14 @@ def take_file(path: str | Path | None, option: str) -> None:
     if len(os.fsencode(real.name)) > longest:
         raise InputError(
             f"{real.name[:40]}…: longer than {longest} bytes; shorten the name that {option} gives"
+        )
+
+
+def _check_name(where: str, option: str) -> None:
+    """Raise ``InputError`` for a name whose ~ no shell has replaced: a folder of that name is not what was meant."""
+    if where.startswith("~"):
+        raise InputError(
+            f"{where}: ~ stands for no folder here; write {option} and a blank before it, or the whole path"
         )
 
 

@@ -1,5 +1,6 @@
 """Where no library is asked for, the best that is an arm is taken, on blocks that judge nothing else."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +20,7 @@ from armloop.identification.reconstruction.libraries import (
     LIBRARIES,
     Contender,
     candidates,
+    check_suits,
     choose,
     comparison_notes,
     contender,
@@ -30,7 +32,7 @@ from armloop.model import ReconstructedModel
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import libraries_table
 from armloop.robot.arm import Arm
-from armloop.util.errors import ExcitationError, InputError
+from armloop.util.errors import ExcitationError, InputError, InputWarning
 from armloop.util.progress import silent
 
 OPTIONS = Options(standard_errors=False)
@@ -273,3 +275,17 @@ def test_what_only_the_double_feature_set_knows_asks_for_it() -> None:
     assert (
         Options(sparse=Sparse("lasso")).of_double_feature_set and Options(max_order=1).of_double_feature_set
     )
+
+
+def test_what_a_library_does_not_use_is_said() -> None:
+    for options in (
+        Options(sparse=Sparse("lasso")),
+        Options(sparse=Sparse(penalty=0.1)),
+        Options(max_order=2),
+    ):
+        with pytest.warns(InputWarning, match="rigid-body has none, and they are not used"):
+            check_suits(named("rigid-body"), "stepwise", options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_suits(named("double-feature-set"), "stepwise", Options(max_order=2))
+        check_suits(named("lagrangian"), "stepwise", Options(physical=False))

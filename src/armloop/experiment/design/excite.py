@@ -199,10 +199,7 @@ def _regression(arm: Arm, limits: Limits, settings: Settings, typical: list[Moti
 def _noise(arm: Arm, limits: Limits, settings: Settings, typical: list[Motion]) -> Array:
     """(n,) standard deviations of the torque noise, N*m (N)."""
     if settings.noise is not None:
-        noise = np.array(settings.noise, dtype=float)
-        if noise.shape != (arm.n,) or not (np.isfinite(noise).all() and np.all(noise > 0)):
-            raise InputError(f"noise must be {arm.n} positive numbers, one per joint, not {settings.noise}")
-        return noise
+        return np.array(settings.noise, dtype=float)
     effort = np.array([joint.effort for joint in arm.joints])
     rms = np.sqrt(np.mean([np.mean(limits.torque(motion) ** 2, axis=0) for motion in typical], axis=0))
     rms = np.where(rms > 1e-6 * rms.max(initial=1e-6), rms, 1.0)

@@ -24,6 +24,7 @@ _USUAL = (6, 48)
 #: Products of columns and trigonometric functions reach beyond the motion's own band; this keeps most of them below
 #: the corner of the low-pass that the log will meet.
 _BELOW_CUTOFF = 5.0
+_LARGEST_NOISE = 1e6  # N*m (N)
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,9 @@ class Settings:
             )
         if not 0 <= self.reserve < 1:
             raise InputError(f"reserve {self.reserve:g}: give a part of the effort limits, from 0 to below 1")
+        noise = self.noise
+        if noise is not None and (len(noise) != joints or not all(0 < x <= _LARGEST_NOISE for x in noise)):
+            raise InputError(f"noise must be {joints} positive numbers, one per joint, not {noise}")
         if not 3 <= self.random <= _MOST_RANDOM:
             raise InputError(
                 f"random {self.random}: at least 3 random references are needed for a comparison, and at most "

@@ -32,6 +32,7 @@ from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
+from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 
 #: By name, the richest first.
@@ -60,13 +61,19 @@ def candidates(arm: Arm, options: Options, method: str = "stepwise") -> list[Lib
 
 
 def check_suits(library: Library, method: str, options: Options) -> None:
-    """Raise ``InputError`` where a library knows no such method, or no friction laws that could be chosen."""
+    """Raise ``InputError`` where a library knows no such method or laws, and say what it does not use."""
     if method not in library.methods:
         able = ", ".join(one.name for one in LIBRARIES.values() if method in one.methods)
         raise InputError(f"method {method!r} works on the library {able}, not on {library.name!r}")
     if options.friction is not None and library.own_friction:
         others = " or ".join(one.name for one in LIBRARIES.values() if not one.own_friction)
         raise InputError(f"{library.own_friction}; laws are chosen with --library {others}")
+    if options.of_double_feature_set and not library.own_friction:
+        able = ", ".join(one.name for one in LIBRARIES.values() if one.own_friction)
+        warn(
+            f"an estimator, its penalty and orders choose among the products of {able}; {library.name} has none, and they "
+            "are not used"
+        )
 
 
 @dataclass(frozen=True, eq=False)
