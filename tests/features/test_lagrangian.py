@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
-from armloop.features.lagrangian import EnergyTerms, candidates
+from armloop.features.lagrangian import EnergyTerms, candidates, constant_weights
 from armloop.robot.arm import Arm, load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 
@@ -103,3 +103,13 @@ def test_the_first_joint_is_left_out_where_nothing_depends_on_it():
     assert "cos(q1)" in hung_on_a_wall.names
     assert not hung_on_a_wall.degrees[~hung_on_a_wall.potential, 0].any()
     assert not candidates(replace(arm, gravity=np.zeros(3))).potential.any()
+
+
+def test_a_weight_is_constant_where_a_slide_stays_upright():
+    scara, three = load_arm("scara"), load_arm("three_axis")
+    slides = np.flatnonzero(~scara.revolute).tolist()
+    assert constant_weights(scara) == slides and len(slides) == 1
+    assert constant_weights(three) == []
+    across = np.array([0.0, -9.81, 0.0])
+    assert constant_weights(replace(scara, gravity=across)) == []  # what it carries is turned about
+    assert constant_weights(replace(scara, gravity=np.zeros(3))) == []

@@ -219,3 +219,17 @@ def gravity_sees_first_joint(arm: Arm) -> bool:
     axis = arm.X_PF[0, :3, :3] @ arm.axis[0]
     change = np.cross(axis, arm.gravity) if arm.revolute[0] else axis @ arm.gravity
     return bool(np.linalg.norm(change) > 1e-9 * np.linalg.norm(arm.gravity))
+
+
+def constant_weights(arm: Arm) -> list[int]:
+    """Sliding joints (0-based) that lift the same weight at all postures: a constant force, as an offset of friction is."""
+    found, R = [], np.eye(3)
+    for j in range(arm.n):
+        R = R @ arm.X_PF[j, :3, :3]
+        axis = R @ arm.axis[j]
+        turned, lifted = np.linalg.norm(np.cross(axis, arm.gravity)), abs(axis @ arm.gravity)
+        if arm.revolute[j] and turned > 1e-9 * np.linalg.norm(arm.gravity):
+            break  # what lies beyond is turned against gravity
+        if not arm.revolute[j] and lifted > 1e-9 * np.linalg.norm(arm.gravity):
+            found.append(j)
+    return found

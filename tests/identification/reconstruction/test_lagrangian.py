@@ -10,6 +10,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
+from armloop.dynamics import Dynamics
 from armloop.features.lagrangian import candidates
 from armloop.identification.reconstruction import Reconstruction, reconstruct
 from armloop.identification.reconstruction.physical import PhysicalSolution
@@ -173,6 +174,20 @@ def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: p
     assert any("contradict a positive definite M(q)" in note for note in notes)
     assert "M(q) is not positive definite at 100.0% of the postures" in notes
     assert any("try --library rigid-body" in note for note in notes)
+
+
+def test_the_weight_of_an_upright_slide_is_gravity_and_no_offset_of_its_friction():
+    arm = load_arm("scara")
+    motion = fourier_motion(40.0, 100.0, 3, arm)
+    rubs = 0.5 * np.tanh(motion.v / 1e-3) + motion.v
+    log = measured(motion, rigid_torque(arm, motion.q, motion.v, motion.vdot) + rubs, 3)
+    model = reconstruct([log], arm, library="lagrangian").model
+    (slide,) = np.flatnonzero(~arm.revolute)
+    rest = np.zeros((1, arm.n))
+    weight = rigid_torque(arm, rest, rest, rest)[0]
+    assert abs(weight[slide]) > 1.0
+    np.testing.assert_allclose(Dynamics(model).gravity(rest)[0], weight, atol=0.01 * abs(weight[slide]))
+    assert "offset" not in [term.kind for term in model.friction.terms[slide]]
 
 
 def test_motion_that_tells_nothing_is_refused():

@@ -9,6 +9,7 @@ import numpy as np
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Samples
+from armloop.features.lagrangian import constant_weights
 from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, search
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.friction_selection import FrictionSelection, select_friction
@@ -85,7 +86,10 @@ class Fitting:
     def _climbed(self) -> FrictionSelection:
         extra = self._design.laws.count
         priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
-        return select_friction(self._arm, self._training, self._design, self._options, priors, self._progress)
+        ladder = select_friction(
+            self._arm, self._training, self._design, self._options, priors, self._progress
+        )
+        return without_offsets(ladder, constant_weights(self._arm))
 
     def _window_solution(self, design: Design, ladder: FrictionSelection) -> Solution:
         """The coefficients of a design and of a ladder's friction, on the window."""
@@ -168,7 +172,7 @@ def _picked(
 
 
 def without_offsets(ladder: FrictionSelection, joints: Collection[int]) -> FrictionSelection:
-    """The ladder without the constant torque of joints (0-based) where a law brings one: the two cannot be told apart."""
+    """The ladder without the constant torque of joints (0-based) where a law or a weight is one: none tells them apart."""
 
     def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
         return [[t for t in own if j not in joints or t.kind != "offset"] for j, own in enumerate(terms)]

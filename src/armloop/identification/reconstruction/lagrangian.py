@@ -21,7 +21,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import smooth
 from armloop.dynamics.physics import joint_limits
-from armloop.features.lagrangian import EnergyTerms, candidates
+from armloop.features.lagrangian import EnergyTerms, candidates, constant_weights
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.design import Design
@@ -61,6 +61,8 @@ _FLOOR = 1e-10
 _POOR = 0.1
 #: Rows of the library evaluated at once.
 _CHUNK = 512
+#: Place of the constant among a joint's friction.
+_OFFSET = [term.kind for term in FRICTION].index("offset")
 
 
 def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
@@ -80,7 +82,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     check_rank(training.survey.products(base.count), base)
     library = candidates(arm)
     progress(f"lagrangian: {library.count} candidates, {len(FRICTION) + 1} friction columns a joint")
-    chosen = _choose(library, data)
+    chosen = _choose(library, data, constant_weights(arm))
     energy = library.take(chosen)
     progress(f"lagrangian: {len(chosen)} terms chosen")
     design = Design(arm, energy.columns, energy.count)
@@ -214,11 +216,18 @@ class _Problems:
         )
 
 
-def _choose(library: EnergyTerms, data: Data) -> Index:
-    """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual."""
+def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Index:
+    """Indices of the terms to keep: chosen once with the joints weighted by torque, again by residual.
+
+    The constant force of joints ``weights_of`` is their weight, and no offset of their friction.
+    """
     problems = data.sum(partial(_Problems.of, library=library), "normal equations of the candidates")
     fit, judge, n = problems.fit, problems.judge, len(library.revolute)
-    forced = np.concatenate([np.arange(n), np.arange(library.count, fit.total)])
+    lifts = library.potential & (np.abs(library.degrees).sum(axis=1) == 1)
+    lifts &= (library.degrees[:, weights_of] == 1).any(axis=1)
+    offsets = library.count + len(FRICTION) * np.array(weights_of, dtype=int)
+    friction = np.setdiff1d(np.arange(library.count, fit.total), offsets + _OFFSET)
+    forced = np.concatenate([np.arange(n), np.flatnonzero(lifts), friction])
     weights = np.array([part.count / part.yy for _, part in fit.parts])
     support = forced
     for _ in range(2):
