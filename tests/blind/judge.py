@@ -99,9 +99,14 @@ def deviations(hidden: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[st
                 if key not in found["parameters"] or key in ("phase", "ratio", "order", "force"):
                     continue
                 estimate = found["parameters"][key]
-                off = np.linalg.norm(np.subtract(estimate["value"], value))
-                error = float(np.linalg.norm(np.atleast_1d(estimate["std_error"])))
-                size = float(np.linalg.norm(np.atleast_1d(value)))
+                # What the motion does not determine is stated as such, with no error.
+                errors = np.atleast_1d(np.array(estimate["std_error"], dtype=float))
+                known = np.isfinite(errors)
+                off = np.linalg.norm(np.atleast_1d(np.subtract(estimate["value"], value))[known])
+                error = float(np.linalg.norm(errors[known]))
+                size = float(np.linalg.norm(np.atleast_1d(value)[known]))
+                if not known.any():
+                    continue
                 out.append(
                     (f"{truth['name']}.{key}", float(off) / max(size, 1e-9), float(off) / max(error, 1e-12))
                 )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from armloop.data.log import MotionLog
+from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning, derivative, preprocess, smooth, uniform_period
 from armloop.util.errors import LogError
 
@@ -89,6 +90,21 @@ def test_a_gap_is_never_filtered_across():
     for name in ("time", "q", "v", "vdot", "starts"):
         np.testing.assert_array_equal(getattr(samples.motion, name), getattr(apart.motion, name))
     np.testing.assert_array_equal(samples.tau, apart.tau)
+
+
+def test_time_is_counted_from_the_start_of_the_record_not_from_the_first_sample_that_a_filter_leaves():
+    time = np.concatenate([np.arange(0.0, 4.0, 0.01), np.arange(5.0, 9.0, 0.01)])
+    wave = np.sin(time)[:, None]
+    log = MotionLog(100.0 + time, wave, np.cos(time)[:, None], wave)
+    other = MotionLog(50.0 + time, wave, np.cos(time)[:, None], wave)
+    motion = preprocess([log, other], Conditioning(10.0)).motion
+    first, second, third = motion.starts[:3]
+    elapsed = motion.elapsed()
+    # half a period of the corner is cut off; after the gap the same log goes on, and the next counts anew
+    np.testing.assert_allclose(elapsed[[first, second, third]], [0.05, 5.05, 0.05], atol=1e-9)
+    alone = preprocess([log], Conditioning(10.0)).motion
+    np.testing.assert_array_equal(Motion.joined([alone, alone]).elapsed(), np.tile(alone.elapsed(), 2))
+    np.testing.assert_array_equal(replace(motion, begins=None).elapsed()[[first, third]], 0.0)
 
 
 def test_smoothing_a_prediction_keeps_runs_apart_too():

@@ -25,7 +25,8 @@ def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = Non
     """A fit that leaves this, of one joint or those given (0-based), with blocks as given."""
     rows = len(held_out)
     joint = np.zeros(rows, dtype=np.intp) if joint is None else joint
-    stacked = Stacked(np.zeros((rows, 0)), held_out, block, block % 2, joint, int(joint.max()) + 1, joint)
+    none = np.zeros((rows, 0))
+    stacked = Stacked(none, held_out, block, block % 2, joint, int(joint.max()) + 1, joint, none)
     return Fit((), (), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,37 +11,88 @@ import pytest
 
 from armloop.diagnosis import compensation, fit, next_run, trials
 from armloop.diagnosis.compensation import FeedforwardChange
+from armloop.diagnosis.evidence import Stacked
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.trials import Known
+from armloop.laws.effects import Estimate
+from armloop.regression.clustered import clustered_covariance
 
 
 class TestRefits:
     @staticmethod
-    def known(errors: list[float], effects: list[Any], monkeypatch: pytest.MonkeyPatch) -> tuple[Known, int]:
-        """What is known if the fits, one after the other, leave such errors; and how many were made."""
-        made = iter(errors)
+    def known(
+        found: list[tuple[float, float]], effects: list[Any], monkeypatch: pytest.MonkeyPatch
+    ) -> tuple[Known, int]:
+        """What is known if the fits, one after the other, leave such errors and find such values (±1); how many are made."""
+        made = iter(found)
         fits: list[Any] = []
 
         def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
             fits.append((evidence, residual))
-            score = SimpleNamespace(error=next(made))
-            return SimpleNamespace(score=score, effects=(), parameters=())
+            error, value = next(made)
+            score = SimpleNamespace(error=error)
+            return SimpleNamespace(score=score, effects=(), parameters=({"x": Estimate(value, 1.0, "1")},))
 
         monkeypatch.setattr(trials, "fit", fitted)
+        monkeypatch.setattr(trials, "lead", lambda worse, better: worse.error - better.error)
         evidence: Any = SimpleNamespace(residual=lambda added: len(fits))
         evidence.knowing = lambda added: SimpleNamespace(of=len(fits))
+        monkeypatch.setattr(Known, "added", lambda self: [])
         return Known.of(evidence, effects, [None] * len(effects)), len(fits)  # type: ignore[list-item]
 
     def test_effects_are_fitted_anew_with_what_they_change_of_each_other(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        known, fits = self.known([3.0, 2.0, 1.0], [None], monkeypatch)
-        assert known.error == 1.0 and fits == 3 and known.residual == 2
-        known, fits = self.known([3.0, 3.0], [None], monkeypatch)
-        assert known.error == 3.0 and fits == 2 and known.residual == 0
-        known, fits = self.known([3.0, 2.0, 2.5], [None], monkeypatch)
-        assert known.error == 2.0 and known.residual == 1
-        assert self.known([3.0], [], monkeypatch)[1] == 1
+        known, fits = self.known([(30.0, 8.0), (20.0, 9.0), (20.1, 9.8), (20.0, 9.85)], [None], monkeypatch)
+        # until the parameters stay, whether or not they leave less: the last fit changes them by a twentieth of an error
+        assert known.fit.score.error == 20.1 and fits == 4 and known.residual == 2
+        known, fits = self.known([(3.0, 8.0), (3.0, 8.0)], [None], monkeypatch)
+        assert known.fit.score.error == 3.0 and fits == 2 and known.residual == 0
+        # by chance a fit may leave more, by more than that it went astray
+        known, fits = self.known([(30.0, 8.0), (20.0, 9.0), (22.5, 11.0)], [None], monkeypatch)
+        assert known.fit.score.error == 20.0 and known.residual == 1
+        assert self.known([(3.0, 8.0)], [], monkeypatch)[1] == 1
+
+
+class TestCovariance:
+    """Of coefficients: what blocks show, what cells show beyond it, and what the model itself does not know."""
+
+    @staticmethod
+    def problem(model_errors: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, Stacked]:
+        rng = np.random.default_rng(4)
+        X, left = rng.normal(size=(400, 2)), rng.normal(size=400)
+        block, cell, own = np.arange(400) // 10, np.arange(400) % 7, np.zeros((400, 0))
+        own = own if model_errors is None else model_errors
+        return X, left, Stacked(X, left, block, block % 2, 0 * block, 1, cell, own)
+
+    def test_what_no_column_shows_has_infinite_variance_and_spoils_nothing_else(self) -> None:
+        X, left, rows = self.problem()
+        found = fit.covariance(np.insert(X, 1, 1e-15 * X[:, 0], axis=1), left, rows)
+        assert found[1, 1] == np.inf and not found[1, [0, 2]].any()
+        np.testing.assert_allclose(
+            found[np.ix_([0, 2], [0, 2])], fit.covariance(X, left, rows), rtol=1e-6, atol=1e-9
+        )
+
+    def test_blocks_and_cells_count_once_what_they_have_in_common(self) -> None:
+        X, left, rows = self.problem()
+        same = replace(rows, cell=rows.block)
+        by_block = clustered_covariance(X, left, rows.block)
+        np.testing.assert_allclose(fit.covariance(X, left, same), by_block, rtol=1e-9)
+        # an error that comes back with the motion, of one column alone, is more than blocks show
+        again = X[:, 0] * np.random.default_rng(5).normal(size=7)[rows.cell]
+        one = replace(rows, block=np.arange(400))
+        found = fit.covariance(X[:, :1], again, one)
+        each = [clustered_covariance(X[:, :1], again, x) for x in (one.block, rows.cell)]
+        np.testing.assert_allclose(found, each[1], rtol=1e-9)  # a row a block: what is common is the block
+        assert each[1][0, 0] > 5 * each[0][0, 0]
+
+    def test_what_the_model_may_err_by_in_the_direction_of_a_law_is_an_error_of_the_law(self) -> None:
+        X, left, rows = self.problem()
+        along = X @ np.array([[0.3, 0.0], [-0.1, 2.0]])
+        across = np.linalg.qr(np.hstack([X, np.ones((400, 1))]))[0][:, 2:]
+        own = fit.covariance(X, left, replace(rows, model_errors=np.hstack([along, 5 * across])))
+        expected = fit.covariance(X, left, rows) + np.array([[0.09, -0.03], [-0.03, 4.01]])
+        np.testing.assert_allclose(own, expected, rtol=1e-6)
 
 
 class TestTrials:

@@ -11,6 +11,7 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
+from armloop.diagnosis.evidence import Stacked
 
 
 class TestLawThatIsNotListed:
@@ -175,7 +176,8 @@ class TestLawThatIsNotListed:
         joint = np.nonzero(rows)[1]
         sample = np.nonzero(rows)[0]
         block = sample // 30
-        stacked = SimpleNamespace(joint=joint, fold=block % unlisted.FOLDS, block=block, cell=block)
+        none, fold = np.zeros((len(joint), 0)), block % unlisted.FOLDS
+        stacked = Stacked(none, np.zeros(len(joint)), block, fold, joint, rows.shape[1], block, none)
         after = SimpleNamespace(stacked=stacked, held_out=np.full(len(joint), 99.0))
         return evidence, after, rng.standard_normal(N // 2)
 
@@ -189,8 +191,8 @@ class TestLawThatIsNotListed:
         found = {name: (b, error) for (b, name), error in zip(law.terms, law.errors, strict=True)}
         assert set(found) == {"v2^3", "cos(q1)*sign(v2)"}
         X = np.stack([v[1] ** 3, np.cos(q[0]) * np.sign(v[1])], axis=1)
-        # blocks and cells, which are the same here, count for what each shows
-        errors = 0.1 * np.sqrt(2 * np.diag(np.linalg.inv(X.T @ X)))
+        # blocks and cells, which are the same here, count once
+        errors = 0.1 * np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
         for name, value, error in zip(("v2^3", "cos(q1)*sign(v2)"), (3.0, -2.0), errors, strict=True):
             assert abs(found[name][0] - value) < 4 * error
             assert found[name][1] == pytest.approx(error, rel=0.2)

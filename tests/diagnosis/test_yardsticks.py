@@ -100,7 +100,7 @@ def an_evidence() -> Evidence:
     rows = np.array([[1, 0], [1, 1], [1, 0], [1, 0], [0, 1], [0, 0]], dtype=bool)
     given = Samples(motion, np.arange(12.0).reshape(6, 2), rows, 1.0)
     return Evidence(
-        cast(Any, None),
+        cast(Any, SimpleNamespace(uncertainty={})),
         given,
         np.array([2.0, 0.5]),
         np.ones(2),
@@ -156,9 +156,8 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     """A fit that leaves this on rows held out, and something wrong on the rows that it was fitted to."""
     held_out, block = np.asarray(held_out, dtype=float), np.asarray(block)
     joint = np.zeros(len(block), dtype=np.intp) if joint is None else np.asarray(joint)
-    stacked = Stacked(
-        np.zeros((len(block), 0)), held_out, block, block % 2, joint, int(joint.max()) + 1, joint
-    )
+    none = np.zeros((len(block), 0))
+    stacked = Stacked(none, held_out, block, block % 2, joint, int(joint.max()) + 1, joint, none)
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
@@ -254,6 +253,20 @@ def test_each_joint_alone_must_be_as_good_as_the_best() -> None:
     # of what the best removes by far, three parts in a thousand are nothing
     now = both(40.0, 40.0)
     assert not is_behind(now, both(2.3, 2.3), best) and is_behind(now, both(2.6, 1.0), best)
+
+
+def test_what_the_filter_brings_of_a_standstill_is_a_cell_of_its_own() -> None:
+    q = np.linspace(-1.0, 1.0, 200)[:, None] * [1.0, -1.0]
+    motion = Motion(0.1 * np.arange(200.0), q, q, 0 * q, np.array([0, 100]))
+    moving = np.ones((200, 2), dtype=bool)
+    moving[95:100, 0] = False  # the first run ends at rest, and the second does not begin so
+    samples = Samples(
+        motion, q, moving, 0.1, 1.0
+    )  # half a period of the corner, or five samples, are smeared
+    cells = replace(an_evidence(), samples=samples, rows=moving)._cells
+    of_rest = np.flatnonzero(cells[:, 0] == cells[99, 0])
+    np.testing.assert_array_equal(of_rest, np.arange(90, 100))
+    assert cells[99, 0] not in cells[:, 1]
 
 
 def test_like_places_and_speeds_share_a_cell_and_joints_never_do() -> None:

@@ -20,6 +20,8 @@ class Motion:
     time : (N,) seconds
     q, v, vdot : (N, n) rad, rad/s, rad/s^2 (m, m/s, m/s^2 for a prismatic joint)
     starts : (R,) index of the first sample of each run; `starts[0] == 0`
+    begins : (R,) instant at which the record of each run began, where a filter has cut its ends; None where it is that of
+        the first sample
 
     Raises `ValueError` when the shapes do not agree.
     """
@@ -29,6 +31,7 @@ class Motion:
     v: NDArray[np.float64]
     vdot: NDArray[np.float64]
     starts: NDArray[np.intp]
+    begins: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
@@ -40,6 +43,10 @@ class Motion:
             )
         if len(self.starts) == 0 or self.starts[0] != 0:
             raise ValueError("starts must begin with 0, the first sample of the first run")
+        if self.begins is not None and self.begins.shape != self.starts.shape:
+            raise ValueError(
+                f"begins must have the shape of starts, {self.starts.shape}; it is {self.begins.shape}"
+            )
 
     @classmethod
     def joined(cls, motions: Sequence["Motion"]) -> "Motion":
@@ -49,7 +56,8 @@ class Motion:
         time, q, v, vdot = (
             np.concatenate([getattr(m, key) for m in motions]) for key in ("time", "q", "v", "vdot")
         )
-        return cls(time, q, v, vdot, starts)
+        begins = np.concatenate([m.time[m.starts] if m.begins is None else m.begins for m in motions])
+        return cls(time, q, v, vdot, starts, begins)
 
     @property
     def samples(self) -> int:
@@ -70,7 +78,7 @@ class Motion:
         return float(steps[usual].mean()) if usual.any() else float(median)
 
     def elapsed(self) -> NDArray[np.float64]:
-        """(N,) seconds since the start of each sample's log.
+        """(N,) seconds since the record of each sample's log began.
 
         Runs whose clock goes on belong to one log; a clock that goes back is another's.
         """
@@ -79,9 +87,10 @@ class Motion:
     @cached_property
     def _elapsed(self) -> NDArray[np.float64]:
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
-        first = np.concatenate([[0], self.starts[1:][steps <= 0]]).astype(np.intp)
-        lengths = np.diff(np.append(first, self.samples))
-        return np.asarray(self.time - np.repeat(self.time[first], lengths))
+        first = np.concatenate([[True], steps <= 0])
+        lengths = np.diff(np.append(self.starts[first], self.samples))
+        begins = self.time[self.starts] if self.begins is None else self.begins
+        return np.asarray(self.time - np.repeat(begins[first], lengths))
 
     def runs(self) -> list[slice]:
         """Return the samples of each run as a slice, in order."""

@@ -121,7 +121,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
-    motion = Motion(time, q, v, vdot, starts)
+    motion = Motion(time, q, v, vdot, starts, np.array(spans)[:, 0])
     return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
 
 

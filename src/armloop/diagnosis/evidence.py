@@ -13,11 +13,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from armloop.data.blocks import block_numbers
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
+from armloop.identification.uncertainty import torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
@@ -122,17 +124,32 @@ class Evidence:
 
     @cached_property
     def _cells(self) -> NDArray[np.intp]:
-        """(N, n) cell of a joint's motion that each sample lies in: like places and speeds, as many samples in each."""
+        """(N, n) cell of a joint's motion that each sample lies in: like places and speeds, as many samples in each.
+
+        What lies so near a standstill that the filter still brings in some of its torque, which no motion determines, is a
+        cell of its own.
+        """
         motion, n = self.samples.motion, self.rows.shape[1]
         cells = np.zeros(self.rows.shape, dtype=np.intp)
         for j in range(n):
             mine = self.rows[:, j]
-            cells[:, j] = j
             for x in (motion.q[:, j], motion.v[:, j]) if mine.any() else ():
                 edges = np.quantile(x[mine], np.arange(1, CELLS) / CELLS)
                 cells[:, j] = cells[:, j] * CELLS + np.searchsorted(edges, x)
-            cells[:, j] = cells[:, j] * n + j
-        return cells
+        cells[near_standstill(self.samples)] = CELLS**2
+        return cells * n + np.arange(n)
+
+    @cached_property
+    def _model_errors(self) -> Array:
+        """(R, r) torque of the model's own errors at the rows that count, weighted."""
+        key = (("the model's own errors", None, None), 0.0)
+        if key not in self._of_motion:
+            errors = torque_errors(self.model, self.samples)[self.independent]
+            self._of_motion.keep(key, errors)
+        else:
+            errors = self._of_motion[key]
+        places, joints = np.nonzero(self.rows[self.kept])
+        return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
@@ -189,6 +206,7 @@ class Evidence:
             joints,
             residual.shape[1],
             self._cells[samples, joints],
+            self._model_errors,
         )
 
 
@@ -205,6 +223,15 @@ def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
     half, v, vdot, centre = np.asarray(ranges, dtype=float)
     parts = [(motion.q - centre, half), (motion.v, v), (motion.vdot, vdot)]
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
+
+
+def near_standstill(samples: Samples) -> NDArray[np.bool_]:
+    """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
+    near = ~samples.moving
+    steps = round(samples.reach / samples.period)
+    for run in samples.motion.runs():
+        near[run] = binary_dilation(near[run], np.ones((2 * steps + 1, 1)))
+    return near
 
 
 def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
@@ -235,8 +262,9 @@ def _block_seconds(motion: Motion) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Stacked:
-    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based, of ``joints``) of each row, and ``cell`` of
-    the motion that it lies in.
+    """Weighted rows: X (R, p), y (R,), with block, fold and joint (0-based, of ``joints``) of each row, ``cell`` of the
+    motion that it lies in, and ``model_errors`` (R, r): torque of independent errors of the model, one standard deviation
+    each.
     """
 
     X: Array
@@ -246,6 +274,12 @@ class Stacked:
     joint: NDArray[np.intp]
     joints: int
     cell: NDArray[np.intp]
+    model_errors: Array
+
+    def only(self, rows: NDArray[np.bool_]) -> Stacked:
+        """Some of the rows (R,)."""
+        arrays = ("X", "y", "block", "fold", "joint", "cell", "model_errors")
+        return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
 
     def moments(self) -> list[Moments]:
         """Moments of each fold."""

@@ -14,12 +14,13 @@ from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
 from armloop.regression.clustered import clustered_covariance
-from armloop.regression.embedded import solve
+from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
 
 Array = NDArray[np.float64]
 
 _REFINEMENTS = 3
+_RIDGE = 1e-8
 
 
 class Shape(NamedTuple):
@@ -77,7 +78,7 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         judged, beta, _, _, _ = _solved(problem, [s.without[k] for s in shapes], k)
         outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
-    spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked.block, stacked.cell)
+    spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked)
     parameters, clear, start = [], [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
@@ -136,18 +137,36 @@ def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:
     return float(np.clip(value, min(tried), max(tried))) if len(tried) > 1 else value
 
 
-def covariance(X: Array, left: Array, block: NDArray[np.intp], cell: NDArray[np.intp]) -> Array:
-    """Covariance (p, p) of coefficients from two kinds of error, each with clusters of its own.
+def covariance(X: Array, left: Array, rows: Stacked) -> Array:
+    """Covariance (p, p) of coefficients from three kinds of error.
 
-    Noise, and what happened once, is correlated in time and independent from block to block. What a model and the laws
-    themselves do not get quite right comes back with the motion however long the run: it is correlated in every cell of
-    it. Blocks alone take the second for noise that averages out. (Clustering in two ways after Cameron, Gelbach and Miller,
-    "Robust inference with multiway clustering", J. Business & Economic Statistics 29, 2011; what both would count, error
-    within a block and a cell, is not taken off again.)
+    Noise, and what happened once, is correlated in time and independent from block to block. What the laws do not get
+    quite right comes back with the motion however long the run: it is correlated in every cell of it. Both clusters count,
+    what they have in common once (Cameron, Gelbach and Miller, "Robust inference with multiway clustering", J. Business &
+    Economic Statistics 29, 2011; negative eigenvalues of what cells add are zero, as there). What the model errs by in
+    the very direction of a law is found as that law and leaves no trace in the residual: it follows from the errors of the
+    model's own coefficients.
 
     Args:
         X: (R, p) columns.
         left: (R,) what they leave.
-        block, cell: (R,) block and cell of motion of each row.
+        rows: what else is known of the rows.
+
+    Returns:
+        The covariance; of a coefficient whose column is nothing, which these rows do not determine, infinite variance.
     """
-    return clustered_covariance(X, left, block) + clustered_covariance(X, left, cell)
+    if not X.size:
+        return np.zeros((X.shape[1], X.shape[1]))
+    block, cell = (np.unique(x, return_inverse=True)[1] for x in (rows.block, rows.cell))
+    common = block * (int(cell.max()) + 1) + cell
+    in_time = clustered_covariance(X, left, block)
+    again = clustered_covariance(X, left, cell) - clustered_covariance(X, left, common)
+    G = X.T @ X
+    scale = unit_scale(G)
+    values, vectors = np.linalg.eigh(again / np.outer(scale, scale).clip(min=1e-300))
+    spread = in_time + (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
+    unit = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
+    own = scale[:, None] * np.linalg.solve(unit, scale[:, None] * (X.T @ rows.model_errors))
+    spread += own @ own.T
+    spread[scale == 0, scale == 0] = np.inf
+    return np.asarray(spread)

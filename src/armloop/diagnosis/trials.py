@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
+from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
@@ -18,7 +19,9 @@ from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
 
-_REFITS = 2
+_REFITS = 8
+#: Parameters that change by less than this part of their standard errors are the same.
+_SAME = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +47,19 @@ class Known:
             added = known.added()
             knowing, residual = evidence.knowing(added), evidence.residual(added)
             again = Known(knowing, residual, fit(knowing, residual, effects, shapes))
-            if again.error >= known.error:
+            # What spans the same leaves as much, and yet its parameters are others: those of the effects together.
+            if lead(again.fit.score, known.fit.score) > CHANCE or again.agrees_with(known):
                 break
             known = again
         return known
 
-    @property
-    def error(self) -> float:
-        """Held-out squared error, weighted."""
-        return self.fit.score.error
+    def agrees_with(self, other: Known) -> bool:
+        """Whether the same effects have the same parameters, but for a small part of their standard errors."""
+        mine, others = (
+            np.hstack([e.value for p in k.fit.parameters for e in p.values()]) for k in (self, other)
+        )
+        errors = np.hstack([e.std_error for p in other.fit.parameters for e in p.values()])
+        return bool((np.abs(mine - others) <= _SAME * errors)[np.isfinite(errors)].all())
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""

@@ -287,7 +287,6 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
         return _Law([], y)
     beta = whole.solve(stable)
-    block, cell = after.stacked.block[mine], after.stacked.cell[mine]
-    spread = covariance(X[:, stable], y - X[:, stable] @ beta, block, cell)
+    spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
     return _Law(terms, error, np.sqrt(np.diag(spread)))

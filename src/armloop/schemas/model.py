@@ -179,6 +179,21 @@ class ErrorData(Struct):
     degrees_of_freedom: NotNegative | None
 
 
+class TorqueErrorsData(Struct):
+    """Independent errors of coefficients that were regressed together, one standard deviation each, by the coefficient."""
+
+    unknowns: Annotated[list[Text], _Terms]
+    directions: Annotated[
+        list[
+            Annotated[str, Meta(pattern=r"^(-?[0-9]+([.][0-9]+)?(e[+-]?[0-9]+)?( |$))+$", max_length=100_000)]
+        ],
+        Meta(
+            max_length=MOST_TERMS,
+            description="per unknown its part of each, up to the diagonal; numbers and blanks",
+        ),
+    ]
+
+
 class UncertaintyData(Struct):
     """Standard errors of the coefficients, by their terms' names."""
 
@@ -189,6 +204,7 @@ class UncertaintyData(Struct):
     friction: Annotated[list[Annotated[dict[Text, ErrorData], _Terms]], Meta(max_length=MOST_JOINTS)] = []
     shared: Annotated[dict[Text, ErrorData], _Terms] = {}
     stribeck: Annotated[list[dict[Name, Any]], Meta(max_length=MOST_JOINTS)] = []
+    torque: Annotated[list[TorqueErrorsData], Meta(max_length=MOST_JOINTS)] = []
 
 
 class ModelData(Struct):
@@ -272,6 +288,13 @@ def _agree(model: ModelData) -> None:
         raise ModelError(f"history.inertial: {len(inertial)} parameters, {n} links have {10 * n}")
     _check_arm(arm)
     _check_sums(model)
+    for kept_errors in model.uncertainty.torque:
+        numbers = [len(row.split()) for row in kept_errors.directions]
+        if numbers != [min(k + 1, max(numbers, default=0)) for k in range(len(kept_errors.unknowns))]:
+            raise ModelError(
+                "uncertainty.torque: directions must be one row for each of the unknowns, each a number longer than the "
+                "one before, up to the same length"
+            )
     for k, effect in enumerate(model.effects):
         for joint_number in (effect.joint, effect.other_joint):
             if joint_number is not None and joint_number > n:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,18 +13,22 @@ from exact_parts import ARMS, energies, model_of, scara_terms
 
 from armloop.data.motion import Motion, Samples
 from armloop.features.rigid_body import BaseParameters
+from armloop.identification.uncertainty import propagated
+from armloop.identification.uncertainty.propagated import torque_errors
 from armloop.identification.uncertainty.solving import moved, solve, solve_given_terms
 from armloop.identification.uncertainty.standard_errors import (
     Assembled,
     Fitted,
     covariances,
     gauss_newton_steps,
+    standard_errors,
 )
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, problems
 from armloop.laws.friction import FrictionTerm
-from armloop.model import ReconstructedModel
+from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import ModelError
 
 FRICTION = (
     FrictionTerm("sign", 0.7),
@@ -221,6 +227,50 @@ def test_white_noise_gives_the_errors_of_least_squares(kind: str) -> None:
             G[np.ix_(design.where, design.where)] += design.X.T @ design.X
         exact = sigma * np.sqrt(np.diag(np.linalg.inv(G + 1e-10 * np.diag(np.diag(G)))))
         np.testing.assert_allclose(part.std_error, exact, rtol=0.25)
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_the_directions_kept_have_the_torques_errors(kind: str, tmp_path: Path) -> None:
+    """On motion of the same kind they have nearly all of the variance that the coefficients' covariance gives the torque."""
+    model, data, other = MODELS[kind], samples(MODELS[kind], 4000, 0.05), samples(MODELS[kind], 300, seed=1)
+    every = [Fitted((1, 2, 3), np.ones(data.tau.shape, dtype=bool))]
+    assert torque_errors(model, other).shape == (300, model.arm.n, 0)  # a model of before there were any
+    replace(model, uncertainty=standard_errors(model, data, every)).save(tmp_path / "model.json")
+    kept = load_model(tmp_path / "model.json")
+    errors = torque_errors(kept, other)
+    variance = np.zeros(errors.shape[:2])
+    for problem, part in zip(problems(model), covariances(model, data, every)[0], strict=True):
+        assert part.covariance.size > 0
+        for design in problem.designs(other):
+            own = part.covariance[np.ix_(design.where, design.where)]
+            variance[:, design.joint] += np.einsum("tk,kl,tl->t", design.X, own, design.X)
+    share = (errors**2).sum() / variance.sum()
+    assert 0.98 < share < 1.001
+    unknowns = sum(len(problem.unknowns) for problem in problems(model))
+    assert errors.shape[2] <= unknowns
+    data_of = json.loads((tmp_path / "model.json").read_text(encoding="utf-8"))
+    data_of["uncertainty"]["torque"][0]["directions"].pop()
+    (tmp_path / "broken.json").write_text(json.dumps(data_of), encoding="utf-8")
+    with pytest.raises(ModelError, match=r"uncertainty\.torque: directions must be one row for each"):
+        load_model(tmp_path / "broken.json")
+
+
+def test_of_many_unknowns_the_directions_that_the_torque_feels_most_are_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(6)
+    X = rng.normal(size=(300, 9)) * np.geomspace(1.0, 1e-3, 9)
+    covariance = np.diag(np.geomspace(1.0, 100.0, 9))  # each has less of the torque than the one before
+    variance = np.einsum("tk,kl,tl->", X, covariance, X)
+    whole = propagated.leading(covariance, X.T @ X)
+    np.testing.assert_allclose(whole @ whole.T, covariance, atol=1e-9)
+    monkeypatch.setattr(propagated, "_NUMBERS", 17)  # two of nine rows each, less the one that is zero
+    few = propagated.leading(covariance, X.T @ X)
+    assert few.shape == (9, 2) and few[0, 1] == 0.0
+    best = np.sort(np.linalg.eigvalsh(np.sqrt(covariance) @ X.T @ X @ np.sqrt(covariance)))[-2:].sum()
+    assert ((X @ few) ** 2).sum() == pytest.approx(best) and best < variance
+    lost = np.diag([1.0, np.nan, 4.0])  # what no sample determined
+    assert np.isfinite(propagated.leading(lost, np.eye(3))).all()
 
 
 def test_what_a_later_step_finds_is_not_in_the_residual_of_an_earlier_one() -> None:

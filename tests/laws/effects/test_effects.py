@@ -188,6 +188,32 @@ def test_a_delay_is_the_torque_of_an_earlier_time(context):
     )
 
 
+def test_noise_of_the_motion_does_not_shorten_a_delay(context):
+    """Noise of the motion is in the residual and in what is said to come later: only the tangent is free of that."""
+    kind, late, rng = build("time_delay"), 0.05, np.random.default_rng(1)
+    torque, time = context.predicted, context.motion.time[:, None]
+    recorded = torque + kind.torque(context, {"seconds": late})
+    found = []
+    for _ in range(40):
+        phase = rng.uniform(0, 2 * np.pi, torque.shape[1])
+        noisy = torque + 0.1 * torque.std(axis=0) * np.sin(2 * np.pi * rng.uniform(1.5, 2.5) * time + phase)
+        shape, seen = 0.03, replace(context, predicted=noisy)
+        for _ in range(8):
+            shape = float(fitted_constrained(kind, seen, recorded - noisy, shape))
+        found.append(shape)
+    error = np.std(found, ddof=1) / np.sqrt(len(found))
+    assert abs(np.mean(found) - late) <= 4 * error and error < 0.02 * late
+
+
+def fitted_constrained(kind: Effect, context, tau: np.ndarray, shape: float) -> float:
+    """The nonlinear parameter after one step of constrained least squares."""
+    columns = kind.full_columns(context, shape).reshape(tau.size, -1)
+    x = kind.start(np.full(columns.shape[1], shape))
+    beta, J = kind.embed(x)
+    step = np.linalg.lstsq(columns @ J, tau.ravel() - columns @ beta, rcond=None)[0]
+    return kind.refined(x + step, shape)
+
+
 def test_a_contact_does_the_work_of_its_force(context):
     motion, contact = context.motion, build("external_contact")
     tau = contact.torque(context, CONTACT)
@@ -240,6 +266,22 @@ def test_a_drift_starts_with_each_log(context):
 def test_joints_beyond_a_link_feel_nothing_of_a_push_on_it(context):
     pushed = build("external_contact").torque(context, {**CONTACT, "link": 2.0})
     assert pushed[:, :2].any() and not pushed[:, 2:].any()
+
+
+def test_what_a_motion_does_not_determine_has_no_standard_error(context):
+    covariance = np.diag([4e-4, 1e-4, 1e-4, np.inf, 1e-6])
+    x = np.array([2.0, 0.1, 0.2, 0.0, 0.01])
+    turned = build("payload").estimates(context.arm, x, covariance, 0.0)
+    assert turned["mass"].std_error == pytest.approx(0.02) and turned[
+        "own_inertia"
+    ].std_error == pytest.approx(1e-3)
+    assert np.isnan(turned["com"].std_error).all()  # the tool's axes are turned: each has some of it
+    straight = replace(context.arm, X_tool=np.eye(4))
+    found = build("payload").estimates(straight, x, covariance, 0.0)
+    np.testing.assert_allclose(found["com"].std_error, [np.hypot(5e-3, 5e-4), np.hypot(5e-3, 1e-3), np.nan])
+    assert "(0.050, 0.100, not determined)" in build("payload").sentence(found)
+    spring = build("joint_spring").estimates(context.arm, np.array([2.0, 0.8]), np.diag([0.01, np.inf]), 0.0)
+    assert spring["stiffness"].std_error == pytest.approx(0.1) and np.isnan(spring["rest"].std_error)
 
 
 @pytest.mark.parametrize("name", EFFECTS)

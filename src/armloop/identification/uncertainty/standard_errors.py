@@ -24,6 +24,7 @@ from armloop.identification.uncertainty.blocking import (
     independent_blocks,
 )
 from armloop.identification.uncertainty.friction_lines import friction_line
+from armloop.identification.uncertainty.propagated import leading, to_dict
 from armloop.identification.uncertainty.sandwich import Equations
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
@@ -62,6 +63,12 @@ class Errors:
     def std_error(self) -> Array:
         """(p,) standard errors."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
+
+    @property
+    def gram(self) -> Array:
+        """(p, p) products of the columns that were regressed together, in units of the residual's variance."""
+        own = self.equations.stage[:, None] == self.equations.stage
+        return np.where(own, self.equations.jacobian.sum(axis=0), 0.0) / self.equations.variance[:, None]
 
     def undetermined(self) -> list[dict[str, Any]]:
         """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
@@ -109,6 +116,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         ``undetermined``: coefficients that these samples do not tell apart, and the sums of them that they determine;
         ``stribeck``: per joint f_s, f_c, f_v, v_s of Eq. (34), where the law has that form;
         ``friction_line``: per joint f_c, f_v of the straight line nearest to any law;
+        ``torque``: the coefficients' covariance by the directions that the torque feels
+        (:mod:`armloop.identification.uncertainty.propagated`);
         ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
     """
     parts, seconds, correlation = covariances(model, samples, fitted)
@@ -129,6 +138,7 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
     rows = np.logical_or.reduce([one.rows for one in fitted])
     table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
+    table["torque"] = [to_dict(part.unknowns, leading(part.covariance, part.gram)) for part in parts]
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
         "block_seconds": seconds,

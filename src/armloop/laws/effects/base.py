@@ -222,11 +222,15 @@ class Effect(ABC):
         return tuple(x.tolist())
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        """Named parameters from the free parameters (k,) and their covariance (k, k), by the delta method."""
-        step = 1e-6 * np.maximum(np.sqrt(np.abs(np.diag(covariance))), np.maximum(np.abs(x), 1e-12))
+        """Named parameters from the free parameters (k,) and their covariance (k, k), by the delta method.
+
+        Of what depends on a free parameter of infinite variance the standard error is not a number: nobody knows it.
+        """
+        size = np.where(np.isfinite(np.diag(covariance)), np.diag(covariance), 0.0)
+        step = 1e-6 * np.maximum(np.sqrt(np.abs(size)), np.maximum(np.abs(x), 1e-12))
         ends = [[self.named(x + s * h, shape) for s in (1.0, -1.0)] for h in np.diag(step)]
         slopes = np.array([np.subtract(up, down) for up, down in ends]) / (2 * step[:, None])
-        errors = np.sqrt(np.maximum(np.einsum("kp,kl,lp->p", slopes, covariance, slopes), 0.0))
+        errors = std_errors(slopes.T, covariance)
         return {
             p.name: Estimate(float(value), float(error), fill(arm, p.unit, self.joint))
             for p, value, error in zip(self.parameters, self.named(x, shape), errors, strict=True)
@@ -323,6 +327,18 @@ class Effect(ABC):
         full = np.zeros((len(columns), joints, columns.shape[1]))
         full[:, self.joint - 1] = columns
         return full
+
+
+def std_errors(derivative: Array, covariance: Array) -> Array:
+    """(p,) standard errors of functions of free parameters with this covariance (k, k), by their derivative (p, k).
+
+    NaN where a function depends on a free parameter that has infinite variance.
+    """
+    unknown = ~np.isfinite(np.diag(covariance))
+    J, known = derivative[:, ~unknown], covariance[np.ix_(~unknown, ~unknown)]
+    errors = np.sqrt(np.maximum(np.einsum("pk,kl,pl->p", J, known, J), 0.0))
+    large = 1e-9 * np.abs(derivative).max(axis=1, keepdims=True, initial=0.0)
+    return np.where((np.abs(derivative) > large)[:, unknown].any(axis=1), np.nan, errors)
 
 
 def number(value: Value) -> float:

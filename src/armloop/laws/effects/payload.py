@@ -6,7 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
+from armloop.laws.effects.base import (
+    Array,
+    Body,
+    Context,
+    Effect,
+    Estimate,
+    Parameter,
+    Value,
+    number,
+    std_errors,
+)
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import regressor
 from armloop.robot.newton_euler import inverse_dynamics
@@ -80,14 +90,13 @@ class Payload(Effect):
         com = x[1:4] / mass
         J = np.hstack([-com[:, None] / mass, np.eye(3) / mass])
         R, p = arm.X_tool[:3, :3], arm.X_tool[:3, 3]
-        com_cov = R.T @ J @ covariance[:4, :4] @ J.T @ R
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        mass_error, own_error = std_errors(np.eye(5), covariance)[[0, 4]].tolist()
         return {
-            "mass": Estimate(mass, float(errors[0]), "kg"),
+            "mass": Estimate(mass, mass_error, "kg"),
             "com": Estimate(
-                (R.T @ (com - p)).tolist(), np.sqrt(np.maximum(np.diag(com_cov), 0)).tolist(), "m"
+                (R.T @ (com - p)).tolist(), std_errors(R.T @ J, covariance[:4, :4]).tolist(), "m"
             ),
-            "own_inertia": Estimate(max(float(x[4]), 0.0), float(errors[4]), "kg*m^2"),
+            "own_inertia": Estimate(max(float(x[4]), 0.0), own_error, "kg*m^2"),
         }
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
@@ -99,8 +108,12 @@ class Payload(Effect):
         return mass > 0 and float(np.linalg.norm(com)) < reach
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
-        mass, com = parameters["mass"], np.asarray(parameters["com"].value)
-        at = ", ".join(f"{x:.3f}" for x in com)
+        mass, com = parameters["mass"], parameters["com"]
+        known = np.isfinite(np.broadcast_to(com.std_error, 3))
+        at = ", ".join(
+            f"{x:.3f}" if one else "not determined"
+            for x, one in zip(np.asarray(com.value), known, strict=True)
+        )
         return f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m"
 
 

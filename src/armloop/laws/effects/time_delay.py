@@ -25,11 +25,21 @@ class TimeDelay(Effect):
         return [float(d) for d in np.concatenate([-sizes[::-1], sizes])]
 
     def refined(self, x: Array, shape: float) -> float:
-        # A delay is not linear in its time: the column of the time found is the exact one.
+        # A delay is not linear in its time: the tangent at the time found is the exact one.
         return shape * float(np.clip(x[0] / shape, 0.5, 2.0))
 
     def columns(self, context: Context, shape: float) -> Array:
-        return (self._late(context, shape) / shape)[:, :, None]
+        # What a delay d adds is tangent(0) + d tangent'. The secant through no delay, d late(shape) / shape, would be one
+        # column, but has the noise of the motion in it that the residual has, too: it finds delays that are too short.
+        h = 0.5 * context.motion.period
+        slope = (self._late(context, shape + h) - self._late(context, shape - h)) / (2 * h)
+        return np.stack([self._late(context, shape) - shape * slope, slope], axis=2)
+
+    def start(self, beta: Array) -> Array:
+        return beta[-1:]
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        return np.array([1.0, x[0]]), np.array([[0.0], [1.0]])
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         return self._late(context, number(parameters["seconds"]))
