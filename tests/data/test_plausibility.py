@@ -177,6 +177,42 @@ def test_without_v_it_is_differentiated_from_q(tmp_path: Path) -> None:
         read_log(path)
 
 
+def torque(log: MotionLog, tau2: np.ndarray) -> list[str]:
+    """What is doubtful about a log with another torque of joint 2."""
+    tau = log.tau.copy()
+    tau[:, 1] = tau2
+    return replace(log, tau=tau).doubts()
+
+
+def test_a_torque_that_is_cut_off_is_said_at_either_end() -> None:
+    log = good()
+    own = log.tau[:, 1] - np.median(log.tau[:, 1])
+    high, low = np.quantile(own, [0.9, 0.1])
+    (above,) = torque(log, np.minimum(own, high))
+    (below,) = torque(log, np.maximum(own, low))
+    for doubt, value in ((above, high), (below, low)):
+        assert doubt.startswith(f"column tau2 is {value:.6g} to the last digit in 10% of the rows")
+
+
+def test_torques_that_stay_at_their_extreme_by_themselves_pass() -> None:
+    log = good()
+    own = log.tau[:, 1] - np.median(log.tau[:, 1])
+    coarse, size = np.ptp(own) / 30, np.ptp(own)
+    swing = size * np.sin(
+        2 * log.time
+    )  # its ends take long: a fifteenth of the time in the last of 200 levels
+    honest = {
+        "for a moment": np.minimum(own, np.quantile(own, 0.9915)),
+        "by a coarse sensor": coarse * np.round(np.minimum(own, np.quantile(own, 0.4)) / coarse),
+        "rounded at a slow turn": size / 100 * np.round(swing / size * 100),
+        "at nothing": np.maximum(own, 0.0),
+    }
+    for name, tau2 in honest.items():
+        assert torque(log, tau2) == [], name
+    still = replace(log, q=0 * log.q, v=0 * log.v)
+    assert not any("saturates" in doubt for doubt in torque(still, np.minimum(own, np.quantile(own, 0.9))))
+
+
 @pytest.mark.parametrize("milliseconds", [-6.0, 5.0, 12.0])
 def test_v_that_lags_is_said_with_the_lag(milliseconds: float) -> None:
     log = good(rate=250.0)

@@ -19,6 +19,7 @@ from armloop.identification.scoring import score
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import score_table
 from armloop.robot.arm import Arm
+from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
 
@@ -107,4 +108,5 @@ def samples_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> Samples
     """The logs conditioned as the model's training logs were; raises ``InputError`` where there is none."""
     found = logs_for(model, logs)
     require_some(found)
+    say_beyond_limits(model.arm, found)
     return preprocess(found, model.conditioning)

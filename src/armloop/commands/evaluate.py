@@ -21,9 +21,11 @@ def run(options: Evaluate) -> None:
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import score
     from armloop.reports.tables import score_table
+    from armloop.robot.plausibility import say_beyond_limits
 
     model, logs = model_and_logs(options)
     require_different(logs)
+    say_beyond_limits(model.arm, logs)
     result = score(model, preprocess(logs, model.conditioning))
     if options.json:
         print_json(result.to_dict())

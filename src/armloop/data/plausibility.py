@@ -381,8 +381,6 @@ def _disagreements(log: Recorded) -> Iterator[Finding]:
 def _saturated(log: Recorded) -> Iterator[Finding]:
     """A torque that is cut off: while the arm moves, far more rows hold its extreme than any other value near it."""
     moves = np.append(False, (np.diff(log.q, axis=0) != 0).any(axis=1))
-    if moves.sum() < _FEWEST:
-        return
     for j, x in enumerate(log.tau[moves].T):
         values, counts = np.unique(x, return_counts=True)
         if len(values) < _LEVELS:

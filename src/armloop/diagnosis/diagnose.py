@@ -29,6 +29,7 @@ from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
 from armloop.laws.effects import hypotheses
 from armloop.model import ReconstructedModel
+from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
@@ -249,6 +250,7 @@ def diagnose(
                 f"{log.name}: {log.joints} joints, but the model's arm {model.arm.name} has {model.arm.n}"
             )
     require_different(logs)
+    say_beyond_limits(model.arm, logs)
     progress("conditioning the run like the model's training logs")
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)

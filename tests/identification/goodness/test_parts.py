@@ -1,6 +1,7 @@
 """The parts of a torque's energy: noise is called noise, a missing law is found, memory does not pass for a law."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.identification.goodness import Parts, outside_trained_range, parts_of, witness
 from armloop.identification.goodness import parts as parts_module
 from armloop.identification.goodness.split import FOLDS, Split, correlation_time, split
+from armloop.identification.reconstruction import Reconstruction
 
 Array = NDArray[np.float64]
 PERIOD, CUTOFF = 0.02, 10.0
@@ -192,3 +194,14 @@ def test_outside_the_trained_range() -> None:
     shares = outside_trained_range(faster, [*inside, centre])
     assert shares[1] > 0.2 and shares[0] == shares[2] == 0
     assert outside_trained_range(motion, None).tolist() == [0, 0, 0]
+
+
+def test_a_torque_that_nothing_explains_is_said() -> None:
+    noise = Parts(2, 0.05, 0.0, 0.95, 0.01, 0.1)
+    assert noise.little_is_explained and noise.little().startswith("joint 2: the model explains 5.0%")
+    assert not replace(noise, explained=0.11).little_is_explained
+    assert not replace(noise, explained=None).little_is_explained
+    # what is predictable is a law that is missing, and said as such
+    assert not replace(noise, predictable_left=0.5).little_is_explained
+    said = Reconstruction.warnings.fget(SimpleNamespace(parts=[noise, replace(noise, explained=0.9)]))  # type: ignore[attr-defined]
+    assert said == [noise.little()]

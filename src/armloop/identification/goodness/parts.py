@@ -23,6 +23,8 @@ _FEWEST, _LONGEST = 200, 20.0
 #: What is much: so large a part of the torque's RMS could still be predicted, which is its square of the energy, by
 #: so many standard errors.
 MUCH, _SURE = 0.1, 3.0
+#: What is next to nothing, of the energy.
+_LITTLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,19 @@ class Parts:
         """Whether a model leaves much that is predictable: then it lacks a law, and its noise is not noise."""
         left, error = self.predictable_left, self.std_error
         return left is not None and error is not None and left > max(MUCH**2, _SURE * error)
+
+    @property
+    def little_is_explained(self) -> bool:
+        """Whether next to nothing of the torque follows from the motion, by this model or any other."""
+        return self.explained is not None and self.explained < _LITTLE and not self.much_is_left
+
+    def little(self) -> str:
+        """What a model that explains next to nothing must say first."""
+        assert self.explained is not None
+        return (
+            f"joint {self.joint}: the model explains {self.explained:.1%} of the torque's energy, and nothing more of it is "
+            "predictable from the motion: was this tau recorded with this motion?"
+        )
 
     def sentence(self) -> str:
         """What a model that leaves much must say first."""

@@ -46,6 +46,7 @@ from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
 from armloop.util.workers import Workers, one_thread
@@ -76,8 +77,9 @@ class Reconstruction:
 
     @property
     def warnings(self) -> list[str]:
-        """What must be said before anything else: joints of which the model leaves much that is predictable."""
-        return [one.sentence() for one in self.parts if one.much_is_left]
+        """What must be said before anything else: joints of which the model leaves much, or nearly all."""
+        much = [one.sentence() for one in self.parts if one.much_is_left]
+        return much + [one.little() for one in self.parts if one.little_is_explained]
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop reconstruct --json``, without the model's path."""
@@ -149,6 +151,7 @@ def reconstruct(
     streamed = large and METHODS[method].streams
     kept = [] if streamed else [log.read() for log in logs]
     require_different(kept)
+    say_beyond_limits(arm, kept)
     if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
         # samples that are no time series show the first library alone what it needs
