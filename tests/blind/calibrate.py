@@ -14,7 +14,7 @@ from typing import Any
 
 from judge import is_named, reliability
 
-from armloop.diagnosis.probability import EFFECTS
+from armloop.diagnosis.probability import bin_of
 
 
 def counts(cases: list[tuple[dict[str, Any], dict[str, Any]]]) -> dict[str, tuple[int, int]]:
@@ -24,7 +24,8 @@ def counts(cases: list[tuple[dict[str, Any], dict[str, Any]]]) -> dict[str, tupl
         for effect in verdict["effects"]:
             label = {"event": "event"}.get(effect.get("when", ""), effect["effect"])
             if label not in ("event", "unlisted"):
-                label = f"from {next(b.least_share for b in EFFECTS if effect['share'] >= b.least_share):g}"
+                one = bin_of(effect["share"], effect["strength"]["times_baseline"])
+                label = f"from a share of {one.least_share:g} and {one.least_times:g} times the baseline"
             named, right = found.get(label, (0, 0))
             found[label] = named + 1, right + is_named(hidden, effect)
     return found

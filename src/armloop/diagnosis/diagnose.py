@@ -143,7 +143,7 @@ class Diagnosis:
                     **added.to_dict(),
                     "share": found.share,
                     "when": "changed",
-                    "probability": probability.of_effect(found.share),
+                    "probability": probability.of_effect(found.share, strength.times),
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),

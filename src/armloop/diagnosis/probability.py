@@ -11,9 +11,12 @@ from typing import NamedTuple
 
 
 class Bin(NamedTuple):
-    """What was named with at least a share of what can be explained: how many, and how many of these were there."""
+    """What was named with at least a share of what can be explained, and at least so many times the baseline: how many, and
+    how many of these were there.
+    """
 
     least_share: float
+    least_times: float
     named: int
     right: int
 
@@ -23,12 +26,18 @@ class Bin(NamedTuple):
         return (self.right + 1) / (self.named + 2)
 
 
-#: Effects by the part of what can be explained that they remove; a companion that removes little is false more often.
-EFFECTS = (Bin(0.05, 150, 145), Bin(0.0, 7, 2))
+#: Effects by the part of what can be explained that they remove, and by how many times more than the model's own
+#: shortcomings: a companion that removes little is false more often, and so is what hardly exceeds the baseline.
+EFFECTS = (Bin(0.05, 3.0, 150, 145), Bin(0.05, 0.0, 9, 6), Bin(0.0, 0.0, 7, 2))
 #: Events of a run, and residuals that follow no listed effect.
-EVENT, UNLISTED = Bin(0.0, 22, 21), Bin(0.0, 18, 18)
+EVENT, UNLISTED = Bin(0.0, 0.0, 22, 21), Bin(0.0, 0.0, 18, 18)
 
 
-def of_effect(share: float) -> float:
-    """Probability that an effect is there, or one of its alternatives, which removes this share."""
-    return next(each for each in EFFECTS if share >= each.least_share).probability
+def bin_of(share: float, times: float) -> Bin:
+    """What is counted together with an effect that removes this share, and so many times the baseline."""
+    return next(each for each in EFFECTS if share >= each.least_share and times >= each.least_times)
+
+
+def of_effect(share: float, times: float) -> float:
+    """Probability that an effect is there, or one of its alternatives."""
+    return bin_of(share, times).probability

@@ -23,13 +23,13 @@ _WIDTH = 110
 def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
     """Each effect found with its parameters ± standard error, its share of the explainable residual, and where it is."""
     rows: list[list[object]] = []
-    for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True):
+    every = zip(diagnosis.outcome.found, diagnosis.outcome.added(), diagnosis.strengths, strict=True)
+    for found, added, strength in every:
+        chance = probability.of_effect(found.share, strength.times)
         for k, (key, e) in enumerate(added.parameters.items()):
             first = [effect_label(found.effect), "sensor" if found.effect.sensor else "arm"]
             label, where = first if k == 0 else ["", ""]
-            share, likely = (
-                (percent(found.share), percent(probability.of_effect(found.share))) if k == 0 else ("", "")
-            )
+            share, likely = (percent(found.share), percent(chance)) if k == 0 else ("", "")
             value = with_error(e.value, e.std_error)
             rows.append([label, key.replace("_", " "), value, unit(e.unit), share, likely, where])
     if diagnosis.unlisted is not None:
