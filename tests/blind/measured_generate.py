@@ -10,7 +10,7 @@ import json
 import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -64,19 +64,17 @@ class Smooth:
 
     @staticmethod
     def of(log: MotionLog) -> Smooth:
-        """Low-pass of 12 Hz on an even grid, and back to the log's instants."""
-        t = np.linspace(log.time[0], log.time[-1], len(log.time))
-        step = float(t[1] - t[0])
-        sos = butter(2, 12.0, fs=1 / step, output="sos")
+        """Low-pass of 12 Hz."""
+        q, v = (_slow(log.time, x) for x in (log.q, log.v))
+        return Smooth(log.time, q, v, np.gradient(v, log.time, axis=0))
 
-        def even(x: Array) -> Array:
-            return np.column_stack([np.interp(t, log.time, column) for column in x.T])
 
-        def back(x: Array) -> Array:
-            return np.column_stack([np.interp(log.time, t, column) for column in x.T])
-
-        q, v = (sosfiltfilt(sos, even(x), axis=0) for x in (log.q, log.v))
-        return Smooth(log.time, *(back(x) for x in (q, v, np.gradient(v, step, axis=0))))
+def _slow(time: Array, values: Array) -> Array:
+    """Low-pass of 12 Hz on an even grid, and back to the log's instants."""
+    t = np.linspace(time[0], time[-1], len(time))
+    sos = butter(2, 12.0, fs=1 / float(t[1] - t[0]), output="sos")
+    even = sosfiltfilt(sos, np.column_stack([np.interp(t, time, x) for x in values.T]), axis=0)
+    return np.column_stack([np.interp(time, t, x) for x in even.T])
 
 
 def generate_measured(seed: int, cases: int, data: Path, logs: Path, answers: Path) -> None:
@@ -155,7 +153,7 @@ def _drawn(
         return [{**effect, "parameters": {"gain": gain}}], tau, ""
     if name == "time_delay":
         # the joint that feels it most by its motion, not by its noise, does so by its size
-        slow = Smooth.of(replace(log, q=log.tau)).q
+        slow = _slow(log.time, log.tau)
         share = float((np.sqrt(np.mean((_late(log.time, slow, 0.01) - slow) ** 2, axis=0)) / level).max())
         seconds = round(0.01 * size / share, 3)
         tau = _late(log.time, log.tau, seconds)
