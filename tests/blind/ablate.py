@@ -66,6 +66,7 @@ RULES = [
     _rule("no event beyond the trained range", lambda *_: False, (contacts, "_strays")),
     _rule("an event stands out", lambda motion, rows, level, bursts: bursts, (contacts, "_standing_out")),
     _rule("an event begins and ends in its run", lambda *_: True, (contacts, "_seen_whole")),
+    _rule("what differs from before and after is an event", lambda *_: [], (contacts, "pulses")),
     _rule("of events that overlap one is listed", lambda motion, found: found, (contacts, "_distinct")),
     _rule(
         "joints that turn round tell nothing of an event",
@@ -101,6 +102,8 @@ RULES = [
         (judgement, "enough"),
         (unlisted, "enough"),
     ),
+    _rule("twice that for a law that ties two joints", lambda effect: 1, (search, "_tied")),
+    _rule("a coefficient is clear", lambda e, outcome: outcome, (search, "clear")),
     _rule("the likelihood ratio counts too", lambda *_: -np.inf, (judgement, "_likelier")),
     _rule("effects beside a law must be worth it", lambda e, outcome: outcome, (unlisted, "pruned")),
     _rule(
