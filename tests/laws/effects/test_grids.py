@@ -50,11 +50,7 @@ def test_what_a_law_costs_and_what_it_is_made_of() -> None:
     assert order == ["encoder_offset", "torque_gain", "torque_offset", "time_delay"]
     assert len({EFFECTS[name].fault_order for name in order}) == 4
     # what a reconstruction finds with the velocity, and with the direction alone
-    steps = {
-        e.step
-        for name in ("viscous_asymmetry", "quadratic_drag", "viscous_friction")
-        for e in EFFECTS[name]._parts()
-    }  # type: ignore[attr-defined]
+    steps = {e.step for name in ("quadratic_drag", "viscous_friction") for e in EFFECTS[name]._parts()}  # type: ignore[attr-defined]
     assert steps == {2}
     assert {e.step for e in EFFECTS["coulomb_friction"]._parts()} == {1}  # type: ignore[attr-defined]
 
