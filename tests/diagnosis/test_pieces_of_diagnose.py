@@ -119,7 +119,7 @@ def judged(jobs: int | None = None) -> Any:
     """The diagnosis of a log of three joints."""
     model: Any = SimpleNamespace(
         recorded={"unit": "N*m", "drive_gains": None},
-        arm=SimpleNamespace(n=3, name="arm"),
+        arm=SimpleNamespace(n=3, name="arm", joints=()),
         conditioning=None,
         with_effects=lambda added: ("with", *added),
     )
