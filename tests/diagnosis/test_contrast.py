@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,16 @@ class TestContrast:
         found, _ = contrast(run, left, 0.2)
         assert found[505, 0] == pytest.approx(2.0)  # 4 - 1 before, 4 - 2 after
         assert found[503, 0] == pytest.approx(3.4 - 2.0 - 0.4)  # eight samples of ten: 3.4; after: 2.4
+
+    def test_what_the_filter_smears_at_the_edges_is_left_out(self) -> None:
+        """A corner of 5 Hz reaches 0.1 s to either side: of an event's smeared edges the sides know nothing."""
+        run = replace(samples(), cutoff_hz=5.0)
+        left = np.zeros((1000, 1))
+        left[490:520] = 1.0
+        left[500:510] = 4.0
+        # ten samples of 4, and those beside them from ten samples away on
+        assert contrast(run, left, 0.2)[0][505, 0] == pytest.approx(4.0)
+        assert contrast(samples(), left, 0.2)[0][505, 0] == pytest.approx(3.0)
 
     def test_of_a_step_or_a_slope_there_is_none(self) -> None:
         run = samples()
@@ -122,6 +134,10 @@ def test_beside_a_line_nothing_is_left_but_the_event() -> None:
     found = beside(run, left, slice(700, 720))
     np.testing.assert_allclose(found[700:720], 3.0, atol=1e-12)
     np.testing.assert_allclose(found[680:700], 0.0, atol=1e-12)
+    smeared = np.array(left)
+    smeared[690:700], smeared[720:730] = 9.0, -9.0
+    found = beside(replace(run, cutoff_hz=5.0), smeared, slice(700, 720))
+    np.testing.assert_allclose(found[700:720], 3.0, atol=1e-12)
     # at the end of a run what is before and what little is after
     left[700:720] -= 3.0
     np.testing.assert_allclose(beside(run, left, slice(985, 999))[980:], 0.0, atol=1e-12)

@@ -163,3 +163,16 @@ def test_a_search_dealt_over_processes_finds_the_same_to_the_bit(monkeypatch):
     ]
     assert one.after.parameters == three.after.parameters
     np.testing.assert_array_equal(one.after.held_out, three.after.held_out)
+
+
+def test_an_effect_is_as_clear_as_the_clearest_of_its_coefficients_in_its_stated_errors():
+    evidence, _, residual = slow_friction_in_one_fold(2.0)
+    residual = residual + 0.01 * np.random.default_rng(5).normal(size=residual.shape)
+    coupling, offset = effect("transmission_coupling", 1, 2), effect("torque_offset", 3)
+    found = fit(evidence, residual, [coupling, offset], [Shape.fixed(-1.0), Shape.fixed(0.0)])
+    stated = [
+        [abs(p[key].value / p[key].std_error) for key in keys]
+        for p, keys in zip(found.parameters, (("inertia", "viscous", "coulomb"), ("offset",)), strict=True)
+    ]
+    assert max(stated[0]) > 2 * min(stated[0])
+    np.testing.assert_allclose(found.clear, [max(own) for own in stated], rtol=1e-6)
