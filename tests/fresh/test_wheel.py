@@ -1,4 +1,4 @@
-"""The wheel carries the arms, the scenarios and the measured logs, and works with no checkout near it."""
+"""The wheel carries arms, scenarios, measured logs and the reports' templates, and works with no checkout near it."""
 
 import subprocess
 import sys
@@ -33,9 +33,10 @@ def run(python: Path, *words: str, cwd: Path) -> str:
 
 
 @pytest.mark.slow
-def test_wheel_holds_what_lies_at_the_top_of_the_checkout(repository: Path, unpacked: Path) -> None:
-    for kind, suffix in (("urdf", "*.urdf"), ("scenarios", "*.yaml"), ("scenarios/measured", "*/*.parquet")):
-        folder = repository / kind
+def test_wheel_holds_what_is_no_module(repository: Path, unpacked: Path) -> None:
+    kinds = (("urdf", "*.urdf"), ("scenarios", "*.yaml"), ("scenarios/measured", "*/*.parquet"))
+    for kind, suffix in (*kinds, ("reports/templates", "*")):
+        folder = repository / ("src/armloop" if kind.startswith("reports") else ".") / kind
         expected = {str(path.relative_to(folder)): path.read_bytes() for path in folder.glob(suffix)}
         folder = unpacked / "armloop" / kind
         packed = {str(path.relative_to(folder)): path.read_bytes() for path in folder.glob(suffix)}

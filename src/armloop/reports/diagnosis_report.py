@@ -23,29 +23,11 @@ from armloop.reports.plots import (
     residual_time_figure,
     shares_figure,
 )
+from armloop.reports.prose import Prose
 from armloop.reports.residuals import moving_joints
 from armloop.reports.tables import formulas
-from armloop.reports.words import counted, effect_label, listed, number, numbers, percent, unit, with_error
+from armloop.reports.words import effect_label, number, percent, unit, with_error
 
-_SHARES = (
-    "How much of the residual energy above the model's own baseline each effect removes on blocks it was "
-    "not fitted to. Thin bars are effects that this motion cannot tell from the one found."
-)
-_TIME = (
-    "The residual, measured minus predicted torque, while the joint slides. Each value comes from "
-    "parameters fitted on other blocks. The grey band is what the model leaves on its own baseline data: a "
-    "residual inside it means nothing."
-)
-_SHAPE = (
-    "The same residual against position, velocity and load, where its law shows as the mean line, and its "
-    "spectrum, where what comes back shows as a peak. The load is the torque that passes the joint, friction "
-    "apart. The grey band is the baseline's level."
-)
-_LEFT = "What the effects leave, on a scale of its own: a law that shows here is one that was not found."
-_ADDS = (
-    "The feedforward with the augmented model minus the feedforward with the model before, along the run's "
-    "motion. A sensor's fault and a contact are not in it: no controller should supply them."
-)
 #: Events that have a card of their own.
 _MOST_EVENTS = 6
 
@@ -61,51 +43,46 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
     """Verdict and evidence, residuals, and what cannot be told apart."""
     samples = diagnosis.samples
     seconds = sum(float(np.ptp(samples.motion.time[run])) for run in samples.motion.runs())
-    intro = (
-        f"The model predicted the torque of {listed(list(log_names))} ({number(seconds)} s of motion, "
-        f"{counted(len(np.unique(diagnosis.evidence.blocks)), 'block')}). What is left was compared with "
-        "what the model leaves on its own baseline data, and every listed effect at every joint was tried "
-        "on blocks of data it had not been fitted to; of equals, the simplest stands."
+    logs, blocks = list(log_names), len(np.unique(diagnosis.evidence.blocks))
+    floor, *levels = (
+        np.asarray(diagnosis.errors()[key], dtype=float) for key in ("noise_floor", "before", "after")
     )
+    before, after = (level / floor for level in levels)
+    given = {"logs": logs, "seconds": seconds, "blocks": blocks, "before": before, "after": after}
+    say = Prose("diagnosis", diagnosis=diagnosis, **given)
     accused = " ".join(blame(diagnosis))
     tables = [effects_table(diagnosis)] if diagnosis.outcome.found or diagnosis.unlisted is not None else []
     tables += [events_table(diagnosis)] if diagnosis.contacts else []
     verdict = Section(
         "Diagnosis",
-        [intro, *findings(diagnosis)],
-        [Picture(shares_figure(diagnosis), _SHARES)] if diagnosis.outcome.found else [],
+        [*say.paragraphs("method"), *findings(diagnosis)],
+        [Picture(shares_figure(diagnosis), say["shares"])] if diagnosis.outcome.found else [],
         [*tables, errors_table(diagnosis)],
         notes=[*reasons(diagnosis), *([accused] if accused else []), *alternatives(diagnosis)],
     )
-    pictures = [Picture(residual_time_figure(diagnosis), _TIME)]
+    pictures = [Picture(residual_time_figure(diagnosis), say["time"])]
     if moving_joints(diagnosis):
-        pictures.append(Picture(residual_shape_figure(diagnosis), _SHAPE))
+        pictures.append(Picture(residual_shape_figure(diagnosis), say["shape"]))
     if diagnosis.outcome.found:
         left = residual_shape_figure(diagnosis, what_is_left=True)
-        pictures.append(Picture(left, _LEFT, "What is left, on its own scale"))
-    return [verdict, Section("Residual", [_residual_words(diagnosis)], pictures)]
+        pictures.append(Picture(left, say["left"], "What is left, on its own scale"))
+    return [verdict, Section("Residual", say.paragraphs("residual"), pictures)]
 
 
 def closing_section(diagnosis: Diagnosis, closing: Closing) -> Section:
     """What a controller now adds, and the errors on whole runs that were not fitted."""
     arm, changes = diagnosis.model.arm, bool(closing.feedforward.largest.any())
     added = [*diagnosis.outcome.added(), *(contact.added for contact in diagnosis.contacts)]
-    if changes:
-        same = [f"{j + 1}" for j in np.flatnonzero(closing.feedforward.largest == 0)]
-        text = ["With the augmented model as feedforward a controller supplies this in addition."]
-        if same:
-            text[0] += f" At {'joint' if len(same) == 1 else 'joints'} {listed(same)} nothing changes."
-    else:
-        text = [nothing_to_supply(added)]
-    if closing.held_out:
-        text.append(
-            f"Beside the blocks held out of the run, {counted(len(closing.held_out), 'whole run')} that no effect was "
-            "fitted to went through both models."
-        )
+    say = Prose(
+        "diagnosis",
+        compensation=closing,
+        same=[f"{j + 1}" for j in np.flatnonzero(closing.feedforward.largest == 0)],
+        nothing_to_supply=None if changes else nothing_to_supply(added),
+    )
     return Section(
         "What it changes",
-        text,
-        [Picture(feedforward_figure(diagnosis, closing), _ADDS)] if changes else [],
+        say.paragraphs("compensation"),
+        [Picture(feedforward_figure(diagnosis, closing), say["feedforward"])] if changes else [],
         [
             *([feedforward_table(diagnosis, closing)] if changes else []),
             *([held_out_table(closing, arm)] if closing.held_out else []),
@@ -120,42 +97,28 @@ def diagnosis_report(
     closing: Closing | None = None,
 ) -> str:
     """One HTML page on a diagnosis; ``model`` is the model before, without the effects."""
-    count = len(diagnosis.outcome.found)
-    text = [
-        f"The model of {model.arm.name} was made with the method {model.history.get('method', 'unknown')} "
-        f"from {counted(len(model.history.get('logs', [])), 'log')}."
-    ]
-    if count:
-        text.append(
-            f"The augmented model adds {counted(count, 'effect')} to it and goes wherever a model goes: "
-            "prediction, evaluation and feedforward control."
-        )
-    models = Section("The model", text, formulas=[("The model as formulas, one per joint", formulas(model))])
+    found = [one.effect for one in diagnosis.outcome.found]
+    say = Prose(
+        "diagnosis",
+        diagnosis=diagnosis,
+        name=diagnosis.model.arm.name,
+        sensors_alone=found and all(e.sensor for e in found) and not diagnosis.contacts,
+        model=model,
+        found=len(found),
+    )
+    folded = [("The model as formulas, one per joint", formulas(model))]
+    models = Section("The model", say.paragraphs("model"), formulas=folded)
     sections = diagnosis_sections(diagnosis, log_names)
     if closing is not None:
         sections.append(closing_section(diagnosis, closing))
     return render(
         Report(
             f"Diagnosis: {headline(diagnosis)}",
-            _lead(diagnosis),
+            say["lead"],
             [*sections, models],
             diagnosis_cards(diagnosis),
         )
     )
-
-
-def _lead(diagnosis: Diagnosis) -> str:
-    name = diagnosis.model.arm.name
-    if diagnosis.verdict == "cannot_tell":
-        return f"A run of {name} by which this model cannot tell whether anything has changed."
-    if diagnosis.verdict == "no_effect":
-        return f"A run of {name} that the model explains as well as its own baseline data."
-    if diagnosis.verdict == "unlisted_effect":
-        return f"A run of {name} that neither the model nor any listed effect explains."
-    found = [f.effect for f in diagnosis.outcome.found]
-    if found and all(effect.sensor for effect in found) and not diagnosis.contacts:
-        return f"A run of {name} that the model could not explain: the sensor is at fault, not the arm."
-    return f"A run of {name} that the model could not explain, and what it takes to explain it."
 
 
 def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
@@ -233,18 +196,3 @@ def _contact_card(diagnosis: Diagnosis, k: int) -> Card:
         else f"mean torque on joint {added.effect.joint}"
     )
     return Card(f"{number(size, 2)} {unit(what.unit)}", f"Event {k + 1}, {start} to {end} s", where, "accent")
-
-
-def _residual_words(diagnosis: Diagnosis) -> str:
-    errors = diagnosis.errors()
-    floor = np.asarray(errors["noise_floor"])
-    before, after = np.asarray(errors["before"]) / floor, np.asarray(errors["after"]) / floor
-    if not diagnosis.evidence.rows.any():
-        return "No joint moved long enough to judge anything but the contacts."
-    if not diagnosis.outcome.found:
-        return f"The residual is {numbers(before, 2)} times the baseline's, joint by joint."
-    return (
-        f"Before, the residual was {numbers(before, 2)} times the baseline's, joint by joint; with the "
-        f"effects added it is {numbers(after, 2)} times. One means that the model explains this run as well "
-        "as its own training data."
-    )

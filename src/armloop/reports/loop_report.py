@@ -14,13 +14,12 @@ from armloop.reports.loop_result import LoopResult, mean_eta, truth_name, varyin
 from armloop.reports.loop_stages import told_in_stages
 from armloop.reports.plots import column_figure, eta_figure, ring_figure, tracking_figure
 from armloop.reports.plots.style import AFTER, BEFORE
+from armloop.reports.prose import Prose
 from armloop.reports.reconstruction_report import conditions_section, mean_nrmse, reconstruction_sections
 from armloop.reports.tables import Table, eta_table, make_table, seconds_table
 from armloop.reports.words import (
     angle,
     controller,
-    counted,
-    listed,
     number,
     parameters,
     percent,
@@ -43,7 +42,7 @@ def loop_report(
         further: sections on what was done beside the simulated arm.
         links: words and relative addresses of further pages.
     """
-    samples = varying(result)
+    say, samples = Prose("loop", result=result), varying(result)
     sections = [
         _measure_section(result),
         conditions_section(result.clusters),
@@ -59,30 +58,16 @@ def loop_report(
     return render(
         Report(
             f"The whole loop on {result.arm.name}",
-            "An arm was measured, its dynamics reconstructed and used for control. Then something about the "
-            f"arm changed that nobody declared. {_outcome(result)}",
+            say["lead"],
             sections,
             _cards(result),
             [*([("Watch the replay", replay)] if replay else []), *links],
             Picture(
                 ring_figure(*stages),
-                "The loop, from stage to stage, with the numbers and signals of this run.",
+                say["ring"],
                 narrow=column_figure(*stages),
             ),
         )
-    )
-
-
-def _outcome(result: LoopResult) -> str:
-    """What became of the change, in a sentence that also holds where it was missed."""
-    if not result.diagnosis.outcome.found:
-        return (
-            "The residual of one more run was traced to no listed effect, and the arm was controlled again."
-        )
-    cause = "its cause" if result.right else "a cause that was not the true one"
-    return (
-        f"The residual of one more run was traced to {cause}, the model was augmented by it, and the arm was "
-        "controlled again."
     )
 
 
@@ -127,13 +112,8 @@ def _measure_section(result: LoopResult) -> Section:
         seconds = sum(float(np.ptp(log.time[run])) for run in runs)
         rows.append([name.replace("_", " "), f"{log.samples}", f"{len(runs)}", f"{seconds:.1f} s"])
     rows += [["in all", f"{sum(log.samples for log in result.logs.values())}", "", ""]]
-    text = (
-        "Three kinds of data were collected: creeping so slowly that only gravity and dry friction act, "
-        "moving at constant velocities, and following exciting trajectories. Each isolates a part of the "
-        "dynamics, so that the parts can be found one after the other."
-    )
     table = make_table(["condition", "samples", "runs", "motion logged"], rows, "The data")
-    return Section("Measurement", [text], tables=[table])
+    return Section("Measurement", Prose("loop").paragraphs("measurement"), tables=[table])
 
 
 def _control_section(result: LoopResult) -> Section:
@@ -141,39 +121,23 @@ def _control_section(result: LoopResult) -> Section:
     n = len(next(iter(tracking.values())).eta)
     paper = any(len(published.ETA_DEG.get(name, ())) == n for name in tracking)
     order = sorted(tracking, key=lambda name: mean_eta(tracking[name]))
-    text = [
-        "The same reference was tracked with each controller; a model supplies the torque that the motion "
-        "needs, and PID only corrects what is left.",
-        "From best to worst, mean over the joints: "
-        + listed([f"{controller(name)} ({number(mean_eta(tracking[name]), 2)})" for name in order])
-        + f" {tracking[order[0]].unit[0]}.",
-    ]
-    beside = " Dashed outlines are the paper's values, measured on its own arm." if paper else ""
+    each = [f"{controller(name)} ({number(mean_eta(tracking[name]), 2)})" for name in order]
+    say = Prose("loop", order=each, unit=tracking[order[0]].unit[0], paper=paper)
     return Section(
         "Control",
-        text,
+        say.paragraphs("control"),
         [
-            Picture(
-                eta_figure(tracking, paper), "Mean absolute tracking error over the scored interval." + beside
-            ),
-            Picture(
-                tracking_figure(tracking),
-                "Above, the reference and the joints' motion; below, what separates them. Where a joint "
-                "turns around, dry friction changes sign: there PID alone is late.",
-            ),
+            Picture(eta_figure(tracking, paper), say["eta"]),
+            Picture(tracking_figure(tracking), say["tracking"]),
         ],
         [eta_table(tracking, paper)],
     )
 
 
 def _truth_section(result: LoopResult) -> Section:
-    hidden = result.undeclared
-    text = [
-        "Only after the verdict was it looked up what had been hidden in the plant: "
-        f"{truth_name(result)} ({parameters(hidden['parameters'])}). "
-        f"The verdict was {'right' if result.right else 'wrong'}."
-    ]
-    return Section("The truth revealed", text, tables=[_truth_table(result)])
+    hidden = parameters(result.undeclared["parameters"])
+    say = Prose("loop", result=result, hidden=truth_name(result), parameters=hidden)
+    return Section("The truth revealed", say.paragraphs("truth"), tables=[_truth_table(result)])
 
 
 def _truth_table(result: LoopResult) -> Table:
@@ -202,38 +166,28 @@ def _control_again_section(result: LoopResult) -> Section:
     runs = {"before": result.tracking_before, "after": result.tracking_after}
     names = {"before": "with the first model", "after": "with the augmented model"}
     colors = {"before": BEFORE, "after": AFTER}
-    before, after = mean_eta(runs["before"]), mean_eta(runs["after"])
-    u = runs["after"].unit[0]
     clean = dict(result.tracking).get("pid_step3")
-    beside = f" On the unchanged arm it was {number(mean_eta(clean), 2)} {u}." if clean is not None else ""
+    say = Prose(
+        "loop",
+        **{key: mean_eta(run) for key, run in runs.items()},
+        clean=clean and mean_eta(clean),
+        unit=runs["after"].unit[0],
+    )
     rows = [[names[key], *run.eta] for key, run in runs.items()]
     if clean is not None:
         rows.append(["first model, unchanged arm", *clean.eta])
     headers = ["PID + Step III", *(f"η{j + 1} [{x}]" for j, x in enumerate(runs["after"].unit))]
-    change = "lowers" if after < before else "raises"
-    text = (
-        "The changed arm tracked the reference again, with the feedforward of the first model and with that "
-        f"of the augmented one, which {change} η from {number(before, 2)} to {number(after, 2)} {u}, mean "
-        f"over the joints.{beside}"
-    )
     return Section(
         "Control again",
-        [text],
+        say.paragraphs("control_again"),
         [
             Picture(eta_figure(runs, names=names, colors=colors), "Tracking error on the changed arm."),
-            Picture(
-                tracking_figure(runs, names, colors),
-                "The motion behind these numbers, and the error over time.",
-            ),
+            Picture(tracking_figure(runs, names, colors), say["tracking_again"]),
         ],
         [make_table(headers, rows, "Tracking error η on the changed arm")],
     )
 
 
 def _account_section(result: LoopResult) -> Section:
-    text = f"Everything here follows from seed {result.seed}; the same seed gives the same report."
-    if result.notes:
-        text += (
-            f" There {'is' if len(result.notes) == 1 else 'are'} {counted(len(result.notes), 'note')} below."
-        )
-    return Section("Account", [text], tables=[seconds_table(result.seconds)], notes=list(result.notes))
+    text = Prose("loop", result=result).paragraphs("account")
+    return Section("Account", text, tables=[seconds_table(result.seconds)], notes=list(result.notes))

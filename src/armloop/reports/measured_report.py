@@ -14,8 +14,9 @@ from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, reasons
 from armloop.reports.html import Picture, Section
 from armloop.reports.plots import residual_time_figure
+from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table, score_table
-from armloop.reports.words import counted, number, percent
+from armloop.reports.words import counted, number
 
 _TITLE = "The same on measured data"
 
@@ -50,19 +51,12 @@ def measured_words(result: MeasuredResult) -> str:
 
 def measured_section(result: MeasuredResult) -> Section:
     """The part of the loop's report that is measured, not simulated."""
-    moving = float(np.nanmean(result.free.moving["nrmse"]))
-    text = [
-        "Everything above was simulated. This was not: a UR5's motor currents (Kufieta 2014), from three runs of free "
-        f"motion to a model, which leaves {percent(moving)} of the torque on a free run that it was not made of, mean of "
-        "the joints while they move. Then the same motion again, and during it something happened that nobody declared.",
-        *findings(result.diagnosis),
-    ]
+    say = Prose("measured", moving=float(np.nanmean(result.free.moving["nrmse"])))
     contacts = result.diagnosis.contacts
-    caption = "The residual of the pushed run, joint by joint; shaded is when the diagnosis says that somebody pushed."
     return Section(
         _TITLE,
-        text,
-        [Picture(residual_time_figure(result.diagnosis), caption)],
+        [*say.paragraphs("text"), *findings(result.diagnosis)],
+        [Picture(residual_time_figure(result.diagnosis), say["residual"])],
         [
             _free_table(result),
             *(

@@ -23,6 +23,7 @@ from armloop.reports.plots import (
     orders_figure,
     torque_figure,
 )
+from armloop.reports.prose import Prose
 from armloop.reports.tables import (
     Table,
     compared,
@@ -33,36 +34,7 @@ from armloop.reports.tables import (
     score_table,
     steps_table,
 )
-from armloop.reports.words import counted, number, percent
-
-_ORDERS = (
-    "Each candidate library was fitted with some blocks of data set aside; the smallest one whose error "
-    "there is within a standard error of the best was kept (ringed)."
-)
-_ORDERS_WITH_REFERENCE = " The last panel is the one-shot reference method, which keeps its best."
-_TORQUE = (
-    "Measured and predicted torque over time. Step I knows gravity and dry friction, Step II adds what "
-    "depends on velocity, Step III what depends on acceleration: the last curve should lie on the measured "
-    "one. Below each joint's torque, on a scale of its own: what the whole model leaves of it."
-)
-_FRICTION = (
-    "Friction over velocity. Dots: the measured torque without what the rest of the model explains; line: the "
-    "model's friction once the joint slides, the band where it depends on the load. Dots away from the line are "
-    "friction that the model lacks, or something else that it takes for friction."
-)
-_LADDER = (
-    "Friction laws, tried one after the other: from the error before to the error with it, on blocks that judged and "
-    "fitted nothing. What gains less than it scatters over the blocks is not taken."
-)
-_PARTS = (
-    "Of what the model leaves on held-out data, a flexible regression (ridge and boosted trees of the state, the "
-    "direction, the recent path and the load) still predicts a part on blocks left out, further apart than the "
-    "residual's memory: so much is known to be missing from the model. The rest is noise, as far as anyone can tell."
-)
-_CLUSTERS = (
-    "Every dot is a sample; crosses are the cluster centres. The elbow of the within-cluster sum tells how "
-    "many kinds of motion the indicator sees."
-)
+from armloop.reports.words import percent
 
 
 def mean_nrmse(score: Score) -> float:
@@ -73,12 +45,8 @@ def mean_nrmse(score: Score) -> float:
 
 def conditions_section(clusters: Clusters, title: str = "Sorting the samples") -> Section:
     """How the samples were sorted into the three working conditions."""
-    text = (
-        "The relative activation indicator says of every sample how much the arm moves and how much it "
-        "accelerates; k-means sorts the samples by it, so that each step is fitted on data in which the "
-        "later steps' terms are absent."
-    )
-    return Section(title, [text], [Picture(clusters_figure(clusters), _CLUSTERS)])
+    say = Prose("reconstruction")
+    return Section(title, say.paragraphs("conditions"), [Picture(clusters_figure(clusters), say["clusters"])])
 
 
 def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionLog]) -> str:
@@ -89,9 +57,7 @@ def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionL
     if reconstruction.reports[0].orders is not None:
         sections.insert(0, conditions_section(sort_samples(samples.motion)))
     error = percent(mean_nrmse(reconstruction.held_out))
-    lead = "From motion logs to a readable model of the joint torques, step by step."
-    if reconstruction.warnings:
-        lead = f"{'; '.join(reconstruction.warnings)}. {lead}"
+    lead = Prose("reconstruction", warnings=reconstruction.warnings)["lead"]
     cards = [Card(error, "Prediction error", "nRMSE on data that no step has seen, mean of the joints")]
     cards += _parts_card(reconstruction)
     return render(Report(f"Reconstruction of {model.arm.name}", lead, sections, cards))
@@ -127,45 +93,46 @@ def reconstruction_sections(
         reference: the one-shot reconstruction of the same data, to be compared with.
     """
     model, history = reconstruction.model, reconstruction.model.history
+    error = mean_nrmse(reconstruction.held_out)
+    other = None if reference is None else mean_nrmse(reference.held_out)
+    say = Prose(
+        "reconstruction",
+        warnings=reconstruction.warnings if reconstruction.parts else [],
+        history=history,
+        held_out=reconstruction.held_out,
+        parts=reconstruction.parts,
+        error=error,
+        reference=other,
+        factor=_factor(error, other),
+    )
     pictures = []
     if has_trials(reconstruction.reports):
         trials = orders_figure(reconstruction.reports, reference.reports if reference else ())
-        pictures.append(Picture(trials, _ORDERS + (_ORDERS_WITH_REFERENCE if reference else "")))
+        pictures.append(Picture(trials, say["orders"]))
     notes = list(reconstruction.notes)
     if ladder := history.get("friction_ladder"):
         # the notes say the same in a line each, for the terminal
         notes = [
             note for note in notes if not any(note.startswith(f"friction, {r['rung']}:") for r in ladder)
         ]
-        pictures.append(Picture(ladder_figure(ladder), _LADDER))
+        pictures.append(Picture(ladder_figure(ladder), say["ladder"]))
     if samples is not None:
-        pictures.append(Picture(torque_figure(model, samples), _TORQUE))
-        pictures.append(Picture(friction_figure(model, samples), _FRICTION))
+        pictures.append(Picture(torque_figure(model, samples), say["torque"]))
+        pictures.append(Picture(friction_figure(model, samples), say["friction"]))
     tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
     if compared(reconstruction.libraries):
         tables.insert(0, libraries_table(reconstruction.libraries))
-    text = [
-        f"The model was reconstructed from {counted(len(history.get('logs', [])), 'log')} with the method "
-        f"{history.get('method', 'unknown')} on the library {history.get('library', 'unknown')}: from many "
-        "candidate functions a sparse regression keeps those that lower the error on data it was not "
-        "fitted on.",
-        f"On the {counted(reconstruction.held_out.samples, 'sample')} that no step has seen and that chose nothing, it "
-        f"is off by {percent(mean_nrmse(reconstruction.held_out))} of the measured torque (nRMSE of moving samples, "
-        "mean of the joints).",
-    ]
     if reconstruction.parts:
         tables.append(parts_table(reconstruction.parts, model.arm))
-        text = [*(f"{warning}." for warning in reconstruction.warnings), *text, _PARTS]
     if reference is not None:
         tables.append(comparison(reconstruction, reference))
-        text.append(_against(reconstruction, reference))
     folded = [("The model as formulas, one per joint", formulas(model))]
     tables += [table for table in (stribeck_table(model),) if table is not None]
     if (coefficients := coefficients_table(model, None)) is not None:
         folded.append(("Coefficients with standard errors", f"{coefficients}\n\n{textwrap.fill(NOTE, 110)}"))
     if legend := model.legend():
         folded.append(("What the symbols stand for", "\n".join(legend)))
-    return [Section("Reconstruction", text, pictures, tables, folded, notes)]
+    return [Section("Reconstruction", say.paragraphs("text"), pictures, tables, folded, notes)]
 
 
 def comparison(ours: Reconstruction, reference: Reconstruction) -> Table:
@@ -182,13 +149,8 @@ def _terms(reports: Sequence[StepReport]) -> list[int]:
     return [int(x) for x in np.sum([report.terms for report in reports], axis=0)]
 
 
-def _against(ours: Reconstruction, reference: Reconstruction) -> str:
-    mine, theirs = mean_nrmse(ours.held_out), mean_nrmse(reference.held_out)
-    if not np.isfinite(mine + theirs) or min(mine, theirs) <= 0:
-        return "One-shot SINDy was run on the same data; the table compares the two."
-    factor = max(mine, theirs) / min(mine, theirs)
-    verdict = "more" if mine < theirs else "less"
-    return (
-        f"One-shot SINDy on the same data is off by {percent(theirs)}, {number(factor, 2)} times {verdict} "
-        "than the stepwise model."
-    )
+def _factor(error: float, other: float | None) -> float | None:
+    """How many times larger the larger of two errors is; None where that cannot be said."""
+    if other is None or not np.isfinite(error + other) or min(error, other) <= 0:
+        return None
+    return max(error, other) / min(error, other)

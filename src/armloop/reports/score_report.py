@@ -7,9 +7,10 @@ from matplotlib.figure import Figure
 from armloop.identification.scoring import Score
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots.style import BLUE, INK, figure, panels, polish
+from armloop.reports.prose import Prose
 from armloop.reports.reconstruction_report import mean_nrmse
 from armloop.reports.tables import score_table
-from armloop.reports.words import counted, percent
+from armloop.reports.words import percent
 from armloop.robot.arm import Arm
 
 
@@ -37,12 +38,9 @@ def score_figure(score: Score, arm: Arm) -> Figure:
 
 def score_report(score: Score, arm: Arm) -> str:
     """One HTML page on a score."""
-    text = (
-        f"The model's torques against those of {counted(score.samples, 'sample')}, conditioned as its training logs "
-        "were. Standstill is scored apart, for there friction is not determined."
-    )
+    text = Prose("score", score=score).paragraphs("text")
     picture = Picture(score_figure(score, arm), "RMSE over the RMS of the measured torque, joint by joint.")
-    section = Section("Prediction error", [text], [picture], [score_table(score, arm)])
+    section = Section("Prediction error", text, [picture], [score_table(score, arm)])
     card = Card(percent(mean_nrmse(score)), "Prediction error", "nRMSE while moving, mean of the joints")
     return render(
         Report(f"A model of {arm.name}, evaluated", "Predicted and measured torques.", [section], [card])

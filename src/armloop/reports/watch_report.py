@@ -9,6 +9,7 @@ import numpy as np
 
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots.watch import MOST_ARMS, NARROW, heat_figure, trend_figure
+from armloop.reports.prose import Prose
 from armloop.reports.tables import make_table
 from armloop.reports.watch_tables import (
     alarm_words,
@@ -26,16 +27,6 @@ from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
 from armloop.watch.verdicts import Tested, examine, whole_history
 
-_HEAT = (
-    "Each row is an arm, each column an effect. Colour: the most evidence there ever was for it, as a part of what raises "
-    "an alarm (logarithmic scale). Dots: effects that an alarm was traced to. An effect shows itself in related columns, "
-    "too; the alarm's own section says which of them explains the others."
-)
-_TREND = (
-    "Each dot is the coefficient, in SI units, that the effect alone would be given by one log (or the logarithm of "
-    "the residual's mean square). The band holds nine in ten of the logs before the first change. Below: the "
-    "evidence for a change."
-)
 _SHOWN, _STREAMS = 4, 60
 
 
@@ -72,8 +63,7 @@ def watch_report(
     return render(
         Report(
             "Arms under watch",
-            f"A mean time of at least {outcome.hours:g} h of operation between false alarms of one whole arm, all joints "
-            "and effects together, as long as its healthy logs of one programme are interchangeable.",
+            Prose("watch", outcome=outcome)["lead"],
             sections,
             _cards(outcome),
         )
@@ -118,7 +108,7 @@ def _heat(outcome: Outcome) -> Section:
         alarmed[a] = [(arm["arm"], name) in found for name in kept]
     limit = np.array([arm["limit"] for arm in arms])
     shown = ([arm["arm"] for arm in arms], kept, evidence, limit, alarmed)
-    picture = Picture(heat_figure(*shown), _HEAT, narrow=heat_figure(*shown, NARROW))
+    picture = Picture(heat_figure(*shown), Prose("watch")["heat"], narrow=heat_figure(*shown, NARROW))
     notes = [f"{arm['arm']}: {note}" for arm in outcome.arms for note in arm["notes"]]
     if len(outcome.arms) > len(arms):
         notes.append(f"The {len(arms)} arms with the most evidence, of {len(outcome.arms)}.")
@@ -161,7 +151,9 @@ def _trends(outcome: Outcome, arm: str, tested: Tested) -> Section:
         (place(_item(tested, s)), tested.adjusted.values[:, s], tested.watched.evidence[:, s]) for s in chosen
     ]
     made = trend_figure(tested.history.units.when, shown, float(tested.watched.limits[-1]), alarms)
-    return Section(f"Trends of {arm}", [], [Picture(made, _TREND)], [], [], list(tested.notes))
+    return Section(
+        f"Trends of {arm}", [], [Picture(made, Prose("watch")["trend"])], [], [], list(tested.notes)
+    )
 
 
 def _item(tested: Tested, s: int) -> dict[str, Any]:
