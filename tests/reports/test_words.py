@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armloop.reports.words import controller, effect_name, listed, number, percent, unit, with_error
+from armloop.reports.words import controller, effect_name, listed, number, percent, place, unit, with_error
 
 
 @pytest.mark.parametrize(
@@ -26,6 +26,12 @@ def test_a_value_ends_where_its_error_begins() -> None:
     assert with_error(0.44982, 0.00071) == "0.44982 ± 0.00071"
     assert with_error([1.0, 2.0], [0.1, 0.02]) == "(1.00 ± 0.10, 2.000 ± 0.020)"
     assert with_error(1.0, float("nan")) == "1.00"
+
+
+def test_an_entry_is_told_with_all_its_joints() -> None:
+    pair = {"effect": "transmission_coupling", "joint": 1, "other_joint": 2}
+    assert place(pair) == "transmission coupling, joints 1 and 2"
+    assert place({"effect": "payload", "joint": None}) == "payload"
 
 
 def test_names() -> None:

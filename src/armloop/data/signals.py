@@ -8,7 +8,7 @@ motion it belongs to stay together in time; runs are treated one by one, never a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,7 @@ class Conditioning:
     smear: float = 0.5
 
     def __post_init__(self) -> None:
-        for name, value in self.to_dict().items():
+        for name, value in vars(self).items():
             if not isinstance(value, int | float) or not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
         if 0 < self.cutoff_hz < LOWEST_CORNER:
@@ -61,10 +61,6 @@ class Conditioning:
     def reach(self) -> float:
         """Seconds to either side over which the low-pass smears a step."""
         return filter_reach(self.cutoff_hz)
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return asdict(self)
 
 
 class ShortRunError(LogError):

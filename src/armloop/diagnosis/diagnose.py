@@ -27,7 +27,8 @@ from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
-from armloop.laws.effects import hypotheses
+from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects.base import entry
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array
@@ -149,16 +150,7 @@ class Diagnosis:
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
                     **({"remedy": remedy(added)} if added.effect.sensor else {}),
-                    "alternatives": [
-                        {
-                            "effect": rival.name,
-                            "joint": rival.joint,
-                            **({"other_joint": rival.other_joint} if rival.pair_wise else {}),
-                            "share": share,
-                            "why": why_alike(added.effect, rival),
-                        }
-                        for rival, share in found.rivals
-                    ],
+                    "alternatives": _alternatives(added.effect, found.rivals),
                 }
             )
         effects.sort(key=lambda item: -item["share"])
@@ -170,15 +162,7 @@ class Diagnosis:
                 "probability": probability.EVENT.probability,
                 "words": contact.added.effect.sentence(contact.added.parameters),
                 "rmse": {"before": contact.before.tolist(), "after": contact.after.tolist()},
-                "alternatives": [
-                    {
-                        "effect": rival.name,
-                        "joint": rival.joint,
-                        "share": share,
-                        "why": why_alike(contact.added.effect, rival),
-                    }
-                    for rival, share in contact.rivals
-                ],
+                "alternatives": _alternatives(contact.added.effect, contact.rivals),
             }
             for contact in self.contacts
         ]
@@ -212,6 +196,11 @@ def _by_joint(fit: Fit, values: Array) -> Array:
 def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
     """x / y, NaN where y is zero."""
     return np.divide(x, y, out=np.full(len(x), np.nan), where=y > 0)
+
+
+def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:
+    """Entries of what this motion cannot tell from an effect."""
+    return [{**entry(*one.place), "share": share, "why": why_alike(effect, one)} for one, share in confounded]
 
 
 def _null(value: Any) -> Any:

@@ -21,6 +21,7 @@ from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_range
 from armloop.experiment.design import sampled
 from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import Effect
+from armloop.laws.effects.base import entry
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 
@@ -41,10 +42,7 @@ class Told:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        places = {
-            key: {"effect": e.name, "joint": e.joint, **_other(e)}
-            for key, e in (("found", self.found), ("alternative", self.rival))
-        }
+        places = {key: entry(*e.place) for key, e in (("found", self.found), ("alternative", self.rival))}
         return {**places, "apart": {"run": self.now, "next_run": self.then}}
 
 
@@ -74,9 +72,7 @@ class NextRun:
             "purpose": self.purpose,
             "duration": self.reference.duration,
             "alternatives": [told.to_dict() for told in self.told],
-            "std_error_factor": [
-                {"effect": e.name, "joint": e.joint, **_other(e), "factor": x} for e, x in self.sharper
-            ],
+            "std_error_factor": [{**entry(*e.place), "factor": x} for e, x in self.sharper],
             "joint": self.joint,
             "use": {name: row.tolist() for name, row in zip(names, self.use, strict=True)},
         }
@@ -133,7 +129,3 @@ def _sharper(run: Stage, then: Stage, laws: Sequence[Law]) -> list[tuple[Effect,
     sizes = [run.columns(law.effect, law.shape).shape[1] for law in laws]
     change = np.split(logs[1] - logs[0], np.cumsum(sizes)[:-1])
     return [(law.effect, float(np.exp(part.mean()))) for law, part in zip(laws, change, strict=True)]
-
-
-def _other(effect: Effect) -> dict[str, int | None]:
-    return {"other_joint": effect.other_joint} if effect.pair_wise else {}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
-from armloop.laws.effects.base import Placed, fill
+from armloop.laws.effects.base import Placed, entry, fill
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import Acting, FrictionLaw
 from armloop.model.components import COMPONENTS, Component
@@ -67,9 +67,7 @@ class AddedEffect:
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as in ``diagnosis.json``."""
         return {
-            "effect": self.effect.name,
-            "joint": self.effect.joint,
-            **({"other_joint": self.effect.other_joint} if self.effect.pair_wise else {}),
+            **entry(*self.effect.place),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
             **({"when": self.when} if self.when else {}),
         }
@@ -287,7 +285,7 @@ class ReconstructedModel:
             "components": [component.to_dict() for component in self.components],
             "friction": self.friction.to_dict(),
             "effects": [added.to_dict() for added in self.effects],
-            "conditioning": self.conditioning.to_dict(),
+            "conditioning": asdict(self.conditioning),
             "recorded": self.recorded,
             "baseline": self.baseline,
             "history": self.history,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.laws.effects import Estimate
+from armloop.laws.effects.base import entry
 from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, solve
 from armloop.regression.moments import Moments
@@ -56,18 +57,12 @@ class Named:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, as an entry of ``diagnosis.json``."""
-        name, joint, other = self.place
         return {
-            "effect": name,
-            "joint": joint,
-            **({"other_joint": other} if other is not None else {}),
+            **entry(*self.place),
             "parameters": {key: e.to_dict() for key, e in self.parameters.items()},
             "share": self.share,
             "words": self.words,
-            "alternatives": [
-                {"effect": n, "joint": j, **({"other_joint": o} if o is not None else {})}
-                for n, j, o in self.alternatives
-            ],
+            "alternatives": [entry(*place) for place in self.alternatives],
         }
 
 
@@ -88,7 +83,7 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
         moment = moment - explained
     full = Normal(window.gram, moment, energy)
     chosen: list[Place] = []
-    rivals: list[tuple[Place, ...]] = []
+    alike: list[tuple[Place, ...]] = []
     gains: list[float] = []
     last = np.zeros(len(moment))
     while True:
@@ -119,13 +114,13 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
         # of those that explain as much, the fewest parameters, and a law of the motion alone before one of the load
         pick = min(equals, key=lambda place: (*_simplicity(columns, places[place]), -gain[place]))
         chosen.append(pick)
-        rivals.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
+        alike.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
         gains.append(gain[pick])
         last = held[pick]
     whole = sum(gains)
     return [
         _named(arm, columns, rest, chosen, place, gain / whole if whole > 0 else 0.0, others)
-        for place, gain, others in zip(chosen, gains, rivals, strict=True)
+        for place, gain, others in zip(chosen, gains, alike, strict=True)
     ]
 
 

@@ -8,14 +8,16 @@ import numpy as np
 
 from armloop.diagnosis import Closing, Diagnosis
 from armloop.model import ReconstructedModel
-from armloop.reports.diagnosis_tables import (
-    effects_table,
-    errors_table,
-    events_table,
-    feedforward_table,
-    held_out_table,
+from armloop.reports.diagnosis_tables import compensation_tables, found_tables
+from armloop.reports.findings import (
+    all_added,
+    alternatives,
+    blame,
+    findings,
+    headline,
+    nothing_to_supply,
+    reasons,
 )
-from armloop.reports.findings import alternatives, blame, findings, headline, nothing_to_supply, reasons
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import (
     feedforward_figure,
@@ -51,13 +53,11 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
     given = {"logs": logs, "seconds": seconds, "blocks": blocks, "before": before, "after": after}
     say = Prose("diagnosis", diagnosis=diagnosis, **given)
     accused = " ".join(blame(diagnosis))
-    tables = [effects_table(diagnosis)] if diagnosis.outcome.found or diagnosis.unlisted is not None else []
-    tables += [events_table(diagnosis)] if diagnosis.contacts else []
     verdict = Section(
         "Diagnosis",
         [*say.paragraphs("method"), *findings(diagnosis)],
         [Picture(shares_figure(diagnosis), say["shares"])] if diagnosis.outcome.found else [],
-        [*tables, errors_table(diagnosis)],
+        found_tables(diagnosis),
         notes=[*reasons(diagnosis), *([accused] if accused else []), *alternatives(diagnosis)],
     )
     pictures = [Picture(residual_time_figure(diagnosis), say["time"])]
@@ -69,24 +69,20 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
     return [verdict, Section("Residual", say.paragraphs("residual"), pictures)]
 
 
-def closing_section(diagnosis: Diagnosis, closing: Closing) -> Section:
+def compensation_section(diagnosis: Diagnosis, closing: Closing) -> Section:
     """What a controller now adds, and the errors on whole runs that were not fitted."""
-    arm, changes = diagnosis.model.arm, bool(closing.feedforward.largest.any())
-    added = [*diagnosis.outcome.added(), *(contact.added for contact in diagnosis.contacts)]
+    changes = bool(closing.feedforward.largest.any())
     say = Prose(
         "diagnosis",
         compensation=closing,
         same=[f"{j + 1}" for j in np.flatnonzero(closing.feedforward.largest == 0)],
-        nothing_to_supply=None if changes else nothing_to_supply(added),
+        nothing_to_supply=None if changes else nothing_to_supply(all_added(diagnosis)),
     )
     return Section(
         "What it changes",
         say.paragraphs("compensation"),
         [Picture(feedforward_figure(diagnosis, closing), say["feedforward"])] if changes else [],
-        [
-            *([feedforward_table(diagnosis, closing)] if changes else []),
-            *([held_out_table(closing, arm)] if closing.held_out else []),
-        ],
+        compensation_tables(diagnosis, closing),
     )
 
 
@@ -110,7 +106,7 @@ def diagnosis_report(
     models = Section("The model", say.paragraphs("model"), formulas=folded)
     sections = diagnosis_sections(diagnosis, log_names)
     if closing is not None:
-        sections.append(closing_section(diagnosis, closing))
+        sections.append(compensation_section(diagnosis, closing))
     return render(
         Report(
             f"Diagnosis: {headline(diagnosis)}",

@@ -9,7 +9,7 @@ import numpy as np
 
 from armloop.diagnosis import probability
 from armloop.laws.effects.found import RANGE
-from armloop.reports.findings import blame, findings, nothing_to_supply, reasons, rivals
+from armloop.reports.findings import all_added, blame, confounded, findings, nothing_to_supply, reasons
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
 
@@ -134,31 +134,33 @@ def held_out_table(
     return make_table(headers, rows, title, left=(0, 1, 2))
 
 
+def found_tables(diagnosis: Diagnosis) -> list[Table]:
+    """Effects and events, where there are any, and the errors per joint."""
+    effects = diagnosis.outcome.found or diagnosis.unlisted is not None
+    tables = [effects_table(diagnosis)] if effects else []
+    tables += [events_table(diagnosis)] if diagnosis.contacts else []
+    return [*tables, errors_table(diagnosis)]
+
+
+def compensation_tables(diagnosis: Diagnosis, closing: Closing) -> list[Table]:
+    """What a controller adds, where it does, and errors on whole runs that were not fitted, where there are any."""
+    tables = [feedforward_table(diagnosis, closing)] if closing.feedforward.largest.any() else []
+    return [*tables, *([held_out_table(closing, diagnosis.model.arm)] if closing.held_out else [])]
+
+
 def diagnosis_table(diagnosis: Diagnosis, closing: Closing | None = None) -> str:
     """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
     sentences = [*findings(diagnosis), *reasons(diagnosis), *blame(diagnosis)]
     parts = [f"Verdict: {diagnosis.verdict}", "\n".join(map(_wrapped, sentences))]
-    if diagnosis.outcome.found or diagnosis.unlisted is not None:
-        parts.append(str(effects_table(diagnosis)))
-    if diagnosis.contacts:
-        parts.append(str(events_table(diagnosis)))
-    parts.append(str(errors_table(diagnosis)))
-    for found, alike in rivals(diagnosis):
-        lines = [_wrapped(f"- {rival}: {why}") for rival, why in alike]
+    parts += map(str, found_tables(diagnosis))
+    for found, alike in confounded(diagnosis):
+        lines = [_wrapped(f"- {other}: {why}") for other, why in alike]
         parts.append("\n".join([f"This motion cannot tell {found} from", *lines]))
     if closing is not None:
-        parts += _closing_parts(diagnosis, closing)
+        if not closing.feedforward.largest.any():
+            parts.append(nothing_to_supply(all_added(diagnosis)))
+        parts += map(str, compensation_tables(diagnosis, closing))
     return "\n\n".join(parts)
-
-
-def _closing_parts(diagnosis: Diagnosis, closing: Closing) -> list[str]:
-    if closing.feedforward.largest.any():
-        parts = [str(feedforward_table(diagnosis, closing))]
-    else:
-        parts = [nothing_to_supply([*diagnosis.outcome.added(), *(c.added for c in diagnosis.contacts)])]
-    if closing.held_out:
-        parts.append(str(held_out_table(closing, diagnosis.model.arm)))
-    return parts
 
 
 def _wrapped(sentence: str) -> str:

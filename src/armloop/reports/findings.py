@@ -8,7 +8,8 @@ import numpy as np
 
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.whereabouts import whereabouts
-from armloop.reports.words import counted, effect_label, effect_name, listed, number, percent, unit
+from armloop.reports.prose import Prose
+from armloop.reports.words import counted, effect_label, listed, percent, place, unit
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
@@ -27,46 +28,22 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def findings(diagnosis: Diagnosis) -> list[str]:
     """What was found, a sentence each, strongest first; what to do where a sensor is at fault."""
-    sentences = [
-        f"Found: {unit(added.effect.sentence(added.parameters))}. It removes {percent(found.share)} of what can be "
-        "explained."
-        for found, added in zip(diagnosis.outcome.found, diagnosis.outcome.added(), strict=True)
-    ]
-    if len(diagnosis.contacts) == 1:
-        (contact,) = diagnosis.contacts
-        sentences.append(
-            f"Found: {contact.added.effect.sentence(contact.added.parameters)}. It explains "
-            f"{percent(contact.share)} of the burst; its samples are kept out of everything else."
-        )
-    elif diagnosis.contacts:
-        sentences.append(
-            f"Found: {len(diagnosis.contacts)} {_events(diagnosis)}, listed below; their samples are kept out of "
-            "everything else."
-        )
-    if diagnosis.contacts and not diagnosis.judged:
-        sentences.append("Apart from that the joints hardly move: nothing else could be looked for.")
-    unlisted = diagnosis.unlisted
+    outcome, unlisted = diagnosis.outcome, diagnosis.unlisted
+    values: dict[str, object] = {
+        "effects": [
+            (unit(added.effect.sentence(added.parameters)), found.share)
+            for found, added in zip(outcome.found, outcome.added(), strict=True)
+        ],
+        "contacts": diagnosis.contacts,
+        "events": _events(diagnosis),
+        "judged": diagnosis.judged,
+        "unlisted": unlisted,
+        "adopted": diagnosis.adopted,
+    }
     if unlisted is not None:
-        u = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
-        where = whereabouts(diagnosis.evidence, diagnosis.outcome.after, unlisted.joint - 1)
-        law = (
-            f"follows {unlisted.form}, which would leave {number(unlisted.rmse_with_form)} {u}"
-            if unlisted.form
-            else "follows no law that both halves of the run agree on"
-        )
-        sentences.append(
-            f"Joint {unlisted.joint} keeps a residual of {number(unlisted.rmse)} {u} (baseline "
-            f"{number(unlisted.baseline)} {u}) that no listed effect accounts for; it {law}; "
-            f"{unit(where.words())}."
-        )
-        if diagnosis.adopted:
-            sentences.append(
-                "The law is adopted: the augmented model and its feedforward have it where the run has been, and it fades "
-                "outside of that."
-            )
-        elif unlisted.parameters:
-            sentences.append("--adopt puts the law into the augmented model and its feedforward.")
-    return sentences or [_nothing(diagnosis)]
+        values["unit"] = unit(diagnosis.model.arm.joints[unlisted.joint - 1].torque_unit)
+        values["where"] = whereabouts(diagnosis.evidence, outcome.after, unlisted.joint - 1)
+    return Prose("findings", **values).paragraphs("findings") or [_nothing(diagnosis)]
 
 
 def _events(diagnosis: Diagnosis) -> str:
@@ -79,16 +56,11 @@ def _events(diagnosis: Diagnosis) -> str:
 def _nothing(diagnosis: Diagnosis) -> str:
     """What can be said where nothing was found, with its number."""
     if not diagnosis.evidence.rows.any():
-        return "Nothing can be said of this run: no joint moves in it long enough."
+        return Prose("findings", moves=False)["nothing"]
     errors = diagnosis.errors()
     ratio = np.asarray(errors["before"], dtype=float) / np.asarray(errors["noise_floor"], dtype=float)
     most = float(np.nanmax(ratio)) if np.isfinite(ratio).any() else 0.0
-    size = f"At its largest the residual is {number(most, 2)} times the baseline"
-    if diagnosis.verdict == "cannot_tell":
-        return (
-            f"{size}; whether the arm has changed this model cannot tell by this run, for the reasons given."
-        )
-    return f"{size}, and no listed effect nor a law accounts for more of it than for the model's own shortcomings."
+    return Prose("findings", moves=True, most=most, verdict=diagnosis.verdict)["nothing"]
 
 
 def reasons(diagnosis: Diagnosis) -> list[str]:
@@ -113,12 +85,12 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     return [who[:1].upper() + who[1:] + apart, *(f"{unit(remedy(a))}." for a in faulty)]
 
 
-def rivals(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
+def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
     """For each effect found: what this motion cannot tell from it, with its share, and why and which motion could."""
     return [
         (
-            _label(effect),
-            [(f"{_label(r)} ({percent(r['share'])})", str(r["why"])) for r in effect["alternatives"]],
+            place(effect),
+            [(f"{place(r)} ({percent(r['share'])})", str(r["why"])) for r in effect["alternatives"]],
         )
         for effect in diagnosis.to_dict()["effects"]
         if effect["alternatives"]
@@ -128,10 +100,15 @@ def rivals(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:
 def alternatives(diagnosis: Diagnosis) -> list[str]:
     """The same as sentences of their own."""
     return [
-        f"Not told apart from {found}: {rival}. {why[:1].upper()}{why[1:]}."
-        for found, alike in rivals(diagnosis)
-        for rival, why in alike
+        f"Not told apart from {found}: {other}. {why[:1].upper()}{why[1:]}."
+        for found, alike in confounded(diagnosis)
+        for other, why in alike
     ]
+
+
+def all_added(diagnosis: Diagnosis) -> list[AddedEffect]:
+    """Effects and events found, as they join the model."""
+    return [*diagnosis.outcome.added(), *(contact.added for contact in diagnosis.contacts)]
 
 
 def nothing_to_supply(added: list[AddedEffect]) -> str:
@@ -148,12 +125,3 @@ def _why_not(added: AddedEffect) -> str:
     if added.effect.name == "friction_drift":
         return "friction that fades is gone once the joint is warm"
     return f"{effect_label(added.effect)} asks for none along this motion"
-
-
-def _label(effect: dict[str, object]) -> str:
-    joint, other = effect.get("joint"), effect.get("other_joint")
-    return effect_name(
-        str(effect["effect"]),
-        joint if isinstance(joint, int) else None,
-        other if isinstance(other, int) else None,
-    )

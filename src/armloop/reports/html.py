@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import matplotlib
+import msgspec
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup, escape
 from matplotlib.figure import Figure
@@ -85,29 +86,15 @@ class Section:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values, figures drawn."""
-        return {
-            "title": self.title,
-            "text": self.text,
-            "pictures": [[p.svg(), p.caption, p.summary] for p in self.pictures],
-            "tables": [asdict(table) for table in self.tables],
-            "formulas": self.formulas,
-            "notes": self.notes,
-        }
+        pictures = [[p.svg(), p.caption, p.summary] for p in self.pictures]
+        return {**vars(self), "pictures": pictures, "tables": [asdict(table) for table in self.tables]}
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Section:
         """Rebuild from :meth:`to_dict`."""
-        return Section(
-            data["title"],
-            data["text"],
-            [Picture(*parts) for parts in data["pictures"]],
-            [
-                Table(tuple(t["headers"]), tuple(map(tuple, t["rows"])), t["title"], tuple(t["left"]))
-                for t in data["tables"]
-            ],
-            [(summary, text) for summary, text in data["formulas"]],
-            data["notes"],
-        )
+        pictures = [Picture(*parts) for parts in data["pictures"]]
+        tables = msgspec.convert(data["tables"], list[Table])
+        return Section(**{**data, "pictures": pictures, "tables": tables})
 
     @property
     def anchor(self) -> str:

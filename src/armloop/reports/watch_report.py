@@ -19,9 +19,8 @@ from armloop.reports.watch_tables import (
     delay_words,
     moment,
     named,
-    place,
 )
-from armloop.reports.words import counted, number, percent, unit
+from armloop.reports.words import counted, number, percent, place, unit
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store

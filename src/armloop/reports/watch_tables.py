@@ -7,17 +7,10 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from armloop.reports.tables import Table, make_table
-from armloop.reports.words import counted
+from armloop.reports.words import counted, place
 
 if TYPE_CHECKING:
     from armloop.watch import Outcome
-
-
-def place(item: dict[str, Any]) -> str:
-    """An effect and where it is, such as ``viscous friction, joint 2``."""
-    joints = [str(j) for j in (item.get("joint"), item.get("other_joint")) if j is not None]
-    words = str(item["effect"]).replace("_", " ")
-    return f"{words}, joint {' and '.join(joints)}" if joints else words
 
 
 def moment(when: float) -> str:

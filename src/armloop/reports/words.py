@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -98,6 +98,11 @@ def effect_name(name: str, joint: int | None, other_joint: int | None = None) ->
     if other_joint is not None:
         return f"{plain}, joints {joint} and {other_joint}"
     return plain if joint is None else f"{plain}, joint {joint}"
+
+
+def place(item: Mapping[str, Any]) -> str:
+    """An effect's entry in a file as its name with its joints."""
+    return effect_name(item["effect"], item.get("joint"), item.get("other_joint"))
 
 
 def effect_label(effect: Effect) -> str:

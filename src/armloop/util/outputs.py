@@ -140,13 +140,7 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
     folder = Path(path)
     _check_name(str(path), option)
     try:
-        existing = folder
-        while _status(existing) is None:
-            existing = existing.parent
-        if not existing.is_dir():
-            raise InputError(f"{existing}: is a file; {option} must name a folder")
-        if not os.access(existing, os.W_OK | os.X_OK):
-            raise InputError(f"{existing}: cannot be written to; choose another folder for {option}")
+        _existing(folder, option, "name")
         for name in names:
             target(folder / name)
         if _guard is not None:
@@ -170,21 +164,25 @@ def take_file(path: str | Path | None, option: str) -> None:
         raise InputError(
             f"{path}: is given to {_guard.taken[real]} and to {option}; give each a name of its own"
         )
-    existing = real.parent
     try:
-        while _status(existing) is None:
-            existing = existing.parent
-        if not existing.is_dir():
-            raise InputError(f"{existing}: is a file; {option} must lie in a folder")
-        if not os.access(existing, os.W_OK | os.X_OK):
-            raise InputError(f"{existing}: cannot be written to; choose another folder for {option}")
-        longest = os.pathconf(existing, "PC_NAME_MAX")
+        longest = os.pathconf(_existing(real.parent, option, "lie in"), "PC_NAME_MAX")
     except OSError as error:
         raise InputError(f"{option} {path}: cannot be written ({error.strerror or error})") from error
     if len(os.fsencode(real.name)) > longest:
         raise InputError(
             f"{real.name[:40]}…: longer than {longest} bytes; shorten the name that {option} gives"
         )
+
+
+def _existing(folder: Path, option: str, must: str) -> Path:
+    """The folder, or the nearest one above it that is there; raises `InputError` where nothing can be made in it."""
+    while _status(folder) is None:
+        folder = folder.parent
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is a file; {option} must {must} a folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{folder}: cannot be written to; choose another folder for {option}")
+    return folder
 
 
 def _check_name(where: str, option: str) -> None:

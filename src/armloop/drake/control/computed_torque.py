@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
+from armloop.drake.control.pid import check_gains
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
@@ -41,16 +42,7 @@ class AccelerationGains:
     def __post_init__(self) -> None:
         if self.ki is None:
             object.__setattr__(self, "ki", np.zeros_like(np.atleast_1d(np.asarray(self.kp, dtype=float))))
-        for name in ("kp", "kd", "ki"):
-            value = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
-            object.__setattr__(self, name, value)
-            if (
-                value.ndim != 1
-                or value.shape != self.kp.shape
-                or not np.isfinite(value).all()
-                or (value < 0).any()
-            ):
-                raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
+        check_gains(self, "kp", "kd", "ki")
 
     @staticmethod
     def critical(n: int, bandwidth: float = 20.0) -> AccelerationGains:

@@ -15,6 +15,16 @@ from armloop.drake.scalar_types import scalar_template
 from armloop.util.arrays import Array
 
 
+def check_gains(gains: Any, *names: str) -> None:
+    """Make fields arrays (n,); raises `ValueError` when they are not finite, of at least 0, as many as the first."""
+    for name in names:
+        value = np.atleast_1d(np.asarray(getattr(gains, name), dtype=float))
+        object.__setattr__(gains, name, value)
+        alike = value.ndim == 1 and value.shape == getattr(gains, names[0]).shape
+        if not (alike and np.isfinite(value).all() and (value >= 0).all()):
+            raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
+
+
 @dataclass(frozen=True, eq=False)
 class PidGains:
     """Gains (n,): kp N*m/rad, ki N*m/(rad s), kd N*m*s/rad (N/m, .. for a prismatic joint).
@@ -27,16 +37,7 @@ class PidGains:
     kd: Array
 
     def __post_init__(self) -> None:
-        for name in ("kp", "ki", "kd"):
-            value = np.atleast_1d(np.asarray(getattr(self, name), dtype=float))
-            object.__setattr__(self, name, value)
-            if (
-                value.ndim != 1
-                or value.shape != self.kp.shape
-                or not np.isfinite(value).all()
-                or np.any(value < 0)
-            ):
-                raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
+        check_gains(self, "kp", "ki", "kd")
 
     @staticmethod
     def paper(n: int) -> PidGains:

@@ -7,7 +7,7 @@ upper bound for the noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -78,10 +78,6 @@ class Parts:
             f"it predictable from the motion: a law is missing"
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return {**vars(self)}
-
 
 def parts_of(witness: Witness, progress: Progress = silent) -> list[Parts]:
     """Parts of every joint's torque energy on the rows that judge."""
@@ -127,7 +123,7 @@ def merged(parts: list[Parts], outside: Any = None) -> list[dict[str, Any]]:
     Args:
         outside: (n,) of :func:`outside_trained_range`; left away by default.
     """
-    found = [one.to_dict() for one in parts]
+    found = [asdict(one) for one in parts]
     if outside is not None:
         for entry, share in zip(found, outside, strict=True):
             entry["outside_trained_range"] = float(share)

@@ -9,7 +9,7 @@ must keep its phase from block to block, and help on blocks left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +122,7 @@ def _residuals(
     model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
 ) -> tuple[list[Residual], float]:
     """Per joint, what the model leaves of the unfiltered torque where the joint moves; and the sample period, s."""
-    fine = Conditioning(**{**model.conditioning.to_dict(), "oversampling": 1e9})
+    fine = replace(model.conditioning, oversampling=1e9)
     runs = samples.motion.runs()
     collected: list[list[tuple[Array, Array, Index]]] = [[] for _ in range(model.arm.n)]
     following = number = 0

@@ -86,6 +86,11 @@ class Estimate:
         )
 
 
+def entry(name: str, joint: int | None, other_joint: int | None = None) -> dict[str, Any]:
+    """An effect's name and joints as in ``diagnosis.json``."""
+    return {"effect": name, "joint": joint, **({} if other_joint is None else {"other_joint": other_joint})}
+
+
 @dataclass(frozen=True, eq=False)
 class Context:
     """What an effect may look at: the arm, the motion, and what the known model says of it.

@@ -1,4 +1,4 @@
-"""Explained share of the residual: of the effect found, and of its rivals."""
+"""Explained share of the residual: of the effect found, and of what it is confounded with."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from armloop.diagnosis import Diagnosis
 from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, panels, polish
 from armloop.reports.words import effect_label, percent
 
-_MOST_RIVALS = 4
+_MOST_ALIKE = 4
 _INCHES_PER_LETTER = 0.085
 
 
@@ -17,8 +17,8 @@ def shares_figure(diagnosis: Diagnosis) -> Figure:
     bars: list[tuple[str, float, bool]] = []
     for found in diagnosis.outcome.found:
         bars.append((effect_label(found.effect), found.share, True))
-        rivals = sorted(found.rivals, key=lambda rival: -rival[1])[:_MOST_RIVALS]
-        bars += [(f"alike: {effect_label(effect)}", share, False) for effect, share in rivals]
+        alike = sorted(found.rivals, key=lambda one: -one[1])[:_MOST_ALIKE]
+        bars += [(f"alike: {effect_label(effect)}", share, False) for effect, share in alike]
     made = figure(9.5, 1.0 + 0.42 * max(1, len(bars)))
     axes = panels(
         made,
