@@ -10,6 +10,7 @@ from armloop.api.model import Model
 from armloop.api.reading import as_logs, require_some
 from armloop.api.score import logs_for
 from armloop.api.shown import displayed, page
+from armloop.commands.arguments import MOST_PROCESSES
 from armloop.commands.diagnose import Diagnose as Command
 from armloop.data.log import MotionLog
 from armloop.data.repeats import require_not_fitted
@@ -21,6 +22,7 @@ from armloop.model import AddedEffect, ReconstructedModel
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.util.errors import InputError
 from armloop.util.files import write_json, write_text
+from armloop.util.given import path_of, require
 from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ class Diagnosis:
 
     def save(self, folder: str | Path) -> Path:
         """Write what ``armloop diagnose --out`` does: diagnosis.json, model.json (augmented), report.html."""
-        place = Path(folder)
+        place = path_of(folder, "the folder")
         write_json(place / "diagnosis.json", self.to_dict())
         self.model.save(place / "model.json")
         self.report(place / "report.html")
@@ -106,11 +108,16 @@ def diagnose(
     Raises:
         InputError: a log does not fit the model.
     """
+    require("True or False", adopt=adopt)
+    require("a whole number or None", jobs=jobs)
+    require("a function", progress=progress)
     runs, after = (logs_for(model, as_logs(each)) for each in (logs, held_out))
     require_some(runs)
     require_not_fitted(after, runs, [log.name for log in after])
-    if jobs is not None and jobs < 1:
-        raise InputError(f"jobs {jobs}: give 1 or more processes, or None for as many as there are cores")
+    if jobs is not None and not 1 <= jobs <= MOST_PROCESSES:
+        raise InputError(
+            f"jobs {jobs}: give 1 or more processes, at most {MOST_PROCESSES}, or None for as many as there are cores"
+        )
     plain = Model.of(model).plain()
     found = run(plain, runs, progress, jobs)
     found = found.adopt() if adopt else found

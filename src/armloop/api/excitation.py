@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armloop.api.reading import as_arm
+from armloop.api.reading import as_arm, require_model
 from armloop.api.shown import displayed, page
 from armloop.commands.excite import Excite as Command
 from armloop.experiment.design import Excitation, Settings, baseline_noise
@@ -17,6 +17,7 @@ from armloop.model import ReconstructedModel
 from armloop.reports.excitation_tables import measures_table, use_table
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.errors import InputError
+from armloop.util.given import numbers_of, path_of, require
 from armloop.util.progress import Progress, silent
 from armloop.util.resources import urdf_names
 
@@ -36,7 +37,9 @@ class Reference:
 
     def save(self, path: str | Path, *, rate: float = Command.rate) -> int:
         """Write it as a table (CSV or Parquet) with so many rows per second; returns their number."""
-        return write_reference(str(path), self.result.reference, rate)
+        require("a finite number", rate=rate)
+        Command.checked(rate=rate)
+        return write_reference(str(path_of(path)), self.result.reference, rate)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop excite --json``."""
@@ -112,10 +115,22 @@ def excite(
     Raises:
         InputError: settings out of range, or limits that exclude any motion.
     """
+    require("a word or None", library=library)
+    require("a word", criterion=criterion)
+    require("a finite number or None", duration=duration, base_frequency=base_frequency)
+    require("a finite number", reserve=reserve)
+    require("a whole number or None", harmonics=harmonics, starts=starts)
+    require("a whole number", order=order, random=random, seed=seed)
+    require("a function", progress=progress)
     Command.checked(starts=starts)
+    if seed < 0:
+        raise InputError(f"seed must not be negative; it is {seed}")
     arm = as_arm(arm)
+    if model is not None:
+        require_model(model)
+        model.arm.require_same(arm, "the model")
     chosen = library or default_library(arm)
-    given = None if noise is None else tuple(map(float, noise))
+    given = None if noise is None else tuple(numbers_of(noise, (arm.n,), "noise").tolist())
     settings = Settings(
         library=chosen,
         criterion=criterion,
@@ -131,12 +146,11 @@ def excite(
         seed=seed,
     )
     stated = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
-    for name, values in stated.items():
-        if values is not None and len(values) != arm.n:
-            raise InputError(f"{name}: give {arm.n} numbers, one per joint of {arm.name}")
-    ranges = ranges_with(
-        arm, _plants(arm), **{key: None if x is None else tuple(map(float, x)) for key, x in stated.items()}
-    )
+    kept = {
+        name: None if values is None else tuple(numbers_of(values, (arm.n,), name).tolist())
+        for name, values in stated.items()
+    }
+    ranges = ranges_with(arm, _plants(arm), **kept)
     return Reference(run(arm, ranges, settings, model.predict if model else None, progress))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +27,7 @@ from armloop.reports.tables import formulas, score_table, steps_table
 from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
 from armloop.util.files import write_text
+from armloop.util.given import numbers_of, require
 from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -63,6 +64,9 @@ class Model(ReconstructedModel):
         """
         from armloop.reports.plots.torque import torque_figure
 
+        require("a finite number", seconds=seconds)
+        if seconds <= 0:
+            raise InputError(f"seconds must be above 0; it is {seconds:g}")
         chosen = self.logs if logs is None else as_logs(logs)
         if not chosen:
             raise InputError(
@@ -98,6 +102,7 @@ class Model(ReconstructedModel):
             InputError: the target is unknown, or the place cannot be written to.
             ModelError: the model cannot be said in this form.
         """
+        require("a word", to=to)
         samples = None if log is None else samples_for(self, as_logs(log))
         motion = None if samples is None else states_of(samples.motion, samples.moving)
         return write_export(self.plain(), to, path, motion)
@@ -172,7 +177,15 @@ def reconstruct(
     Raises:
         InputError: logs that do not fit the arm, an unknown option, or too little excitation.
     """
+    require("a word", method=method, estimator=estimator)
+    require("a word or None", library=library)
+    require("a finite number or None", penalty=penalty, cutoff=cutoff)
+    require("a whole number", max_order=max_order)
+    require("True or False", physical=physical)
+    require("a function", progress=progress)
     given, arm = as_logs(logs), as_arm(arm)
+    if not given:
+        raise InputError("reconstruct: there is no log; give one at least")
     units = {log.tau_unit for log in given}
     if len(units) != 1:
         raise InputError("reconstruct: give logs, all of them with torques or all with currents")
@@ -181,12 +194,41 @@ def reconstruct(
         sparse=Sparse(estimator, penalty),
         max_order=max_order,
         physical=physical,
-        snr=snr,
-        friction=None if friction is None else tuple(friction),
+        snr=_ratios(snr, method, library, cutoff),
+        friction=_laws(friction),
     )
-    conditioning = None if cutoff is None else Conditioning(cutoff_hz=cutoff)
+    conditioning = None if cutoff is None else Conditioning(cutoff_hz=float(cutoff))
     recorded: dict[str, Any] = {"unit": units.pop(), "drive_gains": None}
     account = run(given, arm, method, library, conditioning, options, progress, recorded)
     made = account.model
     kept = {f.name: getattr(made, f.name) for f in fields(ReconstructedModel)}
     return Model(**kept, account=account, logs=tuple(given))
+
+
+def _ratios(
+    snr: Sequence[float] | None, method: str, library: str | None, cutoff: float | None
+) -> tuple[float, float, float] | None:
+    """The signal-to-noise ratios; raises ``InputError`` where they are none, or would not be looked at."""
+    if snr is None:
+        return None
+    q, v, vdot = numbers_of(snr, (3,), "snr", "dB of q, v and vdot").tolist()
+    if min(q, v, vdot) <= 0:
+        raise InputError(f"snr must be positive ratios in dB; it is {(q, v, vdot)}")
+    if cutoff != 0:
+        raise InputError("snr is for samples that are no time series; give cutoff=0 with it")
+    if method != "stepwise" or library not in (None, "double-feature-set"):
+        raise InputError("snr works with the stepwise method and the library double-feature-set")
+    return q, v, vdot
+
+
+def _laws(friction: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The names of friction laws; raises ``InputError`` where they are no names."""
+    if friction is None:
+        return None
+    if isinstance(friction, str) or not isinstance(friction, Iterable):
+        raise InputError(
+            f"friction must be a list of laws, such as ['coulomb', 'viscous']; it is {friction!r:.60}"
+        )
+    laws = tuple(friction)
+    require("a word", **{f"friction {k + 1}": law for k, law in enumerate(laws)})
+    return laws

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Iterable, Sequence
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from armloop.data.log import MotionLog
 from armloop.data.log import read_log as read_file
 from armloop.data.repeats import require_different
+from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm, load_arm
-from armloop.util.errors import InputError, LogError
+from armloop.util.errors import ArmError, InputError, LogError
 
 
 def read_log(
@@ -56,13 +59,23 @@ def read_logs(
         if not found:
             raise LogError(f"{pattern}: matches no file; give the paths of CSV or Parquet motion logs")
     else:
-        found = list(paths)
+        try:
+            found = list(paths)
+        except TypeError:
+            raise LogError(
+                f"paths of logs must be text, a pathlib.Path or a list of them; it is of type {type(paths).__name__}"
+            ) from None
     arm = None if arm is None else as_arm(arm)
     return [read_log(path, arm, tau_unit=tau_unit, drive_gains=drive_gains) for path in found]
 
 
 def as_arm(arm: Arm | str | Path) -> Arm:
     """The arm itself, or the one of a name or URDF."""
+    if not isinstance(arm, Arm | str | PathLike):
+        raise ArmError(
+            "the arm must be an Arm, a built-in name or the path of a URDF; it is of type "
+            f"{type(arm).__name__}"
+        )
     return arm if isinstance(arm, Arm) else load_arm(arm)
 
 
@@ -82,3 +95,11 @@ def as_logs(logs: MotionLog | Sequence[MotionLog]) -> list[MotionLog]:
                 f"a log must be a MotionLog, such as of armloop.read_log; this is of type {type(log).__name__}"
             )
     return several
+
+
+def require_model(model: Any) -> None:
+    """Raise ``InputError`` for what is no model."""
+    if not isinstance(model, ReconstructedModel):
+        raise InputError(
+            f"a model must be one, such as of armloop.load_model; this is of type {type(model).__name__}"
+        )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.api.reading import as_logs, require_some
+from armloop.api.reading import as_logs, require_model, require_some
 from armloop.api.shown import displayed, page
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
@@ -82,10 +82,7 @@ def evaluate(model: ReconstructedModel, logs: MotionLog | Sequence[MotionLog]) -
 
 def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[MotionLog]:
     """The logs in the unit that the model predicts; raises ``InputError`` where they cannot be."""
-    if not isinstance(model, ReconstructedModel):
-        raise InputError(
-            f"a model must be one, such as of armloop.load_model; this is of type {type(model).__name__}"
-        )
+    require_model(model)
     gains = model.recorded["drive_gains"]
     predicts = "A" if model.recorded["unit"] == "A" and gains is None else "N*m"
     fitting = []

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from armloop.api.reading import require_model
 from armloop.api.shown import displayed, page
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import eta_table
 from armloop.reports.tracking_tables import metrics_table
 from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
+from armloop.util.given import path_of, require
 from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -93,11 +95,30 @@ def track(
 
     if isinstance(arm, Arm):
         raise InputError("track: arm must be the path of a URDF; the scenario reads it itself")
+    require("a function", progress=progress)
     plan = load_tracking(scenario, arm)
     if plan.pickup is not None or plan.wear is not None:
         raise InputError(f"{scenario}: is of a kind of its own; run `armloop track {scenario}`")
-    models = {"model": model} if isinstance(model, ReconstructedModel) else dict(model or {})
+    models = _by_name(model)
     for name, each in models.items():
         each.arm.require_same(plan.plant.arm, f"model {name}")
-    answer, results = run_scenario(plan, models, None if out is None else Path(out), progress)
+    answer, results = run_scenario(plan, models, None if out is None else path_of(out, "out"), progress)
     return Tracking(answer, results, plan.name.startswith("three_axis_tracking"))
+
+
+def _by_name(
+    model: ReconstructedModel | Mapping[str, ReconstructedModel] | None,
+) -> dict[str, ReconstructedModel]:
+    """The models by name; raises ``InputError`` for what is none, or a name that controllers cannot have."""
+    if model is None:
+        return {}
+    if not isinstance(model, Mapping):
+        require_model(model)
+        return {"model": model}
+    for name, each in model.items():
+        if not (isinstance(name, str) and name.replace("_", "").isalnum()):
+            raise InputError(f"model {name!r:.60}: a name has letters, digits and _ only, such as step3")
+        if name == "exact":
+            raise InputError("model 'exact': is the simulated arm's own model; choose another name")
+        require_model(each)
+    return dict(model)

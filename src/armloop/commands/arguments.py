@@ -101,7 +101,7 @@ def seed(text: str) -> int:
 
 
 #: Most processes that may be asked for.
-_PROCESSES = 1024
+MOST_PROCESSES = 1024
 
 
 def processes(what: str, default: int | None = None) -> Any:
@@ -110,6 +110,6 @@ def processes(what: str, default: int | None = None) -> Any:
 
 
 def _processes(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text[:9]) <= _PROCESSES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 1 to {_PROCESSES}")
+    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_PROCESSES:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 1 to {MOST_PROCESSES}")
     return int(text)

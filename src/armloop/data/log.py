@@ -21,6 +21,7 @@ from armloop.data.plausibility import Finding, Recorded, doubts, faults
 from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
+from armloop.util.given import path_of
 
 TAU_UNITS = ("N*m", "A")
 #: Under which a Parquet file says what its tau holds, where that is no torque.
@@ -135,14 +136,17 @@ class MotionLog:
         if joints is not None and n != joints:
             raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
         kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
-        cells = {
-            kind: np.stack(
-                [_numbers(frame[f"{kind}{j}"], f"{kind}{j}", name) for j in range(1, n + 1)], axis=1
-            )
-            for kind in kinds
-        }
+        seconds = _numbers(frame["time"], "time", name)
+        columns: dict[str, NDArray[np.float64]] = {}
+        for key in (f"{kind}{j}" for kind in kinds for j in range(1, n + 1)):
+            columns[key] = _numbers(frame[key], key, name)
+            if columns[key].shape != seconds.shape or seconds.ndim != 1:
+                raise LogError(
+                    f"{name}: {key} has the shape {columns[key].shape}, time {seconds.shape}; each column must be (N,)"
+                )
+        cells = {kind: np.stack([columns[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in kinds}
         return cls.from_arrays(
-            _numbers(frame["time"], "time", name),
+            seconds,
             cells["q"],
             cells["tau"],
             v=cells.get("v"),
@@ -234,8 +238,8 @@ def read_log(
 
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
     """
-    path = Path(path)
-    if tau_unit not in TAU_UNITS:
+    path = path_of(path, "the path of a log", LogError)
+    if not isinstance(tau_unit, str) or tau_unit not in TAU_UNITS:
         raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
     n, _ = check_header(path, joints)
     told = said_of(path, _UNIT)
@@ -279,11 +283,14 @@ def write_log(path: str | Path, log: MotionLog) -> None:
 
     Raises `LogError` for another suffix and `InputError` when the place cannot be written to.
     """
+    where = path_of(path, "the path of a log", LogError)
+    if not isinstance(log, MotionLog):
+        raise LogError(f"{where}: what is written must be a MotionLog; this is of type {type(log).__name__}")
     columns = {"time": log.time}
     for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
         if values is not None and not (kind == "v" and log.v_derived):
             columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
-    write_columns(Path(path), columns, said_of_log(log))
+    write_columns(where, columns, said_of_log(log))
 
 
 def said_of_log(log: MotionLog) -> dict[str, str]:
@@ -353,7 +360,7 @@ def _listed(names: Sequence[str], most: int = 6) -> str:
 
 
 def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float64]:
-    gains = np.asarray(drive_gains, dtype=np.float64).reshape(-1)
+    gains = _numbers(drive_gains, "drive_gains", str(path)).reshape(-1)
     if len(gains) != n:
         raise LogError(f"{path}: {len(gains)} drive gains for {n} joints; give one per joint, in N*m/A")
     for j, gain in enumerate(gains, start=1):

@@ -6,11 +6,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.filters import filter_reach
+from armloop.util.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +25,7 @@ class Motion:
     begins : (R,) instant at which the record of each run began, where a filter has cut its ends; None where it is that of
         the first sample
 
-    Raises `ValueError` when the shapes do not agree.
+    Raises `InputError` when the shapes do not agree.
     """
 
     time: NDArray[np.float64]
@@ -34,17 +36,20 @@ class Motion:
     begins: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
+        for key in ("time", "q", "v", "vdot", "starts"):
+            if not isinstance(getattr(self, key), np.ndarray):
+                object.__setattr__(self, key, _as_array(getattr(self, key), key))
         if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
-            raise ValueError(f"time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}")
+            raise InputError(f"time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}")
         if self.v.shape != self.q.shape or self.vdot.shape != self.q.shape:
-            raise ValueError(
+            raise InputError(
                 "q, v and vdot must have one shape; "
                 f"they are {self.q.shape}, {self.v.shape}, {self.vdot.shape}"
             )
-        if len(self.starts) == 0 or self.starts[0] != 0:
-            raise ValueError("starts must begin with 0, the first sample of the first run")
+        if self.starts.ndim != 1 or len(self.starts) == 0 or self.starts[0] != 0:
+            raise InputError("starts must begin with 0, the first sample of the first run")
         if self.begins is not None and self.begins.shape != self.starts.shape:
-            raise ValueError(
+            raise InputError(
                 f"begins must have the shape of starts, {self.starts.shape}; it is {self.begins.shape}"
             )
 
@@ -98,6 +103,19 @@ class Motion:
         return [slice(int(first), int(last)) for first, last in zip(self.starts, ends, strict=True)]
 
 
+def _as_array(given: Any, name: str) -> NDArray[Any]:
+    """What is no array yet as one; raises `InputError` where it holds no numbers."""
+    try:
+        found = np.asarray(given)
+    except ValueError:
+        found = np.asarray(None)
+    if found.dtype.kind not in "fiu":
+        raise InputError(
+            f"{name} of a motion must be an array of numbers; it is of type {type(given).__name__}"
+        )
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Samples:
     """A motion with its measured generalized forces.
@@ -110,7 +128,7 @@ class Samples:
     spans : (R, 2) first and last instant of the recorded run that each run of the motion was cut from; None where
         the runs are as they were recorded
 
-    Raises `ValueError` when the shapes do not agree.
+    Raises `InputError` when the shapes do not agree.
     """
 
     motion: Motion
@@ -122,7 +140,7 @@ class Samples:
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:
-            raise ValueError(
+            raise InputError(
                 f"tau and moving must have the shape of q, {self.motion.q.shape}; "
                 f"they are {self.tau.shape}, {self.moving.shape}"
             )

@@ -290,7 +290,7 @@ def _unlike(windows: _Windows) -> Iterator[Finding]:
     for j in moving:
         own = similar[j, j]
         twin = max((k for k in moving if k != j), key=lambda k: abs(similar[j, k]), default=j)
-        if abs(own) >= 0.5:
+        if own >= 0.5:
             continue
         if abs(similar[j, twin]) > 0.95:
             yield Finding(

@@ -22,6 +22,7 @@ from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError, ModelError
 from armloop.util.files import write_text
+from armloop.util.given import path_of
 
 TARGETS = ("urdf", "sdf", "mjcf", "drake", "c")
 _SAMPLES = 400
@@ -40,14 +41,14 @@ def export(
         InputError: the target is unknown, or the place cannot be written to.
         ModelError: the model cannot be said in this form at all.
     """
-    path = Path(path)
+    path = path_of(path, "the path of an export")
     in_amperes = model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None
+    if not isinstance(target, str) or target not in TARGETS:
+        raise InputError(f"--to {target}: unknown; it must be one of {', '.join(TARGETS)}")
     if in_amperes and target != "c":
         raise ModelError(
             f"the model predicts motor currents in A; {target} needs torques: reconstruct it with --drive-gains"
         )
-    if target not in TARGETS:
-        raise InputError(f"--to {target}: unknown; it must be one of {', '.join(TARGETS)}")
     motion = random_motion(model, _SAMPLES, seed=4) if motion is None else motion
     if target == "c":
         return _as_c(model, path, motion)

@@ -29,6 +29,7 @@ from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.arrays import Array
 from armloop.util.errors import ArmError, ModelError
 from armloop.util.files import write_json
+from armloop.util.given import numbers_of
 from armloop.util.reading import read_json
 
 SCHEMA = "armloop/model/2"
@@ -141,7 +142,7 @@ class ReconstructedModel:
             step: 1 gravity and dry friction, 2 with velocity terms, 3 the whole model with its effects.
             sensors: include what a faulty sensor adds to the record.
         """
-        self._check(motion)
+        self._check(motion, step)
         if step < 3 or not self.effects:
             rigid = self.rigid_body(motion, step)
             return rigid + self.friction.torque(motion, step, rigid)
@@ -214,18 +215,24 @@ class ReconstructedModel:
         """(n,) torque a controller should supply for one sample; sensor effects excluded.
 
         Friction with memory acts as if fully slid: a single sample has no history. ``sliding`` (n,) are the
-        velocities to take friction at, by default v.
+        velocities to take friction at, by default v. Raises ``InputError`` for what is not n finite numbers.
         """
-        return self.drive(step)(q, v, vdot, sliding)
+        n = self.arm.n
+        slip = None if sliding is None else _of_joints(sliding, n, "sliding")
+        return self.drive(step)(
+            _of_joints(q, n, "q"), _of_joints(v, n, "v"), _of_joints(vdot, n, "vdot"), slip
+        )
 
     def drive(self, step: int = 3) -> InverseDynamics:
         """The function behind :meth:`feedforward`, for loops in which a look-up counts."""
         if step not in self._pointwise:
+            _check_step(step)
             self._pointwise[step] = pointwise(*self._parts(step), step)
         return self._pointwise[step]
 
     def stacked_drive(self, step: int = 3) -> Callable[[Array], Sequence[float]]:
         """The same function of q, v and vdot behind each other in one array (3n,), -> n torques; the fastest there is."""
+        _check_step(step)
         return stacked(*self._parts(step), step)
 
     def _parts(
@@ -292,11 +299,30 @@ class ReconstructedModel:
             "uncertainty": self.uncertainty,
         }
 
-    def _check(self, motion: Motion) -> None:
+    def _check(self, motion: Motion, step: int) -> None:
+        if not isinstance(motion, Motion):
+            raise ModelError(
+                f"predict takes a Motion (armloop.data.motion) of arrays; this is of type {type(motion).__name__}. "
+                "For a log: model.score(log), model.plot(log)"
+            )
+        _check_step(step)
         if motion.joints != self.arm.n:
             raise ModelError(
                 f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
             )
+
+
+def _check_step(step: int) -> None:
+    """Raise ``ModelError`` for a step that no model has."""
+    if isinstance(step, bool) or step not in (1, 2, 3):
+        raise ModelError(f"step is {step!r}; it must be 1, 2 or 3")
+
+
+def _of_joints(x: Array, n: int, what: str) -> Array:
+    """(n,) finite numbers; an array that is right passes with little more than a look, for loops of control."""
+    if type(x) is np.ndarray and x.dtype == np.float64 and x.shape == (n,) and math.isfinite(x.dot(x)):
+        return x
+    return numbers_of(x, (n,), what)
 
 
 def load_model(path: str | Path, arm: Arm | None = None) -> ReconstructedModel:

@@ -10,6 +10,7 @@ import numpy as np
 from armloop.regression.estimators import LISTED, REGISTRY, Estimator, Problem, Reduction
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index
+from armloop.util.errors import InputError
 
 ESTIMATORS = tuple(LISTED)
 
@@ -31,7 +32,7 @@ class Sparse:
         correlation: number of consecutive samples that carry one sample's worth of independent noise.
 
     Raises:
-        ValueError: no estimator of this name.
+        InputError: no estimator of this name.
     """
 
     estimator: str = ESTIMATORS[0]
@@ -43,7 +44,7 @@ class Sparse:
     def __post_init__(self) -> None:
         if REGISTRY.find(self.estimator) is None:
             names = ", ".join([*ESTIMATORS, *REGISTRY.own_names()])
-            raise ValueError(f"unknown estimator {self.estimator!r}; there are: {names}")
+            raise InputError(f"unknown estimator {self.estimator!r}; there are: {names}")
 
     @property
     def how(self) -> Estimator:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, serial_chain
 from armloop.util.arrays import Array
 from armloop.util.errors import ArmError
+from armloop.util.given import path_of, require
 from armloop.util.quiet import quiet
 from armloop.util.resources import urdf_names, urdf_path
 
@@ -207,7 +208,15 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
         ArmError: the name is unknown, the file cannot be read or parsed or describes what cannot be, or the
             mechanism is not a single chain of revolute, continuous and prismatic joints.
     """
-    text_spec = str(spec)
+    text_spec = str(path_of(spec, "the arm", ArmError))
+    require("a word or None", tip=tip)
+    given: Any = lock
+    if not isinstance(given, Mapping | None):
+        kind = type(given).__name__
+        raise ArmError(
+            f"lock must be positions by joint, such as {{'finger_joint': 0.02}}; it is of type {kind}"
+        )
+    require("a finite number", **{f"lock {name}": value for name, value in (lock or {}).items()})
     path = urdf_path(text_spec) if text_spec in urdf_names() else Path(text_spec)
     try:
         found = path.is_file()

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from armloop.util.errors import InputError
+from armloop.util.given import path_of
 
 #: Beside outputs that have no room for a mark: what was written, by which command.
 RECORD = ".armloop"
@@ -78,7 +79,7 @@ def target(path: str | Path, option: str = "") -> Path:
     Raises:
         InputError: it is a folder or a device, it is read, or this command has not written it.
     """
-    where, name = str(path), option or "the output"
+    where, name = str(path_of(path, option or "the path of an output")), option or "the output"
     _check_name(where, name)
     try:
         real = Path(path).resolve()
@@ -137,7 +138,7 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
     Raises:
         InputError: it cannot be made or written to, another run writes into it, or a file in it is not to be replaced.
     """
-    folder = Path(path)
+    folder = path_of(path, option)
     _check_name(str(path), option)
     try:
         _existing(folder, option, "name")

@@ -15,6 +15,7 @@ from typing import Any
 
 from armloop.util import outputs
 from armloop.util.errors import InputError
+from armloop.util.given import path_of
 
 #: Bytes of a file of settings, and of a file of results.
 SETTINGS, RESULTS = 1 << 20, 1 << 26
@@ -28,7 +29,7 @@ def read_bytes(path: str | Path, most: int, error: type[InputError], what: str =
     Raises:
         InputError: of the given class; no such file, no regular file, not readable, or too large.
     """
-    path = Path(path)
+    path = path_of(path, f"the path of {what}", error)
     try:
         # Without blocking: a pipe that nobody writes to would be waited for.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

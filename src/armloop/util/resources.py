@@ -7,6 +7,7 @@ packed inside the package. Both are found by walking from this file, so no build
 from pathlib import Path
 
 from armloop.util.errors import ArmError, InputError, ScenarioError
+from armloop.util.given import path_of
 
 _PARTS = ("plants", "collection")  # YAML files that scenarios and collections draw on
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -46,9 +47,10 @@ def find_scenario(spec: str | Path) -> tuple[Path, str | None]:
 
     Raises `ScenarioError` when there is no such file.
     """
-    file, colon, name = str(spec).rpartition(":")
+    spec = str(path_of(spec, "the scenario", ScenarioError))
+    file, colon, name = spec.rpartition(":")
     if not colon or Path(spec).is_file():
-        file, name = str(spec), ""
+        file, name = spec, ""
     path = scenario_path(file) if file in scenario_names() else Path(file)
     if not path.is_file():
         known = ", ".join(each for each in scenario_names() if each not in _PARTS)

@@ -14,6 +14,7 @@ from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
+from armloop.model.pointwise import InverseDynamics
 from armloop.util.arrays import Array
 
 FRICTION_SOURCES = ("reference", "state", "none")
@@ -101,7 +102,7 @@ def ComputedTorque_(T: type) -> Any:
             self._arguments = model, gains
             self._options: dict[str, Any] = {"friction_at": friction_at, "period": period}
             n = self._n = len(gains.kp)
-            self._model, self._friction_at = model, friction_at
+            self._drive, self._friction_at = _drive(model), friction_at
             if T is not float:
                 assert isinstance(model, ReconstructedModel)
                 self._equations = ModelEquations(model, functions_of(T))
@@ -124,7 +125,7 @@ def ComputedTorque_(T: type) -> Any:
 
         def set_model(self, model: InverseDynamicsModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
-            self._model = model
+            self._drive = _drive(model)
             self._arguments = model, self._arguments[1]
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
@@ -148,9 +149,7 @@ def ComputedTorque_(T: type) -> Any:
 
         def _torque(self, q: list, v: list, vdot: list, sliding: list, context: Any) -> np.ndarray:
             if T is float:
-                tau = self._model.feedforward(
-                    np.array(q), np.array(v), np.array(vdot), sliding=np.array(sliding)
-                )
+                tau = self._drive(np.array(q), np.array(v), np.array(vdot), np.array(sliding))
                 if not isfinite(sum(tau.tolist())):
                     time = context.get_time()
                     raise RuntimeError(f"the model's torque is not finite at t = {time:.4f} s: {tau}")
@@ -182,3 +181,10 @@ def ComputedTorque_(T: type) -> Any:
 
 
 ComputedTorque = with_signature(ComputedTorque_[None])
+
+
+def _drive(model: InverseDynamicsModel) -> InverseDynamics:
+    """A model's torque at one sample, without the checks of what a caller of `feedforward` hands in."""
+    if isinstance(model, ReconstructedModel):
+        return model.drive()
+    return lambda q, v, vdot, sliding=None: model.feedforward(q, v, vdot, sliding=sliding)

@@ -1,0 +1,67 @@
+"""Type checks of what Python code hands in: paths, numbers, words; what a shell can give only as text is checked there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+from numbers import Integral, Real
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armloop.util.errors import InputError, one_line
+
+if TYPE_CHECKING:
+    from armloop.util.arrays import Array
+
+#: Characters of a value that a message shows.
+_SHOWN = 60
+
+
+def path_of(given: Any, what: str = "the path", error: type[InputError] = InputError) -> Path:
+    """The path that was given; raises ``InputError`` (of the given class) where it is neither text nor a path."""
+    if isinstance(given, str) or (isinstance(given, PathLike) and isinstance(given.__fspath__(), str)):
+        return Path(given)
+    raise error(f"{what} must be text or a pathlib.Path; it is of type {type(given).__name__}")
+
+
+def _is_number(x: Any) -> bool:
+    return type(x) is not bool and isinstance(x, Real) and isfinite(float(x))
+
+
+#: What an option can be, by the words that a message says it with.
+_KINDS: dict[str, Callable[[Any], bool]] = {
+    "a word": lambda x: isinstance(x, str),
+    "a finite number": _is_number,
+    "a whole number": lambda x: isinstance(x, Integral) and not isinstance(x, bool),
+    "True or False": lambda x: type(x).__name__ in ("bool", "bool_"),  # numpy's, too
+    "a function": callable,
+}
+
+
+def require(kind: str, **given: Any) -> None:
+    """Raise ``InputError`` unless every option is of a kind, such as ``"a word"``, or ``"a finite number or None"``."""
+    alone = kind.removesuffix(" or None")
+    for name, value in given.items():
+        if not (_KINDS[alone](value) or (value is None and alone != kind)):
+            raise InputError(f"{name} must be {kind}; it is {_shown(value)}")
+
+
+def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one per joint") -> Array:
+    """What was given as an array of finite numbers of a shape; raises ``InputError`` where it is none."""
+    import numpy as np  # not for those who only name a path
+
+    try:
+        found = np.asarray(given)
+        fits = found.dtype.kind in "fiu" and found.shape == shape
+    except (TypeError, ValueError):
+        fits = False
+    if not fits or not np.isfinite(found).all():
+        size = " x ".join(map(str, shape))
+        raise InputError(f"{what} must be {size} finite numbers, {each}; it is {_shown(given)}")
+    return found.astype(np.float64)
+
+
+def _shown(value: Any) -> str:
+    text = one_line(repr(value))
+    return text if len(text) <= _SHOWN else f"of type {type(value).__name__}"
