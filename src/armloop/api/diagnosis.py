@@ -42,9 +42,9 @@ class Diagnosis:
     """
 
     def __init__(
-        self, found: Found, before: ReconstructedModel, logs: Sequence[MotionLog], closing: Closing
+        self, found: Found, before: ReconstructedModel, logs: Sequence[MotionLog], compensation: Closing
     ) -> None:
-        self._found, self._closing = found, closing
+        self._found, self._compensation = found, compensation
         self._names = [log.name for log in logs]
         self.before = Model.of(before)
         self.verdict: str = found.verdict
@@ -54,13 +54,13 @@ class Diagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
-        return {**self._found.to_dict(), **self._closing.to_dict()}
+        return {**self._found.to_dict(), **self._compensation.to_dict()}
 
     def report(self, path: str | Path) -> Path:
         """Write the page of ``armloop diagnose``, without a network; raises ``InputError`` if it cannot be written."""
         from armloop.reports.diagnosis_report import diagnosis_report
 
-        write_text(path, diagnosis_report(self._found, self.before, self._names, self._closing))
+        write_text(path, diagnosis_report(self._found, self.before, self._names, self._compensation))
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
@@ -82,7 +82,7 @@ class Diagnosis:
         return f"<armloop.Diagnosis {self.verdict}{': ' + found if found else ''}>"
 
     def __str__(self) -> str:
-        return diagnosis_table(self._found, self._closing)
+        return diagnosis_table(self._found, self._compensation)
 
     def _repr_html_(self) -> str:
         return page(str(self), self.plot())
@@ -121,5 +121,5 @@ def diagnose(
     plain = Model.of(model).plain()
     found = run(plain, runs, progress, jobs)
     found = found.adopt() if adopt else found
-    closing = close(plain, found.model, found.samples, after)
-    return Diagnosis(found, model, runs, closing)
+    compensation = close(plain, found.model, found.samples, after)
+    return Diagnosis(found, model, runs, compensation)

@@ -35,16 +35,16 @@ def run(options: Diagnose) -> None:
 
     folder = out_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
     model, logs = model_and_logs(options)
-    apart = held_out_logs(options, model, logs)
+    held_out = held_out_logs(options, model, logs)
     wanted = wish(options, model)
     result = run(model, logs, progress(options), options.jobs)
     result = result.adopt() if options.adopt else result
-    closing = close(model, result.model, result.samples, apart)
-    answer = {**result.to_dict(), **closing.to_dict()}
+    compensation = close(model, result.model, result.samples, held_out)
+    answer = {**result.to_dict(), **compensation.to_dict()}
     planned = None if wanted is None else plan(str(options.next_run), result, wanted, progress(options))
     if planned is not None:
         answer["next_run"] = planned.to_dict()
-    page = diagnosis_report(result, model, [log.name for log in logs], closing)
+    page = diagnosis_report(result, model, [log.name for log in logs], compensation)
     write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")
     write_text(folder / "report.html", page)
@@ -53,7 +53,7 @@ def run(options: Diagnose) -> None:
     if options.json:
         print_json(answer)
         return
-    print(diagnosis_table(result, closing))
+    print(diagnosis_table(result, compensation))
     if planned is not None:
         print("\n" + planned.words())
     print(f"\nwritten: {folder}/diagnosis.json, model.json (augmented), report.html")

@@ -20,7 +20,7 @@ from armloop.util.errors import LogError
 
 _OWN = re.compile(r"(q|v|tau|vdot)\d{1,3}|time")
 # A run that follows another starts so many sample periods later: clearly a gap.
-_APART = 4 * GAP_PERIODS
+_GAP = 4 * GAP_PERIODS
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
     for index, one in enumerate(parts):
         time = _spread(one.log.time, one.starts)
         if index:
-            step = max(1.0, _APART * one.log.period)
+            step = max(1.0, _GAP * one.log.period)
             shift = last + step
             first, epoch = epochs[0], epochs[index]
             if first is not None and epoch is not None and epoch - first > last:
@@ -340,10 +340,10 @@ def _spread(time: Array, starts: Sequence[int]) -> Array:
     steps = np.diff(time)
     inside = np.ones(len(steps), dtype=bool)
     inside[[start - 1 for start in starts if 0 < start < len(time)]] = False
-    apart = max(1.0, _APART * float(np.median(steps[inside]))) if inside.any() else 1.0
+    least = max(1.0, _GAP * float(np.median(steps[inside]))) if inside.any() else 1.0
     for start in starts:
         if 0 < start < len(time):
-            missing = apart - (time[start] - time[start - 1])
+            missing = least - (time[start] - time[start - 1])
             if missing > 0:
                 time[start:] += missing
     return time

@@ -166,10 +166,10 @@ def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array
     fitted = start + change
     left = np.sqrt(np.mean((columns @ fitted - wanted) ** 2, axis=0)) / scale
     full += fitted[: 11 * n]
-    apart = np.zeros(n)
+    offsets = np.zeros(n)
     if constants.any():
-        apart = np.where(np.abs(fitted[11 * n :]) > _NO_BODY * scale, fitted[11 * n :], 0.0)
-    return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0), apart
+        offsets = np.where(np.abs(fitted[11 * n :]) > _NO_BODY * scale, fitted[11 * n :], 0.0)
+    return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0), offsets
 
 
 def _constants(model: ReconstructedModel) -> Array:

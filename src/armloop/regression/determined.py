@@ -20,7 +20,7 @@ DEPENDENT = 1e-8
 _SMALL = 1e-6
 
 
-def told_apart(G: Array, tolerance: float = DEPENDENT) -> tuple[Index, Array]:
+def identifiable(G: Array, tolerance: float = DEPENDENT) -> tuple[Index, Array]:
     """Columns whose coefficients are determined, given that the others' are put into them.
 
     Args:

@@ -46,16 +46,16 @@ def ladder_table(result: CrossValidation) -> Table | None:
     Errors are means over the reconstructions, joints count if most reconstructions took the rung for them.
     """
     ladders = [fit.model.history.get("friction_ladder") for _, fit in result.results]
-    climbed: list[list[dict[str, Any]]] = [ladder for ladder in ladders if ladder]
-    if not climbed:
+    compared: list[list[dict[str, Any]]] = [ladder for ladder in ladders if ladder]
+    if not compared:
         return None
     rows: list[list[object]] = []
-    for name in dict.fromkeys(rung["rung"] for ladder in climbed for rung in ladder):
-        rungs = [rung for ladder in climbed for rung in ladder if rung["rung"] == name]
-        before, after = (float(np.mean([rung[key] for rung in rungs])) for key in ("before", "after"))
-        refused = [rung["refused"] for rung in rungs if rung["refused"] is not None]
-        taken = [joint for rung in rungs for joint in rung["joints"]]
-        usual = [j for j in sorted(set(taken)) if 2 * taken.count(j) > len(rungs)]
+    for name in dict.fromkeys(one["rung"] for ladder in compared for one in ladder):
+        same = [one for ladder in compared for one in ladder if one["rung"] == name]
+        before, after = (float(np.mean([one[key] for one in same])) for key in ("before", "after"))
+        refused = [one["refused"] for one in same if one["refused"] is not None]
+        taken = [joint for one in same for joint in one["joints"]]
+        usual = [j for j in sorted(set(taken)) if 2 * taken.count(j) > len(same)]
         joints = ", ".join(map(str, usual)) or MISSING
         would_be = number(float(np.mean(refused))) if refused else MISSING
         rows.append([name, number(before), number(after), would_be, joints])

@@ -69,20 +69,20 @@ def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[S
     return [verdict, Section("Residual", say.paragraphs("residual"), pictures)]
 
 
-def compensation_section(diagnosis: Diagnosis, closing: Closing) -> Section:
+def compensation_section(diagnosis: Diagnosis, compensation: Closing) -> Section:
     """What a controller now adds, and the errors on whole runs that were not fitted."""
-    changes = bool(closing.feedforward.largest.any())
+    changes = bool(compensation.feedforward.largest.any())
     say = Prose(
         "diagnosis",
-        compensation=closing,
-        same=[f"{j + 1}" for j in np.flatnonzero(closing.feedforward.largest == 0)],
+        compensation=compensation,
+        same=[f"{j + 1}" for j in np.flatnonzero(compensation.feedforward.largest == 0)],
         nothing_to_supply=None if changes else nothing_to_supply(all_added(diagnosis)),
     )
     return Section(
         "What it changes",
         say.paragraphs("compensation"),
-        [Picture(feedforward_figure(diagnosis, closing), say["feedforward"])] if changes else [],
-        compensation_tables(diagnosis, closing),
+        [Picture(feedforward_figure(diagnosis, compensation), say["feedforward"])] if changes else [],
+        compensation_tables(diagnosis, compensation),
     )
 
 
@@ -90,7 +90,7 @@ def diagnosis_report(
     diagnosis: Diagnosis,
     model: ReconstructedModel,
     log_names: Sequence[str],
-    closing: Closing | None = None,
+    compensation: Closing | None = None,
 ) -> str:
     """One HTML page on a diagnosis; ``model`` is the model before, without the effects."""
     found = [one.effect for one in diagnosis.outcome.found]
@@ -105,8 +105,8 @@ def diagnosis_report(
     folded = [("The model as formulas, one per joint", formulas(model))]
     models = Section("The model", say.paragraphs("model"), formulas=folded)
     sections = diagnosis_sections(diagnosis, log_names)
-    if closing is not None:
-        sections.append(compensation_section(diagnosis, closing))
+    if compensation is not None:
+        sections.append(compensation_section(diagnosis, compensation))
     return render(
         Report(
             f"Diagnosis: {headline(diagnosis)}",

@@ -91,10 +91,10 @@ def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not
 
 
 def feedforward_table(
-    diagnosis: Diagnosis, closing: Closing, title: str | None = "Torque that the controller now adds"
+    diagnosis: Diagnosis, compensation: Closing, title: str | None = "Torque that the controller now adds"
 ) -> Table:
     """RMS and largest change of the feedforward along the run, beside the RMS torque measured."""
-    change = closing.feedforward
+    change = compensation.feedforward
     measured = np.sqrt(np.mean(diagnosis.samples.tau**2, axis=0))
     rows = [
         [
@@ -112,11 +112,11 @@ def feedforward_table(
 
 
 def held_out_table(
-    closing: Closing, arm: Arm, title: str | None = "Whole runs that were not fitted, RMSE"
+    compensation: Closing, arm: Arm, title: str | None = "Whole runs that were not fitted, RMSE"
 ) -> Table:
     """RMSE and nRMSE per run and joint, of the model before and the augmented one."""
     rows: list[list[object]] = []
-    for run in closing.held_out:
+    for run in compensation.held_out:
         old, new = run.before.moving, run.after.moving
         for j, joint in enumerate(arm.joints):
             rows.append(
@@ -142,13 +142,13 @@ def found_tables(diagnosis: Diagnosis) -> list[Table]:
     return [*tables, errors_table(diagnosis)]
 
 
-def compensation_tables(diagnosis: Diagnosis, closing: Closing) -> list[Table]:
+def compensation_tables(diagnosis: Diagnosis, compensation: Closing) -> list[Table]:
     """What a controller adds, where it does, and errors on whole runs that were not fitted, where there are any."""
-    tables = [feedforward_table(diagnosis, closing)] if closing.feedforward.largest.any() else []
-    return [*tables, *([held_out_table(closing, diagnosis.model.arm)] if closing.held_out else [])]
+    tables = [feedforward_table(diagnosis, compensation)] if compensation.feedforward.largest.any() else []
+    return [*tables, *([held_out_table(compensation, diagnosis.model.arm)] if compensation.held_out else [])]
 
 
-def diagnosis_table(diagnosis: Diagnosis, closing: Closing | None = None) -> str:
+def diagnosis_table(diagnosis: Diagnosis, compensation: Closing | None = None) -> str:
     """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
     sentences = [*findings(diagnosis), *reasons(diagnosis), *blame(diagnosis)]
     parts = [f"Verdict: {diagnosis.verdict}", "\n".join(map(_wrapped, sentences))]
@@ -156,10 +156,10 @@ def diagnosis_table(diagnosis: Diagnosis, closing: Closing | None = None) -> str
     for found, alike in confounded(diagnosis):
         lines = [_wrapped(f"- {other}: {why}") for other, why in alike]
         parts.append("\n".join([f"This motion cannot tell {found} from", *lines]))
-    if closing is not None:
-        if not closing.feedforward.largest.any():
+    if compensation is not None:
+        if not compensation.feedforward.largest.any():
             parts.append(nothing_to_supply(all_added(diagnosis)))
-        parts += map(str, compensation_tables(diagnosis, closing))
+        parts += map(str, compensation_tables(diagnosis, compensation))
     return "\n\n".join(parts)
 
 

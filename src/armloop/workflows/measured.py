@@ -85,8 +85,8 @@ def run_measured(folder: Path, progress: Progress) -> MeasuredResult:
     from armloop.reports.diagnosis_report import diagnosis_report
 
     model.save(folder / "model.json")
-    closing = close(model, diagnosis.model, diagnosis.samples)
-    write_text(folder / "report.html", diagnosis_report(diagnosis, model, [pushed.name], closing))
+    compensation = close(model, diagnosis.model, diagnosis.samples)
+    write_text(folder / "report.html", diagnosis_report(diagnosis, model, [pushed.name], compensation))
     write_json(folder / "measured.json", result.to_dict())
     return result
 

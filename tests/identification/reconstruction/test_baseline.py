@@ -9,7 +9,7 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion, Samples
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction.block_length import Apart
+from armloop.identification.reconstruction.block_length import Blocks
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.tally import Tally
 from armloop.laws.friction import FrictionLaw
@@ -48,7 +48,7 @@ def test_only_a_log_too_short_for_held_out_blocks_is_weighed_by_all_of_it(short,
     motion = fourier_motion(15.0, 125.0, 3)
     log = measured(motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v, 3, 0.01)
     asked = []
-    monkeypatch.setattr(Apart, "too_short", property(lambda self: short))
+    monkeypatch.setattr(Blocks, "too_short", property(lambda self: short))
     monkeypatch.setattr(
         sys.modules[
             "armloop.identification.reconstruction.reconstruct"

@@ -11,7 +11,7 @@ import pytest
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import ShortRunError
 from armloop.identification.reconstruction import block_length
-from armloop.identification.reconstruction.block_length import Apart, independent_blocks
+from armloop.identification.reconstruction.block_length import Blocks, independent_blocks
 
 RNG = np.random.default_rng(3)
 
@@ -91,9 +91,9 @@ def test_without_a_filter_or_a_long_run_blocks_stay_as_long_as_they_are(
     arm: Any = None
     logs: Any = [SimpleNamespace(read=lambda: None)] * 3
     how: Any = SimpleNamespace(cutoff_hz=1.0, reach=0.4)
-    assert independent_blocks(arm, logs, how, 9.0, 5) == Apart(9.0, 0.4, 0.0)
+    assert independent_blocks(arm, logs, how, 9.0, 5) == Blocks(9.0, 0.4, 0.0)
     how.cutoff_hz = -1.0
-    assert independent_blocks(arm, logs, how, 9.0, 5) == Apart(9.0, 0.0, 0.0)
+    assert independent_blocks(arm, logs, how, 9.0, 5) == Blocks(9.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from armloop.identification.reconstruction import (
     stepwise,
     torque_checks,
 )
-from armloop.identification.reconstruction.block_length import Apart
+from armloop.identification.reconstruction.block_length import Blocks
 from armloop.identification.reconstruction.inner_folds import InnerFolds
 from armloop.identification.reconstruction.physical import Body, physical_cuts, physics_notes
 from armloop.identification.reconstruction.step import PARTS, Candidates, StepPlan, candidates_of
@@ -27,7 +27,7 @@ from armloop.laws.friction import FrictionTerm
 
 
 def samples(lengths: tuple[int, ...], period: float = 0.1, cutoff: float = 0.0) -> Samples:
-    """Runs of so many samples, 5 s apart."""
+    """Runs of so many samples, 5 s blocks."""
     N, starts = sum(lengths), np.cumsum([0, *lengths[:-1]])
     time = np.arange(N) * period + 5.0 * (np.searchsorted(starts, np.arange(N), side="right") - 1)
     motion = Motion(time, *np.zeros((3, N, 1)), starts)
@@ -92,9 +92,9 @@ class TestInnerFolds:
 
 class TestBlockLength:
     def test_blocks_of_another_length_keep_their_margins_as_far_as_they_go_in(self) -> None:
-        apart = Apart(8.0, 2.0, 2.0)
-        assert apart.within(8.0) == apart and not apart.too_short
-        assert apart.within(4.0) == Apart(4.0, 1.0, 2.0) and apart.within(4.0).too_short
+        blocks = Blocks(8.0, 2.0, 2.0)
+        assert blocks.within(8.0) == blocks and not blocks.too_short
+        assert blocks.within(4.0) == Blocks(4.0, 1.0, 2.0) and blocks.within(4.0).too_short
 
     def test_the_middle_of_a_motion(self) -> None:
         given = samples((11,))
@@ -138,9 +138,9 @@ class TestBlockLength:
         how: Any = SimpleNamespace(cutoff_hz=0.5, reach=1.0)
         given: Any = [SimpleNamespace(read=lambda: None)] * logs
         arm: Any = None
-        assert block_length.independent_blocks(arm, given, how, seconds, 5) == Apart(*expected, correlation)
+        assert block_length.independent_blocks(arm, given, how, seconds, 5) == Blocks(*expected, correlation)
         how.cutoff_hz = 0.0
-        assert block_length.independent_blocks(arm, given, how, seconds, 5) == Apart(seconds, 0.0, 0.0)
+        assert block_length.independent_blocks(arm, given, how, seconds, 5) == Blocks(seconds, 0.0, 0.0)
 
     def test_a_block_holds_five_periods_of_the_filter(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(block_length, "preprocess", lambda logs, how: samples((50,)))
@@ -148,7 +148,7 @@ class TestBlockLength:
         how: Any = SimpleNamespace(cutoff_hz=10.0, reach=0.05)
         given: Any = [SimpleNamespace(read=lambda: None)]
         arm: Any = None
-        assert block_length.independent_blocks(arm, given, how, 9.0, 5) == Apart(0.5, 0.1, 0.1)
+        assert block_length.independent_blocks(arm, given, how, 9.0, 5) == Blocks(0.5, 0.1, 0.1)
 
 
 class TestRipple:
@@ -291,8 +291,8 @@ class TestPhysics:
         found = physical._violated(body, np.array([2.0]), np.array([[0.1]]), np.random.default_rng(0))
         # 2 (1/2 + cos q) < 0.2: beyond the angle whose cosine is -0.4
         assert len(found) and (np.abs(found) > np.arccos(-0.4) - 1e-6).all()
-        apart = np.abs(found - found.T)[~np.eye(len(found), dtype=bool)]
-        assert (apart > 0.05 * 6.0).all()
+        blocks = np.abs(found - found.T)[~np.eye(len(found), dtype=bool)]
+        assert (blocks > 0.05 * 6.0).all()
         flat = replace(body, mass=lambda theta, q: np.ones((len(q), 1, 1)))
         assert physical._violated(
             flat, np.array([2.0]), np.array([[0.1]]), np.random.default_rng(0)

@@ -74,7 +74,7 @@ def told_apart(first: int, second: int) -> Criterion:
     return measure
 
 
-def unexplained(rivalries: Sequence[tuple[int, Sequence[int]]], enough: float) -> Criterion:
+def unexplained(confounded: Sequence[tuple[int, Sequence[int]]], enough: float) -> Criterion:
     """How much of a torque its rivals cannot stand for, the worst of several torques first.
 
     T-optimality (Atkinson and Fedorov, "The design of experiments for discriminating between two rival models",
@@ -83,13 +83,13 @@ def unexplained(rivalries: Sequence[tuple[int, Sequence[int]]], enough: float) -
     counting for `enough` more than it has: a torque that drowns in noise is no evidence, however odd its shape.
 
     Args:
-        rivalries: a column and the columns that may stand for it, each.
+        confounded: a column and the columns that may stand for it, each.
         enough: information beyond which only the part that is left counts; the columns are in noise levels.
     """
 
     def measure(F: Array) -> tuple[float, Array]:
         values, slopes = [], []
-        for column, others in rivalries:
+        for column, others in confounded:
             by = list(others)
             x = np.linalg.solve(F[np.ix_(by, by)] + _RIDGE * np.eye(len(by)), F[by, column])
             way = np.zeros(len(F))

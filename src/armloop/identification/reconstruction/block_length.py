@@ -31,7 +31,7 @@ _SHORTEST = 5.0
 
 
 @dataclass(frozen=True)
-class Apart:
+class Blocks:
     """Blocks in which data are held out.
 
     Attributes:
@@ -44,7 +44,7 @@ class Apart:
     margin: float
     correlation: float
 
-    def within(self, seconds: float) -> Apart:
+    def within(self, seconds: float) -> Blocks:
         """The same distances in blocks of another length, as far as they go in."""
         return replace(self, seconds=seconds, margin=min(self.margin, seconds / _LENGTH))
 
@@ -56,7 +56,7 @@ class Apart:
 
 def independent_blocks(
     arm: Arm, logs: Sequence[LogSource], how: Conditioning, seconds: float, folds: int
-) -> Apart:
+) -> Blocks:
     """Blocks at least ``seconds`` long, longer where the residual remembers for longer, if the data are long enough.
 
     Args:
@@ -64,7 +64,7 @@ def independent_blocks(
         folds: every so many blocks one is held out.
     """
     if how.cutoff_hz <= 0:
-        return Apart(seconds, 0.0, 0.0)
+        return Blocks(seconds, 0.0, 0.0)
     some = [logs[k] for k in np.unique(np.linspace(0, len(logs) - 1, _LOGS).astype(int))]
     parts, covered = [], 0.0
     for log in some:
@@ -75,13 +75,13 @@ def independent_blocks(
         covered += samples.motion.samples * samples.period
         parts.append(_middle(samples, _SAMPLES // len(some)))
     if not parts:
-        return Apart(seconds, how.reach, 0.0)
+        return Blocks(seconds, how.reach, 0.0)
     covered *= len(logs) / len(some)
     correlation = _correlation(arm, parts)
     margin = max(how.reach, correlation)
     longest = max(covered / (folds * FEWEST_BLOCKS), _SHORTEST / how.cutoff_hz)
     length = min(max(seconds, _LENGTH * margin), longest)
-    return Apart(length, min(margin, length / _LENGTH), correlation)
+    return Blocks(length, min(margin, length / _LENGTH), correlation)
 
 
 def _correlation(arm: Arm, parts: Sequence[Samples]) -> float:

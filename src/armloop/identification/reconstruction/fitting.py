@@ -60,7 +60,7 @@ class Fitting:
     def chosen(self) -> tuple[FrictionSelection, Laws]:
         """The laws that the training data show, and every joint's friction chosen beside them."""
         self._progress("choosing each joint's friction on held-out data")
-        ladder, samples = self._climbed(), self._training.window.samples
+        ladder, samples = self._selected(), self._training.window.samples
         laws = search(self._arm, samples, self._bench(ladder), self._options, self._progress)
         while laws.chosen:
             ladder = self._beside(laws, ladder)
@@ -81,9 +81,9 @@ class Fitting:
         design = self._own.with_laws(laws)
         self._design = design.loaded(self._window_solution(design, ladder).theta)
         self._progress("choosing each joint's friction anew beside the laws found")
-        return without_offsets(self._climbed(), laws.constant_at())
+        return without_offsets(self._selected(), laws.constant_at())
 
-    def _climbed(self) -> FrictionSelection:
+    def _selected(self) -> FrictionSelection:
         extra = self._design.laws.count
         priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
         ladder = select_friction(

@@ -165,12 +165,12 @@ def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Ext
         return [t for t in named if fading or t.kind != "smooth_sign" or t.parameter == sharpest]
 
     kept = []
-    for rung in ladder:
-        elements = [allowed(own) for own in rung.elements]
-        whole = elements == rung.elements
+    for extension in ladder:
+        elements = [allowed(own) for own in extension.elements]
+        whole = elements == extension.elements
         called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
         if called:
-            kept.append(rung if whole else Extension(" and ".join(called), elements))
+            kept.append(extension if whole else Extension(" and ".join(called), elements))
     return kept
 
 
@@ -191,15 +191,15 @@ def select_friction(
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
     ladder = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
-    candidates = [[term for rung in ladder for term in rung.elements[j]] for j in range(arm.n)]
+    candidates = [[term for extension in ladder for term in extension.elements[j]] for j in range(arm.n)]
     pooled = data.pooled(design, candidates, options.physical)
-    ends = np.cumsum([0] + [len(rung.elements[0]) for rung in ladder])
+    ends = np.cumsum([0] + [len(extension.elements[0]) for extension in ladder])
     places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
     state = _State(pooled, places, priors)
     comparisons, tell = [], paced(progress)
-    for level, rung in enumerate(ladder):
+    for level, extension in enumerate(ladder):
         tell(f"friction: extension {level + 1} of {len(ladder)}")
-        comparisons.append(state.take(level, rung.name, one_by_one=data.plenty))
+        comparisons.append(state.take(level, extension.name, one_by_one=data.plenty))
     if data.plenty:
         comparisons.append(state.eliminate_backward())
     notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
@@ -303,10 +303,10 @@ class _State:
 def _notes(comparisons: list[Comparison]) -> list[str]:
     """What each rung brought, in a line each."""
     notes = []
-    for rung in comparisons:
-        who = "joints " + ", ".join(str(joint + 1) for joint in rung.joints) if rung.joints else "no joint"
-        change = f"{rung.before:.4f} → {rung.after:.4f}"
-        if rung.refused is not None:
-            change = f"{rung.before:.4f}; it would be {rung.refused:.4f}"
-        notes.append(f"friction, {rung.rung}: {who}; held-out nRMSE {change}")
+    for one in comparisons:
+        who = "joints " + ", ".join(str(joint + 1) for joint in one.joints) if one.joints else "no joint"
+        change = f"{one.before:.4f} → {one.after:.4f}"
+        if one.refused is not None:
+            change = f"{one.before:.4f}; it would be {one.refused:.4f}"
+        notes.append(f"friction, {one.rung}: {who}; held-out nRMSE {change}")
     return notes

@@ -115,7 +115,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
             ):  # terms found in little data may leave no room for M; the notes then say so
                 pass
         body = Lagrangian(energy, theta[: energy.count])
-        history = {"friction_ladder": [rung.to_dict() for rung in ladder.comparisons], **physics}
+        history = {"friction_ladder": [one.to_dict() for one in ladder.comparisons], **physics}
         effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
         friction = found_friction(ladder.laws, theta[r:])
         return Found(arm, [body], friction, history=history, effects=effects), theta

@@ -18,7 +18,7 @@ from armloop.identification.reconstruction.bandwidth import (
     choose_bandwidth,
     highest_corner,
 )
-from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Apart, independent_blocks
+from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks, independent_blocks
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.encoder_zeros import encoder_zeros
 from armloop.identification.reconstruction.excitation import check_recorded
@@ -157,13 +157,13 @@ def reconstruct(
         # samples that are no time series show the first library alone what it needs
         wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
     usual = [conditioning or one.conditioning for one in wanted]
-    bandwidth, apart = held_apart(kept or logs, arm, usual, settings, conditioning is None, progress)
-    settings = replace(settings, block_seconds=apart.seconds, correlation_seconds=apart.correlation)
+    bandwidth, blocks = filter_and_blocks(kept or logs, arm, usual, settings, conditioning is None, progress)
+    settings = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
     zeros = None
     if kept and bandwidth.cutoff_hz > 0 and not METHODS[method].reference:
         filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
         aside = held_out_intervals(kept, filters, settings)
-        zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, apart.correlation)
+        zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
         logs = kept = zeros.corrected(kept)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
 
@@ -188,14 +188,14 @@ def reconstruct(
         if zeros is not None and zeros.found:
             found.history["encoder_zeros"] = zeros.to_dict(kept)
             found.notes += zeros.notes(arm)
-        return Attempt(library, how, data, found, apart.margin)
+        return Attempt(library, how, data, found, blocks.margin)
 
     if len(left) == 1:
         tried = [Contender(one, refused=refused.get(one, "")) for one in wanted]
         tried = [
             one if one.refused else replace(one, attempt=attempt(one.library), chosen=True) for one in tried
         ]
-        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, apart)
+        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, blocks)
     tried = [
         Contender(one, refused=refused[one])
         if one in refused
@@ -205,7 +205,7 @@ def reconstruct(
     tried = choose(tried)
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
-    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, apart)
+    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, blocks)
 
 
 def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> bool:
@@ -214,14 +214,14 @@ def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> 
     return bool(logs) and options.folds > 2 and count < 2 * FEWEST_BLOCKS
 
 
-def held_apart(
+def filter_and_blocks(
     logs: Sequence[LogSource],
     arm: Arm,
     usual: Sequence[Conditioning],
     options: Options,
     choosing: bool,
     progress: Progress,
-) -> tuple[Bandwidth, Apart]:
+) -> tuple[Bandwidth, Blocks]:
     """The low-pass, and the blocks that are held out: from it, too.
 
     How long blocks must be depends on the low-pass, and they are held out from its choice: where a lower corner asks for
@@ -232,22 +232,22 @@ def held_apart(
         choosing: whether the corner is chosen; else it is the usual one.
     """
 
-    def blocks(bandwidth: Bandwidth) -> Apart:
+    def blocks_at(bandwidth: Bandwidth) -> Blocks:
         return independent_blocks(arm, logs, bandwidth.suited(usual[0]), options.block_seconds, options.folds)
 
     if not choosing:
         bandwidth = Bandwidth(usual[0].cutoff_hz)
-        return bandwidth, blocks(bandwidth)
+        return bandwidth, blocks_at(bandwidth)
     progress("choosing the low-pass on blocks that judge nothing else")
     bandwidth = Bandwidth(highest_corner(logs, Conditioning()))
-    seconds, apart = 0.0, blocks(bandwidth)
-    while apart.seconds > seconds:
-        seconds, before = apart.seconds, bandwidth.cutoff_hz
+    seconds, blocks = 0.0, blocks_at(bandwidth)
+    while blocks.seconds > seconds:
+        seconds, before = blocks.seconds, bandwidth.cutoff_hz
         dealt = replace(options, block_seconds=seconds)
         bandwidth = choose_bandwidth(logs, arm, Conditioning(), dealt, usual)
         if bandwidth.cutoff_hz != before:
-            apart = blocks(bandwidth)
-    return bandwidth, apart.within(seconds)
+            blocks = blocks_at(bandwidth)
+    return bandwidth, blocks.within(seconds)
 
 
 def _finished(
@@ -259,7 +259,7 @@ def _finished(
     options: Options,
     progress: Progress,
     recorded: dict[str, Any] | None,
-    apart: Apart,
+    blocks: Blocks,
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
     (tried,) = [one.attempt for one in libraries if one.chosen]
@@ -278,10 +278,10 @@ def _finished(
         for one in (found, *([] if found.final is None else [found.final])):
             one.effects = (*one.effects, *ripple)
     notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
-    if apart.too_short:
+    if blocks.too_short:
         notes.append(
-            f"the residual remembers for {apart.correlation:.2g} s, and the logs are too short for held-out blocks of more "
-            f"than {apart.seconds:.2g} s: the held-out error may be too good"
+            f"the residual remembers for {blocks.correlation:.2g} s, and the logs are too short for held-out blocks of more "
+            f"than {blocks.seconds:.2g} s: the held-out error may be too good"
         )
     model = ReconstructedModel(
         arm=arm,
@@ -313,7 +313,7 @@ def _finished(
         model = replace(
             model, components=components, friction=last.law, effects=last.effects, history=history
         )
-    if apart.too_short:
+    if blocks.too_short:
         whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
         model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)

@@ -135,8 +135,8 @@ class Leftover:
             sums[0, label - 1] = np.sum(r[lag:] * r[:-lag], axis=0, where=rows)
             sums[1, label - 1] = np.sum(0.5 * (r[lag:] ** 2 + r[:-lag] ** 2), axis=0, where=rows)
             sums[2, label - 1] = rows.sum(axis=0)
-        apart = usable & chunk.independent[:, None]
-        total, count = np.sum(r**2, axis=0, where=apart), apart.sum(axis=0).astype(float)
+        independent = usable & chunk.independent[:, None]
+        total, count = np.sum(r**2, axis=0, where=independent), independent.sum(axis=0).astype(float)
         return Leftover(sums[0], sums[1], sums[2], total, count)
 
     def worst(self) -> tuple[float, int, int]:

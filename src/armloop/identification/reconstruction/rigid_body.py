@@ -117,7 +117,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         inertial = body.parameters[: 10 * arm.n].tolist()
         history = {
             "inertial": inertial,
-            "friction_ladder": [rung.to_dict() for rung in ladder.comparisons],
+            "friction_ladder": [one.to_dict() for one in ladder.comparisons],
             **physics,
         }
         effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))

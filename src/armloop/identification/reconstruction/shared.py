@@ -15,7 +15,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm
-from armloop.regression.determined import combination, told_apart
+from armloop.regression.determined import combination, identifiable
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
@@ -106,7 +106,7 @@ def check_rank(G: Array, base: BaseParameters) -> None:
     Args:
         G: (r, r) products of the base parameters' columns.
     """
-    weak = base.count - len(told_apart(G)[0])
+    weak = base.count - len(identifiable(G)[0])
     if weak > base.count // 3:
         raise ExcitationError(
             f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
@@ -120,7 +120,7 @@ def undetermined_notes(G: Array, base: BaseParameters) -> list[str]:
     Args:
         G: (r, r) products of the base parameters' columns.
     """
-    kept, sums = told_apart(G)
+    kept, sums = identifiable(G)
     if len(kept) == base.count:
         return []
     leads = [name.split(" ")[0] for name in base.names]

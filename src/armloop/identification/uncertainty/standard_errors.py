@@ -28,7 +28,7 @@ from armloop.identification.uncertainty.propagated import leading, to_dict
 from armloop.identification.uncertainty.sandwich import Equations
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
-from armloop.regression.determined import combination, told_apart
+from armloop.regression.determined import combination, identifiable
 from armloop.util.arrays import Array
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
@@ -78,7 +78,7 @@ class Errors:
         own = self.equations.stage[:, None] == self.equations.stage
         G = np.where(own, self.equations.jacobian.sum(axis=0), 0.0)
         order = np.argsort([unknown.kind != "friction" for unknown in self.unknowns], kind="stable")
-        kept, sums = told_apart(G[np.ix_(order, order)])
+        kept, sums = identifiable(G[np.ix_(order, order)])
         lost = sorted(set(range(len(order))) - set(kept.tolist()))
         if not lost:
             return []

@@ -12,9 +12,9 @@ from armloop.reports.residuals import time_axis
 from armloop.reports.words import number, unit
 
 
-def feedforward_figure(diagnosis: Diagnosis, closing: Closing) -> Figure:
+def feedforward_figure(diagnosis: Diagnosis, compensation: Closing) -> Figure:
     """One row per joint whose feedforward changes: the torque measured, and the change."""
-    samples, change = diagnosis.samples, closing.feedforward
+    samples, change = diagnosis.samples, compensation.feedforward
     time, clock = time_axis(samples.motion)
     changed = [int(j) for j in np.flatnonzero(change.largest > 0)]
     made = figure(10.5, 1.45 * len(changed) + 0.9)

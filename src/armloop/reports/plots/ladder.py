@@ -25,25 +25,25 @@ from armloop.reports.words import percent
 _INCHES_PER_LETTER = 0.085
 
 
-def ladder_figure(rungs: Sequence[Mapping[str, Any]]) -> Figure:
+def ladder_figure(comparisons: Sequence[Mapping[str, Any]]) -> Figure:
     """A line per law in the order of trial: the held-out nRMSE with it, filled where joints took it.
 
-    ``rungs`` are those of a model's history (``friction_ladder``).
+    ``comparisons`` are those of a model's history (``friction_ladder``).
     """
-    names = [str(rung["rung"]) for rung in rungs]
-    made = figure(9.5, 1.25 + 0.36 * len(rungs))
+    names = [str(one["rung"]) for one in comparisons]
+    made = figure(9.5, 1.25 + 0.36 * len(comparisons))
     axes = panels(made, left=0.4 + _INCHES_PER_LETTER * max(map(len, names), default=0))[0, 0]
-    for k, rung in enumerate(rungs):
-        taken = rung["refused"] is None and bool(rung["joints"])
-        led = rung["after"] if rung["refused"] is None else rung["refused"]
+    for k, one in enumerate(comparisons):
+        taken = one["refused"] is None and bool(one["joints"])
+        led = one["after"] if one["refused"] is None else one["refused"]
         color = BLUE if taken else GREY
-        axes.plot([rung["before"], led], [k, k], color=color, linewidth=2.4 if taken else 1.2)
+        axes.plot([one["before"], led], [k, k], color=color, linewidth=2.4 if taken else 1.2)
         axes.plot(led, k, "o", color=color, markersize=8, fillstyle="full" if taken else "none")
-        joints = ", ".join(map(str, rung["joints"]))
+        joints = ", ".join(map(str, one["joints"]))
         text = f"{percent(led)}   joint{'s' if ',' in joints else ''} {joints}" if taken else percent(led)
         axes.annotate(
             text,
-            (max(led, rung["before"]), k),
+            (max(led, one["before"]), k),
             textcoords="offset points",
             xytext=(12, 0),
             va="center",
@@ -52,15 +52,15 @@ def ladder_figure(rungs: Sequence[Mapping[str, Any]]) -> Figure:
         )
     axes.set_xscale("log")
     polish(axes, "held-out nRMSE, mean of the joints", "", grid="x")
-    axes.set_yticks(range(len(rungs)), names)
+    axes.set_yticks(range(len(comparisons)), names)
     axes.tick_params(axis="y", labelsize=10)
     axes.xaxis.set_major_formatter(FuncFormatter(percent_tick))
-    errors = [x for rung in rungs for x in (rung["before"], rung["after"], rung["refused"]) if x]
+    errors = [x for one in comparisons for x in (one["before"], one["after"], one["refused"]) if x]
     low, high = min(errors, default=1e-3), max(errors, default=1.0)
     axes.xaxis.set_minor_formatter(log_percent(low, high))
     axes.tick_params(which="minor", colors=MUTED, labelsize=8)
     axes.set_xlim(0.85 * low, high * (high / low) ** 0.25 * 1.5)
-    axes.set_ylim(len(rungs) - 0.4, -0.6)
+    axes.set_ylim(len(comparisons) - 0.4, -0.6)
     made.legend(
         [Line2D([], [], color=BLUE, marker="o"), Line2D([], [], color=GREY, marker="o", fillstyle="none")],
         ["taken", "tried, not taken"],
