@@ -64,8 +64,8 @@ class TestView:
     BLOCK = np.array([1, 1, 2, 3, 4, 1, 2, 3, 9])
     ROWS = np.array([0, 1, 1, 1, 1, 1, 1, 1, 0], dtype=bool)
 
-    def view(self, noticeable: float = 0.0, block: Any = BLOCK) -> _View:
-        return _View(self.ROWS, self.JOINT, np.array(block), np.full(3, noticeable))
+    def view(self, noticeable: float = 0.0, block: Any = BLOCK, usual: float = 0.0) -> _View:
+        return _View(self.ROWS, self.JOINT, np.array(block), np.full(3, noticeable), np.full(3, usual))
 
     def fit(self, held_out: Any) -> Any:
         return fitted(self.JOINT, self.BLOCK, held_out)
@@ -95,6 +95,9 @@ class TestView:
         np.testing.assert_allclose(found[0].ratios, np.log([4.0, 4.0, 1.0, 16.0]))
         assert self.view(9.74 / 4).gains(before, better)[0].share > 0
         assert self.view(9.76 / 4).gains(before, better)[0].share == 0.0
+        # half of it the model leaves at the reversals of its training logs, too, or less
+        assert self.view(usual=4.876 / 4).gains(before, better)[0].always
+        assert not self.view(usual=4.874 / 4).gains(before, better)[0].always
         # of nothing left there is still a number
         nothing = view._gain(before, self.fit([9.0, 0, 1, 1, 1, 0, 0, 0, 0]), 0)
         assert np.isfinite(nothing.ratios).all() and nothing.ratios[0] > 100
@@ -112,6 +115,11 @@ class TestGains:
             assert (best is not None) == named
         assert taken((Effect("a", 1), {0: gain(0.6)}), found=("b",)).best() is None
         assert taken().best() is None and taken((Effect("a", 1), {})).best() is None
+
+    def test_what_the_training_logs_show_too_was_always_there(self) -> None:
+        for always in (True, False):
+            best = taken((Effect("a", 1), {0: _Gain(0.9, SURE, always)})).best()
+            assert best is not None and best.always == always
 
     def test_the_largest_decides_the_joint_and_the_simplest_of_equals_is_named(self) -> None:
         simple, other, more = (
@@ -231,6 +239,15 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     )
     monkeypatch.setattr(reversals, "independent_rows", lambda samples: np.ones(6, dtype=bool))
     monkeypatch.setattr(reversals, "Outcome", lambda *of: of)
+    unclear: set[tuple[str, int]] = set()
+
+    def clear(own: Any, every: Any, settled: int) -> Any:
+        assert own.rows.all() and settled == 1
+        found = [one for one in every[0][1:] if (one.effect.name, one.effect.joint) not in unclear]
+        left = of(tuple(one.effect for one in found))
+        return SimpleNamespace(found=[*every[0][:1], *found], after=left, every=every)
+
+    monkeypatch.setattr(reversals, "clear", clear)
     turns = np.ones((6, 2), dtype=bool)
     monkeypatch.setattr(reversals, "turning", lambda motion, moving: turns)
     motion = Motion(np.arange(6.0), *np.zeros((3, 6, 2)), np.array([0]))
@@ -242,7 +259,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
             samples=samples,
             rows=rows,
             scale=scale,
-            model=SimpleNamespace(arm=None),
+            model=SimpleNamespace(arm=None, baseline={}),
             only=lambda own: run(own),
         )
 
@@ -259,21 +276,21 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     ]
     assert [one.shape for one in found.found] == ["shape of memory 1", "shape of memory 2"]
     assert found.before.tolist() == [2.0, 3.0] and found.after == pytest.approx([0.6, 1.2])
-    whole: Any = found.outcome
+    whole: Any = found.outcome.every  # type: ignore[attr-defined]
     assert whole[0][0] == "slide" and len(whole[0]) == 3 and whole[3] == "residual of 0"
     assert whole[1].effects == () and [e.joint for e in whole[2].effects] == [1, 2]
     assert found.evidence.rows.all() and len(told) == 2
+    # what is not clear of its stated error goes, and if nothing is left there is nothing to say
+    nobody, everybody = np.zeros((6, 2), dtype=bool), np.ones((6, 2), dtype=bool)
+    unclear.add(("memory", 2))
+    found = judge_reversals(run(nobody), outcome, everybody, told.append)
+    assert found is not None and [one.effect.joint for one in found.found] == [1]
+    assert found.after == pytest.approx([0.6, 3.0])
+    unclear.add(("memory", 1))
+    assert judge_reversals(run(nobody), outcome, everybody, told.append) is None
     # nothing at all where nothing may count
     none = np.zeros((6, 2), dtype=bool)
     assert judge_reversals(run(none), outcome, none, told.append) is None
-
-
-def test_the_sign_counts_where_it_moves_again_and_the_time_until_then() -> None:
-    v = np.array([1.0, 1.0, 0.0, 0.0, -1.0, 1.0, 1.0])[:, None]
-    moving = np.abs(v) > 0
-    # three steps of an eighth of a second are within four tenths, four are not
-    motion = Motion(0.125 * np.arange(7), v, v, v, np.array([0]))
-    assert np.flatnonzero(reversals.turning(motion, moving)).tolist() == [2, 3]
 
 
 def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(

@@ -268,10 +268,10 @@ class TestOutcomes:
 
         monkeypatch.setattr(searching, "_known", known)
 
-        def kept(*names: str) -> tuple[str, Any]:
+        def kept(*names: str, settled: int = 0) -> tuple[str, Any]:
             given = self.outcome(*names)
             fitted: Any = SimpleNamespace(clear=errors["".join(names)])
-            made = searching.clear(cast(Any, None), replace(given, after=fitted))
+            made = searching.clear(cast(Any, None), replace(given, after=fitted), settled)
             return "".join(f.shape for f in made.found), made.after.clear
 
         assert kept("a", "b", "c") == ("ac", (3.0, 3.1))
@@ -279,6 +279,11 @@ class TestOutcomes:
         errors["b"] = (3.5,)
         assert kept("a", "b") == ("b", (3.5,))
         assert kept("a") == ("", ())
+        # the first are not asked again
+        assert kept("a", settled=1) == ("a", (1.0,)) and kept("a", "b", settled=1) == ("ab", (2.9, 5.0))
+        assert kept("a", "b", "c", settled=1) == ("ac", (3.0, 3.1))
+        errors["a"], errors["ac"] = (1.0,), (3.0, 2.0)
+        assert kept("a", "b", "c", settled=1) == ("a", (1.0,))
 
     def test_the_strength_of_an_effect_is_what_the_others_leave(
         self, monkeypatch: pytest.MonkeyPatch

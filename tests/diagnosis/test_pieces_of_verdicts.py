@@ -294,7 +294,7 @@ class TestReversals:
         block = np.tile(np.repeat(np.arange(5), 4), 3)
         rows = np.arange(60) % 2 == 0
         rows[40:] = False
-        return _View(rows, joint, block, np.array([4.0, 1.0, 1.0]))
+        return _View(rows, joint, block, np.array([4.0, 1.0, 1.0]), np.zeros(3))
 
     def fit(self, *size: float) -> Any:
         held = np.repeat(np.array(size), 20)

@@ -10,16 +10,16 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.motion import Motion
+from armloop.data.reversals import at_reversals, turning
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose, reversals
-from armloop.diagnosis.reversals import turning
-from armloop.identification.scoring import score
+from armloop.identification.scoring import residual, score
 from armloop.laws.effects import effect as named
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.laws.hysteresis import stop_operator
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
+from armloop.reports.findings import findings
 from armloop.robot.kinematics import nominal_parameters
 
 LEVEL, WIDTH = np.array([3.0, 4.0, 2.0]), 0.01
@@ -38,8 +38,12 @@ def coulomb_and_viscous(baseline: MotionLog) -> ReconstructedModel:
     body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
     law = FrictionLaw(tuple((FrictionTerm("sign", float(f)), FrictionTerm("viscous", 1.0)) for f in LEVEL))
     bare = ReconstructedModel(three_axis(), (body,), law)
-    rmse = score(bare, preprocess([baseline], bare.conditioning)).moving
-    return replace(bare, baseline={**rmse, "worst": [2 * x for x in rmse["rmse"]]})
+    samples = preprocess([baseline], bare.conditioning)
+    rmse = score(bare, samples).moving
+    turns = turning(samples.motion, samples.moving)
+    there = at_reversals(samples, turns, samples.moving | turns)
+    turned = np.sqrt(np.mean(residual(bare, samples) ** 2, axis=0, where=there)).tolist()
+    return replace(bare, baseline={**rmse, "worst": [2 * x for x in rmse["rmse"]], "reversals": turned})
 
 
 def test_memory_that_the_models_baseline_has_too_is_found_at_every_joint() -> None:
@@ -50,6 +54,9 @@ def test_memory_that_the_models_baseline_has_too_is_found_at_every_joint() -> No
     assert {(e["effect"], e["joint"], e["condition"]) for e in answer["effects"]} == {
         ("presliding_hysteresis", joint, "reversals") for joint in (1, 2, 3)
     }
+    assert {effect["when"] for effect in answer["effects"]} == {"always"}
+    said = " ".join(findings(diagnosis))
+    assert said.count("of the error where the joint turns round. The model has lacked it all along") == 3
     for effect in answer["effects"]:
         parameters = {name: e["value"] for name, e in effect["parameters"].items()}
         assert parameters["level"] == pytest.approx(LEVEL[effect["joint"] - 1], rel=0.1)
@@ -61,6 +68,13 @@ def test_memory_that_the_models_baseline_has_too_is_found_at_every_joint() -> No
     assert (again["verdict"], again["effects"]) == ("no_effect", [])
 
 
+def test_memory_that_the_training_logs_do_not_show_has_come_since() -> None:
+    diagnosis = diagnose(coulomb_and_viscous(run(90, memory=False)), [run(7, memory=True)])
+    effects = diagnosis.to_dict()["effects"]
+    assert [(e["effect"], e["when"]) for e in effects] == 3 * [("presliding_hysteresis", "changed")]
+    assert "all along" not in " ".join(findings(diagnosis))
+
+
 @pytest.mark.parametrize("seed", [7, 8, 9])
 def test_a_clean_run_shows_nothing_at_its_reversals(seed: int) -> None:
     model = coulomb_and_viscous(run(90, memory=False))
@@ -69,58 +83,27 @@ def test_a_clean_run_shows_nothing_at_its_reversals(seed: int) -> None:
     assert "reversals" not in answer["error"]
 
 
-def test_a_joint_that_turns_around_does_not_rest() -> None:
-    time = np.arange(0.0, 4.0, 0.01)
-    v = np.column_stack(
-        [np.sin(np.pi * time), np.abs(np.sin(np.pi * time)), np.sign(time - 2) * (abs(time - 2) > 0.5)]
-    )
-    moving = np.abs(v) > 0.1
-    motion = Motion(time, np.zeros_like(v), v, np.zeros_like(v), np.array([0]))
-    turns = turning(motion, moving)
-    # the first turns around at 1, 2, 3 s; the second stops and goes on; the third rests for a second
-    assert np.count_nonzero(np.diff(turns[:, 0].astype(int)) > 0) == 3
-    assert turns[[100, 200, 300], 0].all() and not (turns[:, 0] & moving[:, 0]).any()
-    assert not turns[:, 1:].any()
-
-
-class TestTurning:
-    """One joint, a sample every 0.1 s; it counts as moving but in given samples."""
-
-    def turned(self, v: list[float], still: list[int], starts: tuple[int, ...] = (0,)) -> list[int]:
-        speeds = np.array(v, dtype=float)[:, None]
-        time = 0.1 * np.arange(len(v))
-        motion = Motion(time, 0 * speeds, speeds, 0 * speeds, np.array(starts))
-        moving = np.ones((len(v), 1), dtype=bool)
-        moving[still] = False
-        return np.flatnonzero(turning(motion, moving)[:, 0]).tolist()
-
-    def test_it_turns_if_it_moves_the_other_way_afterwards(self) -> None:
-        assert self.turned([1, 1, 0, -1, -1], [2]) == [2]
-        assert self.turned([1, 1, 0, 1, 1], [2]) == []
-        assert self.turned([1, 1, 0, -1, -1, 0, 1, 1], [2, 5]) == [2, 5]
-
-    def test_within_four_tenths_of_a_second(self) -> None:
-        # 0.3 s between the last sample that moves and the next, and 0.5 s
-        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3]) == [2, 3]
-        assert self.turned([1, 1, 0, 0, 0, 0, -1, -1], [2, 3, 4, 5]) == []
-
-    def test_what_a_run_begins_or_ends_with_is_no_turn_nor_is_what_two_runs_do(self) -> None:
-        assert self.turned([1, 0, -1, -1], [0, 1]) == self.turned([1, 1, -1, -1], [2, 3]) == []
-        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3], (0, 3)) == []
-        assert self.turned([9, 1, 1, 0, -1, -1], [3], (0, 1)) == [3]
-
-
 def test_an_error_at_reversals_is_noticeable_from_three_hundredths_of_the_torque() -> None:
     """Of the rows that count; in the baselines of the joints."""
     tau = np.array([[3.0, 99.0], [4.0, 2.0], [99.0, 2.0]])
     rows = np.array([[True, False], [True, True], [False, True]])
-    evidence: Any = SimpleNamespace(samples=SimpleNamespace(tau=tau), rows=rows, scale=np.array([0.5, 0.1]))
+    baseline: dict[str, Any] = {}
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(tau=tau),
+        rows=rows,
+        scale=np.array([0.5, 0.1]),
+        model=SimpleNamespace(baseline=baseline),
+    )
     stacked = SimpleNamespace(joint=np.array([0, 0, 1, 1]), block=np.arange(4))
     judged = np.array([[True, True], [False, True], [True, False]])
     fit: Any = SimpleNamespace(stacked=stacked)
     view = reversals._View.of(evidence, fit, judged)
     np.testing.assert_allclose(view.noticeable, [(0.03 / 0.5) ** 2 * 12.5, (0.03 / 0.1) ** 2 * 4.0])
     assert view.rows.tolist() == judged[rows].tolist() and view.block.tolist() == [0, 1, 2, 3]
+    # a model that does not say what it leaves at the reversals of its training logs
+    assert view.usual.tolist() == [0.0, 0.0]
+    baseline["reversals"] = [1.0, None]
+    assert reversals._View.of(evidence, fit, judged).usual.tolist() == [4.0, 0.0]
     evidence.rows = np.zeros((3, 2), dtype=bool)
     assert reversals._View.of(evidence, fit, judged).noticeable.tolist() == [0.0, 0.0]
 

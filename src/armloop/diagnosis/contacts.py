@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
-from armloop.diagnosis.reversals import turning
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect

@@ -143,7 +143,7 @@ class Diagnosis:
                 {
                     **added.to_dict(),
                     "share": found.share,
-                    "when": "changed",
+                    "when": "always" if found.always else "changed",
                     "probability": probability.of_effect(found.share, strength.times),
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),

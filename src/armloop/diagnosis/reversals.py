@@ -5,27 +5,26 @@ search, with as much around it as the filter smears. A joint that turns around i
 speed, and so its reversals are kept out, too. There alone does friction with memory differ from a step of the
 direction: among samples that slide it can hardly be seen, and no model's baseline says anything of it.
 
-So they are judged after the search, as a condition of their own. As there is no baseline to compare with, what is
-named must be plain: it at least halves the joint's error there, on blocks that were not fitted, and what it removes is
-a noticeable torque. The drives of an arm are alike: what is plain at one joint needs less at the others.
+So they are judged after the search, as a condition of their own. As no fit has seen them, what is named must be plain: it
+at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
+drives of an arm are alike: what is plain at one joint needs less at the others. What the model leaves at the reversals of
+its training logs, too, it has lacked all along; the rest has changed since.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 from scipy.stats import t
 
 from armloop.data.blocks import block_sums
-from armloop.data.motion import Motion
+from armloop.data.reversals import at_reversals, turning
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.search import Found, Outcome
+from armloop.diagnosis.search import Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
@@ -44,8 +43,8 @@ _CHANCE = 0.00135
 ALIKE = 0.1
 #: Effects that explain this much of what the chosen one explains are its alternatives.
 RIVAL_SHARE = 0.94
-#: A joint that has turned around within so many seconds did not rest; so long before and after belongs to it.
-TURN, AROUND = 0.4, 0.1
+#: It was there all along if the training logs show this part of it: from run to run reversals differ.
+MOSTLY = 0.5
 #: Fewest blocks with a reversal of a joint that tell anything of it.
 _FEWEST = 4
 
@@ -70,19 +69,6 @@ class AtReversals:
     after: Array
 
 
-def turning(motion: Motion, moving: Mask) -> Mask:
-    """(N, n) samples that do not count as moving although the joint only turns around, within :data:`TURN`."""
-    found = np.zeros_like(moving)
-    for run in motion.runs():
-        for j in range(motion.joints):
-            edges = np.flatnonzero(np.diff(moving[run, j].astype(np.int8))) + run.start
-            for last, end in pairwise(edges.tolist()):
-                back = motion.v[last, j] * motion.v[end + 1, j] < 0
-                if moving[last, j] and back and motion.time[end + 1] - motion.time[last] <= TURN:
-                    found[last + 1 : end + 1, j] = True
-    return found
-
-
 def judge_reversals(
     evidence: Evidence, outcome: Outcome, kept: Mask, progress: Progress
 ) -> AtReversals | None:
@@ -96,8 +82,7 @@ def judge_reversals(
     samples = evidence.samples
     turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
     own = evidence.only(evidence.rows | turns)
-    reach = round(AROUND / samples.period)
-    judged = binary_dilation(turns, np.ones((2 * reach + 1, 1))) & own.rows & kept
+    judged = at_reversals(samples, turns, own.rows & kept)
     start = known = Known.of(own, outcome.after.effects, outcome.after.shapes)
     view = _View.of(own, start.fit, judged)
     found: list[Found] = []
@@ -119,8 +104,12 @@ def judge_reversals(
     if not found:
         return None
     after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
-    whole = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
-    before, left = (np.sqrt(view.mean_squares(k.fit)) * own.scale for k in (start, after))
+    every = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
+    whole = clear(own, every, settled=len(outcome.found))
+    found = whole.found[len(outcome.found) :]
+    if not found:
+        return None
+    before, left = (np.sqrt(view.mean_squares(fit)) * own.scale for fit in (start.fit, whole.after))
     return AtReversals(found, whole, own, before, left)
 
 
@@ -140,19 +129,23 @@ def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """The rows at reversals of stacked rows (R,), and the least mean square per joint (n,) that is noticeable."""
+    """The rows at reversals of stacked rows (R,), and per joint (n,) the least mean square that is noticeable, and the one
+    that the model leaves at the reversals of its training logs; zero where nobody knows it.
+    """
 
     rows: Mask
     joint: NDArray[np.intp]
     block: NDArray[np.intp]
     noticeable: Array
+    usual: Array
 
     @staticmethod
     def of(evidence: Evidence, fit: Fit, judged: Mask) -> _View:
         samples, rows = evidence.samples, evidence.rows
         torque = np.sqrt(np.sum(samples.tau**2, axis=0, where=rows) / np.maximum(rows.sum(axis=0), 1))
-        noticeable = (NOTICEABLE * torque / evidence.scale) ** 2
-        return _View(judged[rows], fit.stacked.joint, fit.stacked.block, noticeable)
+        left = [x or 0.0 for x in evidence.model.baseline.get("reversals") or [0.0]]
+        noticeable, usual = ((x / evidence.scale) ** 2 for x in (NOTICEABLE * torque, np.array(left)))
+        return _View(judged[rows], fit.stacked.joint, fit.stacked.block, noticeable, usual)
 
     def mean_squares(self, fit: Fit) -> Array:
         """(n,) mean held-out squared error at reversals, weighted; NaN where there is none."""
@@ -182,16 +175,23 @@ class _View:
         before, after = current.held_out[mine] ** 2, trial.held_out[mine] ** 2
         gain = float(before.sum() - after.sum())
         sums = [np.maximum(block_sums(x, self.block[mine]), 1e-300) for x in (before, after)]
-        noticed = gain >= self.noticeable[j] * mine.sum()
-        return _Gain(gain / float(before.sum()) if noticed else 0.0, np.log(sums[0] / sums[1]))
+        noticed, always = (
+            gain >= self.noticeable[j] * mine.sum(),
+            MOSTLY * gain <= self.usual[j] * mine.sum(),
+        )
+        share = gain / float(before.sum()) if noticed else 0.0
+        return _Gain(share, np.log(sums[0] / sums[1]), bool(always))
 
 
 @dataclass(frozen=True, eq=False)
 class _Gain:
-    """Part of a joint's squared error at reversals that is removed, zero if hardly anything; log ratio per block."""
+    """Part of a joint's squared error at reversals that is removed, zero if hardly anything; log ratio per block; whether
+    the model leaves most of it at those of its training logs, too.
+    """
 
     share: float
     ratios: Array
+    always: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +244,7 @@ class _Gains:
         best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
         enough = RIVAL_SHARE * there[best]
         rivals = [(e, share) for e, share in there.items() if e is not best and share >= enough]
-        return Found(best, Shape.fixed(0.0), there[best], rivals)
+        return Found(best, Shape.fixed(0.0), there[best], rivals, self.by_effect[best][joint].always)
 
 
 def _positive(ratios: Array) -> bool:

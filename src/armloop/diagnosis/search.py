@@ -45,12 +45,14 @@ class Found:
     Attributes:
         share: part of the explainable held-out energy that it removes beside the others.
         rivals: effects that explain the run as well in its place, with their share.
+        always: whether the model has lacked it all along: its training logs show as much.
     """
 
     effect: Effect
     shape: Shape
     share: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
+    always: bool = False
 
 
 @dataclass(frozen=True)
@@ -221,14 +223,17 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     return outcome
 
 
-def clear(evidence: Evidence, outcome: Outcome) -> Outcome:
+def clear(evidence: Evidence, outcome: Outcome, settled: int = 0) -> Outcome:
     """The outcome without effects no coefficient of which is significant by its stated error (Wald test), the least first.
 
     What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that.
+
+    Args:
+        settled: so many, the first, are not asked again.
     """
     found, fitted = outcome.found, outcome.after
-    while found and min(fitted.clear) < SIGNIFICANCE:
-        least = int(np.argmin(fitted.clear))
+    while len(found) > settled and min(fitted.clear[settled:]) < SIGNIFICANCE:
+        least = settled + int(np.argmin(fitted.clear[settled:]))
         found = [f for k, f in enumerate(found) if k != least]
         fitted = _known(evidence, found).fit
     return Outcome(found, outcome.before, fitted, outcome.residual)

@@ -29,9 +29,10 @@ def headline(diagnosis: Diagnosis) -> str:
 def findings(diagnosis: Diagnosis) -> list[str]:
     """What was found, a sentence each, strongest first; what to do where a sensor is at fault."""
     outcome, unlisted = diagnosis.outcome, diagnosis.unlisted
+    turned = [] if diagnosis.reversals is None else diagnosis.reversals.found
     values: dict[str, object] = {
         "effects": [
-            (unit(added.effect.sentence(added.parameters)), found.share)
+            (unit(added.effect.sentence(added.parameters)), found, found in turned)
             for found, added in zip(outcome.found, outcome.added(), strict=True)
         ],
         "contacts": diagnosis.contacts,

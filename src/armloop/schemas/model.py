@@ -140,6 +140,7 @@ class BaselineData(Struct):
     rms: PerJointOrNull | None = None
     nrmse: PerJointOrNull | None = None
     worst: PerJointOrNull | None = None
+    reversals: PerJointOrNull | None = None
     samples: Count | None = None
 
 
@@ -263,7 +264,10 @@ def _agree(model: ModelData) -> None:
         *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
         ("friction", model.friction),
         ("recorded.drive_gains", model.recorded.drive_gains),
-        *((f"baseline.{key}", getattr(model.baseline, key)) for key in ("rmse", "rms", "nrmse", "worst")),
+        *(
+            (f"baseline.{key}", getattr(model.baseline, key))
+            for key in ("rmse", "rms", "nrmse", "worst", "reversals")
+        ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
         *zeros,
         *(

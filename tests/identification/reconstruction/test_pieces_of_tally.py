@@ -55,6 +55,31 @@ def test_squares_by_condition_and_by_block(part: Any, sorted_: bool, monkeypatch
     assert Tally.of(chunk(0.0), model, sorter, part).blocks.shape == (0, 2, 2)
 
 
+def test_squares_where_a_joint_turns_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
+    model: Any = None
+    turns = np.zeros((N, 2), dtype=bool)
+    turns[[8, 9, 29], [0, 0, 1]] = turns[20, 0] = True
+    monkeypatch.setattr(tally, "turning", lambda motion, moving: turns)
+    near = turns.copy()
+    near[[7, 10], 0] = True
+    asked: list[Any] = []
+
+    def around(samples: Any, turned: Any, counted: Any) -> Any:
+        asked.append((turned is turns, counted))
+        return near & counted
+
+    monkeypatch.setattr(tally, "at_reversals", around)
+    found = Tally.of(chunk(1.0), model, None)
+    held = (BLOCKS % 5 == 0)[:, None]
+    assert asked[0][0] and (asked[0][1] == ((MOVING | turns) & held)).all()
+    there = near & (MOVING | turns) & held
+    assert there.sum() > 2
+    np.testing.assert_allclose(found.reversals, [(LEFT**2 * there).sum(axis=0), there.sum(axis=0)])
+    # samples that are no time series turn nowhere
+    assert not Tally.of(chunk(0.0), model, None).reversals.any()
+
+
 def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
     model: Any = None
@@ -82,4 +107,4 @@ def test_relative_to_the_torque_where_a_joint_has_any() -> None:
     sums = np.zeros((2, 3, 2))
     sums[1] = [[40.0, 60.0], [80.0, 0.0], [20.0, 20.0]]
     # a joint without torque has no relative error: the other one's alone
-    assert Tally({0: sums}, blocks, 20).relative_blocks().tolist() == [0.5]
+    assert Tally({0: sums}, blocks, 20, np.zeros((2, 2))).relative_blocks().tolist() == [0.5]

@@ -304,8 +304,8 @@ def _finished(
     if options.parts:
         progress("what a flexible regression still finds in what the model leaves")
         parts = held_out_parts(model, data, part, progress)
-    worst = tried.worst(found.sorter, Options().block_seconds)
-    model = replace(model, baseline={**tally.baseline(), "worst": worst, "joints": merged(parts)})
+    yardsticks = tried.yardsticks(found.sorter, Options().block_seconds)
+    model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
         components = tuple(found.final.components)

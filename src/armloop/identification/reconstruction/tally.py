@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from armloop.data.blocks import block_numbers
+from armloop.data.reversals import at_reversals, turning
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.scoring import Score, residual
@@ -32,17 +33,21 @@ class Tally:
         blocks: (B, 2, n) of every block: the squared errors of moving samples, and their number; empty where
             samples are no time series.
         samples: number of held-out samples.
+        reversals: (2, n) of samples where a joint turns round (:mod:`armloop.data.reversals`): the squared errors, and
+            their number; zeros where samples are no time series.
     """
 
     sums: dict[int, Array]
     blocks: Array
     samples: int
+    reversals: Array
 
     def __add__(self, other: Tally) -> Tally:
         sums = dict(self.sums)
         for label, values in other.sums.items():
             sums[label] = sums[label] + values if label in sums else values
-        return Tally(sums, np.concatenate([self.blocks, other.blocks]), self.samples + other.samples)
+        blocks = np.concatenate([self.blocks, other.blocks])
+        return Tally(sums, blocks, self.samples + other.samples, self.reversals + other.reversals)
 
     @staticmethod
     def of(
@@ -61,7 +66,8 @@ class Tally:
             seconds: length of the pieces that ``blocks`` are told apart by; the held-out blocks' own by default.
         """
         samples, held = chunk.samples, chunk.judging(part, margin)
-        squares = residual(model, samples)[held] ** 2
+        every = residual(model, samples) ** 2
+        squares = every[held]
         torques, moving = samples.tau[held] ** 2, samples.moving[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples.motion)
         sums = {}
@@ -74,7 +80,7 @@ class Tally:
             ]
             sums[int(label)] = np.array(parts)
         n = squares.shape[1]
-        blocks = np.zeros((0, 2, n))
+        blocks, reversals = np.zeros((0, 2, n)), np.zeros((2, n))
         if samples.cutoff_hz > 0 and held.any():
             pieces = (
                 chunk.blocks if seconds is None else block_numbers(samples.motion, seconds, samples.spans)
@@ -83,7 +89,10 @@ class Tally:
             index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
             blocks = np.zeros((int(index.max()) + 1, 2, n))
             np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
-        return Tally(sums, blocks, int(held.sum()))
+            turns = turning(samples.motion, samples.moving)
+            there = at_reversals(samples, turns, (samples.moving | turns) & held[:, None])
+            reversals = np.array([(every * there).sum(axis=0), there.sum(axis=0)])
+        return Tally(sums, blocks, int(held.sum()), reversals)
 
     @staticmethod
     def fitted(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None, seconds: float) -> Tally:
@@ -111,7 +120,15 @@ class Tally:
         worst = self.worst()
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "samples": self.samples}
+        turned = self.at_reversals()
+        return {
+            **{"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "reversals": turned},
+            "samples": self.samples,
+        }
+
+    def at_reversals(self) -> list[float | None]:
+        """RMSE per joint where it turns round."""
+        return [_root(e, c) for e, c in zip(*self.reversals, strict=True)]
 
     def relative_blocks(self) -> Array:
         """(B,) mean square of each block's error relative to the torque, mean over the joints that move in it.
@@ -155,14 +172,15 @@ def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
     Of a log that is too short for held-out blocks that tell, few may miss the rarer motion.
 
     Args:
-        baseline: of held-out samples, with ``worst``.
+        baseline: of held-out samples, with ``worst`` and ``reversals``.
         fitted: of the model, over all samples.
     """
     pair = [baseline, fitted.baseline()]
-    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst")}
+    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst", "reversals")}
     for j in range(len(more["rmse"])):
         own = max(pair, key=lambda one: one["rmse"][j] or 0.0)
         for key in ("rmse", "rms", "nrmse"):
             more[key][j] = own[key][j]
-        more["worst"][j] = max((one["worst"][j] for one in pair if one["worst"][j] is not None), default=None)
+        for key in ("worst", "reversals"):
+            more[key][j] = max((one[key][j] for one in pair if one[key][j] is not None), default=None)
     return {**baseline, **more}

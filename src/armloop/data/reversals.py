@@ -1,0 +1,38 @@
+"""Reversals of a joint: it turns round, passes zero speed, and does not rest."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+
+from armloop.data.motion import Motion, Samples
+from armloop.util.arrays import Mask
+
+#: A joint that has turned round within so many seconds did not rest; so long before and after belongs to it.
+TURN, AROUND = 0.4, 0.1
+
+
+def turning(motion: Motion, moving: Mask) -> Mask:
+    """(N, n) samples that do not count as moving although the joint only turns round, within :data:`TURN`."""
+    found = np.zeros_like(moving)
+    for run in motion.runs():
+        for j in range(motion.joints):
+            edges = np.flatnonzero(np.diff(moving[run, j].astype(np.int8))) + run.start
+            for last, end in pairwise(edges.tolist()):
+                back = motion.v[last, j] * motion.v[end + 1, j] < 0
+                if moving[last, j] and back and motion.time[end + 1] - motion.time[last] <= TURN:
+                    found[last + 1 : end + 1, j] = True
+    return found
+
+
+def at_reversals(samples: Samples, turns: Mask, counted: Mask) -> Mask:
+    """(N, n) samples that belong to a reversal: the joint turns round, or moves and does so within :data:`AROUND`.
+
+    Args:
+        turns: (N, n) samples at which a joint turns round (:func:`turning`).
+        counted: (N, n) samples of which none but these may belong to one.
+    """
+    reach = round(AROUND / samples.period)
+    return np.asarray(binary_dilation(turns, np.ones((2 * reach + 1, 1))) & counted)

@@ -1,0 +1,66 @@
+"""Where a joint turns round, and what belongs to that."""
+
+import numpy as np
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.reversals import at_reversals, turning
+
+
+def test_a_joint_that_turns_around_does_not_rest() -> None:
+    time = np.arange(0.0, 4.0, 0.01)
+    v = np.column_stack(
+        [np.sin(np.pi * time), np.abs(np.sin(np.pi * time)), np.sign(time - 2) * (abs(time - 2) > 0.5)]
+    )
+    moving = np.abs(v) > 0.1
+    motion = Motion(time, np.zeros_like(v), v, np.zeros_like(v), np.array([0]))
+    turns = turning(motion, moving)
+    # the first turns around at 1, 2, 3 s; the second stops and goes on; the third rests for a second
+    assert np.count_nonzero(np.diff(turns[:, 0].astype(int)) > 0) == 3
+    assert turns[[100, 200, 300], 0].all() and not (turns[:, 0] & moving[:, 0]).any()
+    assert not turns[:, 1:].any()
+
+
+class TestTurning:
+    """One joint, a sample every 0.1 s; it counts as moving but in given samples."""
+
+    def turned(self, v: list[float], still: list[int], starts: tuple[int, ...] = (0,)) -> list[int]:
+        speeds = np.array(v, dtype=float)[:, None]
+        time = 0.1 * np.arange(len(v))
+        motion = Motion(time, 0 * speeds, speeds, 0 * speeds, np.array(starts))
+        moving = np.ones((len(v), 1), dtype=bool)
+        moving[still] = False
+        return np.flatnonzero(turning(motion, moving)[:, 0]).tolist()
+
+    def test_it_turns_if_it_moves_the_other_way_afterwards(self) -> None:
+        assert self.turned([1, 1, 0, -1, -1], [2]) == [2]
+        assert self.turned([1, 1, 0, 1, 1], [2]) == []
+        assert self.turned([1, 1, 0, -1, -1, 0, 1, 1], [2, 5]) == [2, 5]
+
+    def test_within_four_tenths_of_a_second(self) -> None:
+        # 0.3 s between the last sample that moves and the next, and 0.5 s
+        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3]) == [2, 3]
+        assert self.turned([1, 1, 0, 0, 0, 0, -1, -1], [2, 3, 4, 5]) == []
+
+    def test_what_a_run_begins_or_ends_with_is_no_turn_nor_is_what_two_runs_do(self) -> None:
+        assert self.turned([1, 0, -1, -1], [0, 1]) == self.turned([1, 1, -1, -1], [2, 3]) == []
+        assert self.turned([1, 1, 0, 0, -1, -1], [2, 3], (0, 3)) == []
+        assert self.turned([9, 1, 1, 0, -1, -1], [3], (0, 1)) == [3]
+
+
+def test_the_sign_counts_where_it_moves_again_and_the_time_until_then() -> None:
+    v = np.array([1.0, 1.0, 0.0, 0.0, -1.0, 1.0, 1.0])[:, None]
+    moving = np.abs(v) > 0
+    # three steps of an eighth of a second are within four tenths, four are not
+    motion = Motion(0.125 * np.arange(7), v, v, v, np.array([0]))
+    assert np.flatnonzero(turning(motion, moving)).tolist() == [2, 3]
+
+
+def test_a_tenth_of_a_second_around_a_turn_belongs_to_it() -> None:
+    time = 0.02 * np.arange(60)
+    motion = Motion(time, *np.zeros((3, 60, 2)), np.array([0]))
+    turns, counted = np.zeros((2, 60, 2), dtype=bool)
+    turns[[20, 40], [0, 1]] = True
+    counted[:23, 0] = counted[38:, 1] = True
+    found = at_reversals(Samples(motion, np.zeros((60, 2)), counted, 0.02), turns, counted)
+    assert np.flatnonzero(found[:, 0]).tolist() == list(range(15, 23))
+    assert np.flatnonzero(found[:, 1]).tolist() == list(range(38, 46))
