@@ -16,7 +16,7 @@ from armloop.reports.plots import column_figure, eta_figure, ring_figure, tracki
 from armloop.reports.plots.style import AFTER, BEFORE
 from armloop.reports.prose import Prose
 from armloop.reports.reconstruction_report import conditions_section, mean_nrmse, reconstruction_sections
-from armloop.reports.tables import Table, eta_table, make_table, seconds_table
+from armloop.reports.tables import Table, eta_table, make_table, named_eta_table, seconds_table
 from armloop.reports.words import (
     angle,
     controller,
@@ -173,10 +173,9 @@ def _control_again_section(result: LoopResult) -> Section:
         clean=clean and mean_eta(clean),
         unit=runs["after"].unit[0],
     )
-    rows = [[names[key], *run.eta] for key, run in runs.items()]
+    shown = {names[key]: run for key, run in runs.items()}
     if clean is not None:
-        rows.append(["first model, unchanged arm", *clean.eta])
-    headers = ["PID + Step III", *(f"η{j + 1} [{x}]" for j, x in enumerate(runs["after"].unit))]
+        shown["first model, unchanged arm"] = clean
     return Section(
         "Control again",
         say.paragraphs("control_again"),
@@ -184,7 +183,7 @@ def _control_again_section(result: LoopResult) -> Section:
             Picture(eta_figure(runs, names=names, colors=colors), "Tracking error on the changed arm."),
             Picture(tracking_figure(runs, names, colors), say["tracking_again"]),
         ],
-        [make_table(headers, rows, "Tracking error η on the changed arm")],
+        [named_eta_table("PID + Step III", shown, "Tracking error η on the changed arm")],
     )
 
 

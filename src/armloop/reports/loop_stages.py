@@ -25,7 +25,17 @@ from armloop.reports.plots.style import (
 )
 from armloop.reports.reconstruction_report import mean_nrmse
 from armloop.reports.residuals import held_out_residuals
-from armloop.reports.words import angle, controller, effect_label, listed, number, percent, unit, vector
+from armloop.reports.words import (
+    angle,
+    controller,
+    counted,
+    effect_label,
+    listed,
+    number,
+    percent,
+    unit,
+    vector,
+)
 
 _SPARK_SECONDS = 12.0
 
@@ -67,7 +77,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     stages = [
         Stage(
             "Measure",
-            f"{count:,}".replace(",", "\u202f") + " samples",
+            counted(count, "sample"),
             listed([_plain(name) for name in result.logs]).replace("_", " "),
             lines(
                 time,

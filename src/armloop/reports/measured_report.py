@@ -43,30 +43,26 @@ class MeasuredResult(Protocol):
 
 def measured_words(result: MeasuredResult) -> str:
     """All of it for a terminal."""
-    parts = [str(_free_table(result)), diagnosis_table(result.diagnosis)]
-    if result.diagnosis.contacts:
-        parts += [str(_pushes_table(result)), str(_during_table(result))]
-    return "\n\n".join(parts)
+    parts = [_free_table(result), diagnosis_table(result.diagnosis), *_push_tables(result)]
+    return "\n\n".join(map(str, parts))
 
 
 def measured_section(result: MeasuredResult) -> Section:
     """The part of the loop's report that is measured, not simulated."""
     say = Prose("measured", moving=float(np.nanmean(result.free.moving["nrmse"])))
-    contacts = result.diagnosis.contacts
+    events = [events_table(result.diagnosis)] if result.diagnosis.contacts else []
     return Section(
         _TITLE,
         [*say.paragraphs("text"), *findings(result.diagnosis)],
         [Picture(residual_time_figure(result.diagnosis), say["residual"])],
-        [
-            _free_table(result),
-            *(
-                [events_table(result.diagnosis), _pushes_table(result), _during_table(result)]
-                if contacts
-                else []
-            ),
-        ],
+        [_free_table(result), *events, *_push_tables(result)],
         notes=reasons(result.diagnosis),
     )
+
+
+def _push_tables(result: MeasuredResult) -> list[Table]:
+    """What was found of the pushes, if any were."""
+    return [_pushes_table(result), _during_table(result)] if result.diagnosis.contacts else []
 
 
 def _free_table(result: MeasuredResult) -> Table:

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from armloop.identification.scoring import Score
 from armloop.reports.html import Card, Picture, Report, Section, render
-from armloop.reports.plots.style import BLUE, INK, figure, panels, polish
+from armloop.reports.plots.style import BLUE, annotate, figure, panels, polish
 from armloop.reports.prose import Prose
 from armloop.reports.reconstruction_report import mean_nrmse
 from armloop.reports.tables import score_table
@@ -21,15 +21,7 @@ def score_figure(score: Score, arm: Arm) -> Figure:
     for j, error in enumerate(score.moving["nrmse"]):
         if error is not None:
             axes.bar(j, 100 * error, 0.6, color=BLUE)
-            axes.annotate(
-                percent(error),
-                (j, 100 * error),
-                textcoords="offset points",
-                xytext=(0, 4),
-                ha="center",
-                color=INK,
-                fontsize=9.5,
-            )
+            annotate(axes, percent(error), (j, 100 * error), (0, 4), ha="center")
     polish(axes, "", "nRMSE while moving [%]", grid="y")
     axes.set_xticks(range(arm.n), [f"joint {j + 1}" for j in range(arm.n)])
     axes.margins(y=0.15)

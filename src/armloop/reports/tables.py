@@ -80,23 +80,25 @@ def _cell(value: object) -> str:
     return str(value)
 
 
+def named_eta_table(head: str, results: Mapping[str, TrackingResult], title: str | None) -> Table:
+    """Mean absolute tracking error η per joint, a row for each named result."""
+    units = next(iter(results.values())).unit
+    rows = [[name, *result.eta] for name, result in results.items()]
+    return make_table([head, *(f"η{j + 1} [{u}]" for j, u in enumerate(units))], rows, title)
+
+
 def eta_table(
     results: Mapping[str, TrackingResult], paper: bool = False, title: str | None = "Tracking error η"
 ) -> Table:
     """Mean absolute tracking error η per controller and joint, beside the paper's where it has one."""
-    first = next(iter(results.values()))
-    n = len(first.eta)
-    rows: list[list[object]] = []
-    for name, result in results.items():
-        row: list[object] = [controller(name), *result.eta]
-        if paper:
-            theirs = published.ETA_DEG.get(name, ())
-            row += theirs if len(theirs) == n else [None] * n
-        rows.append(row)
-    headers = [f"η{j + 1} [{u}]" for j, u in enumerate(first.unit)]
-    return make_table(
-        ["controller", *headers, *([f"paper η{j + 1}" for j in range(n)] if paper else [])], rows, title
-    )
+    made = named_eta_table("controller", {controller(name): run for name, run in results.items()}, title)
+    if not paper:
+        return made
+    n = len(made.headers) - 1
+    theirs = [published.ETA_DEG.get(name, ()) for name in results]
+    beside = [row if len(row) == n else [None] * n for row in theirs]
+    rows = [[*own, *other] for own, other in zip(made.rows, beside, strict=True)]
+    return make_table([*made.headers, *(f"paper η{j + 1}" for j in range(n))], rows, title)
 
 
 def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the reconstruction") -> Table:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.reports.tables import Table, make_table
+from armloop.reports.tables import Table, make_table, named_eta_table
 from armloop.reports.words import controller
 
 if TYPE_CHECKING:
@@ -26,9 +26,7 @@ def phases_table(
     phases: Mapping[str, TrackingResult], title: str | None = "Tracking error η in one run"
 ) -> Table:
     """η per phase of a pickup and joint."""
-    units = next(iter(phases.values())).unit
-    rows = [[PHASES[name], *phase.eta] for name, phase in phases.items()]
-    return make_table(["phase", *(f"η{j + 1} [{unit}]" for j, unit in enumerate(units))], rows, title)
+    return named_eta_table("phase", {PHASES[name]: phase for name, phase in phases.items()}, title)
 
 
 def spread_table(result: WearResult, title: str | None = "Tracking error η over all draws") -> Table:

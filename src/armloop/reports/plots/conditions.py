@@ -6,7 +6,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from armloop.data.regimes import Clusters, Condition
-from armloop.reports.plots.style import BLUE, CONDITIONS, INK, SURFACE, every, figure, legend, panels, polish
+from armloop.reports.plots.style import (
+    BLUE,
+    CONDITIONS,
+    INK,
+    SURFACE,
+    annotate,
+    every,
+    figure,
+    legend,
+    panels,
+    polish,
+)
 from armloop.reports.words import counted
 
 _MOST = 6000
@@ -31,17 +42,9 @@ def clusters_figure(clusters: Clusters) -> Figure:
     legend(made, 3)
     counts = np.arange(1, len(clusters.wcss) + 1)
     elbow.plot(counts, clusters.wcss, color=BLUE, linewidth=2, marker="o", markersize=5)
-    elbow.plot(
-        clusters.elbow, clusters.wcss[clusters.elbow - 1], "o", color=INK, markersize=11, fillstyle="none"
-    )
-    elbow.annotate(
-        f"elbow at {clusters.elbow}",
-        (clusters.elbow, clusters.wcss[clusters.elbow - 1]),
-        textcoords="offset points",
-        xytext=(12, 10),
-        color=INK,
-        fontsize=9.5,
-    )
+    at = (clusters.elbow, clusters.wcss[clusters.elbow - 1])
+    elbow.plot(*at, "o", color=INK, markersize=11, fillstyle="none")
+    annotate(elbow, f"elbow at {clusters.elbow}", at, (12, 10))
     elbow.set_xticks(counts)
     elbow.set_ylim(bottom=0)
     polish(elbow, "number of clusters", "within-cluster sum", "Elbow")

@@ -14,7 +14,9 @@ from armloop.reports.plots.style import (
     GREY,
     INK,
     MUTED,
+    annotate,
     figure,
+    legend_row,
     log_percent,
     panels,
     percent_tick,
@@ -41,15 +43,8 @@ def ladder_figure(comparisons: Sequence[Mapping[str, Any]]) -> Figure:
         axes.plot(led, k, "o", color=color, markersize=8, fillstyle="full" if taken else "none")
         joints = ", ".join(map(str, one["joints"]))
         text = f"{percent(led)}   joint{'s' if ',' in joints else ''} {joints}" if taken else percent(led)
-        axes.annotate(
-            text,
-            (max(led, one["before"]), k),
-            textcoords="offset points",
-            xytext=(12, 0),
-            va="center",
-            color=INK if taken else MUTED,
-            fontsize=9.5,
-        )
+        at = (max(led, one["before"]), k)
+        annotate(axes, text, at, (12, 0), va="center", color=INK if taken else MUTED)
     axes.set_xscale("log")
     polish(axes, "held-out nRMSE, mean of the joints", "", grid="x")
     axes.set_yticks(range(len(comparisons)), names)
@@ -61,14 +56,6 @@ def ladder_figure(comparisons: Sequence[Mapping[str, Any]]) -> Figure:
     axes.tick_params(which="minor", colors=MUTED, labelsize=8)
     axes.set_xlim(0.85 * low, high * (high / low) ** 0.25 * 1.5)
     axes.set_ylim(len(comparisons) - 0.4, -0.6)
-    made.legend(
-        [Line2D([], [], color=BLUE, marker="o"), Line2D([], [], color=GREY, marker="o", fillstyle="none")],
-        ["taken", "tried, not taken"],
-        loc="upper left",
-        bbox_to_anchor=(0.02, 1.0),
-        ncols=2,
-        frameon=False,
-        fontsize=9.5,
-        labelcolor=INK,
-    )
+    lines = [Line2D([], [], color=BLUE, marker="o"), Line2D([], [], color=GREY, marker="o", fillstyle="none")]
+    legend_row(made, lines, ["taken", "tried, not taken"], 2)
     return made

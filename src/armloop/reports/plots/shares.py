@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from armloop.diagnosis import Diagnosis
-from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, figure, panels, polish
+from armloop.reports.plots.style import BLUE, GREY, INK, MUTED, annotate, figure, panels, polish
 from armloop.reports.words import effect_label, percent
 
 _MOST_ALIKE = 4
@@ -27,16 +27,8 @@ def shares_figure(diagnosis: Diagnosis) -> Figure:
     )[0, 0]
     for k, (_, share, real) in enumerate(bars):
         axes.barh(k, 100 * share, 0.62 if real else 0.34, color=BLUE if real else GREY)
-        axes.annotate(
-            percent(share),
-            (max(100 * share, 0), k),
-            textcoords="offset points",
-            xytext=(6, 0),
-            va="center",
-            color=INK,
-            fontsize=9.5,
-            fontweight="bold" if real else "normal",
-        )
+        weight = "bold" if real else "normal"
+        annotate(axes, percent(share), (max(100 * share, 0), k), (6, 0), va="center", fontweight=weight)
     polish(axes, "share of the explainable residual energy removed on data not fitted [%]", "", grid="x")
     axes.set_yticks(range(len(bars)), [name for name, _, _ in bars])
     axes.tick_params(axis="y", labelsize=10, labelcolor=INK)

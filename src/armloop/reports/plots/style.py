@@ -15,6 +15,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ CYCLE = (BLUE, ORANGE, GREEN, PINK, GREY)
 
 #: More points than this on a line cannot be seen.
 MOST_POINTS = 2000
+_LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9.5}
 
 
 def controller_colors(names: Sequence[str]) -> dict[str, str]:
@@ -97,25 +99,30 @@ def polish(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "", grid
     return axes
 
 
+def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float], **how: Any) -> None:
+    """Write beside a point, ``offset`` in points from it."""
+    axes.annotate(
+        text, at, textcoords="offset points", xytext=offset, **{"color": INK, "fontsize": 9.5, **how}
+    )
+
+
+def legend_row(made: Figure, artists: Sequence[Artist], labels: Sequence[str], columns: int) -> Legend:
+    """Add a frameless legend in a row above a figure's axes."""
+    where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 1.0)}
+    return made.legend(artists, labels, ncols=columns, labelcolor=INK, **_LEGEND, **where)
+
+
 def legend(target: Axes | Figure, columns: int = 4) -> None:
     """Add a frameless legend, each label once; on a figure it stands in a row above the axes."""
     handles: dict[str, Artist] = {}
     for axes in target.axes if isinstance(target, Figure) else [target]:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    size, artists, labels = 9.5, list(handles.values()), list(handles)
+    artists, labels = list(handles.values()), list(handles)
     if isinstance(target, Figure):
-        made = target.legend(
-            artists,
-            labels,
-            loc="upper left",
-            bbox_to_anchor=(0.02, 1.0),
-            ncols=columns,
-            frameon=False,
-            fontsize=size,
-        )
+        made = legend_row(target, artists, labels, columns)
     else:
-        made = target.legend(artists, labels, loc="best", ncols=columns, frameon=False, fontsize=size)
+        made = target.legend(artists, labels, loc="best", ncols=columns, **_LEGEND)
     for shown in made.legend_handles:
         if isinstance(shown, Line2D):
             shown.set_linewidth(2.4)
@@ -135,16 +142,7 @@ def legend_above(made: Figure, width: float) -> float:
         shown.remove()
         letters = max(map(len, labels), default=1)
         columns = min(max(1, int((width - 0.3) / (0.08 * letters + 0.5))), max(len(labels), 1))
-        made.legend(
-            [artist for artist in artists if artist is not None],
-            labels,
-            loc="upper left",
-            bbox_to_anchor=(0.02, 1.0),
-            ncols=columns,
-            frameon=False,
-            fontsize=9.5,
-            labelcolor=INK,
-        )
+        legend_row(made, [artist for artist in artists if artist is not None], labels, columns)
         top += 0.21 * -(-len(labels) // columns)
     return top
 

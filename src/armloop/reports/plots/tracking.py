@@ -14,6 +14,7 @@ from armloop.reports.plots.style import (
     GRID,
     INK,
     MUTED,
+    annotate,
     controller_colors,
     figure,
     legend,
@@ -132,12 +133,5 @@ def _bars(
             )
             tops = [max(pair) for pair in zip(values, shown, strict=True)]
         for at, top, value in zip(x, tops, values, strict=True):
-            axes.annotate(
-                f"{value:.2f}" if value >= 0.095 else number(value, 2),
-                (at, top),
-                textcoords="offset points",
-                xytext=(0, 3),
-                ha="center",
-                color=INK,
-                fontsize=8.5,
-            )
+            text = f"{value:.2f}" if value >= 0.095 else number(value, 2)
+            annotate(axes, text, (at, top), (0, 3), ha="center", fontsize=8.5)
