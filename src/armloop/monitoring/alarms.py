@@ -1,4 +1,4 @@
-"""When an arm has changed: e-detectors of all its streams, one threshold, and a new start after each alarm."""
+"""Sequential change detection: e-detectors of all streams, one threshold, and a new start after each alarm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Watching sample by sample: block sums, a null learned from healthy blocks, cumulative sums beyond it (CUSUM)."""
+"""CUSUM monitoring, sample by sample: block sums, a null learned from healthy blocks, cumulative sums beyond it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Naming a change from sums alone: forward selection of effects on normal equations, judged on units left out."""
+"""Fault isolation from sums alone: forward selection of effects on normal equations, judged on units left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run of the loop hands over to its report, and what several parts of the report say of it."""
+"""Result of a run of the loop, as its report takes it, and what several parts of the report say of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The loop's measured part in a terminal and in the loop's report: a model of free motion, and who pushed the arm."""
+"""Results on the measured arm, for a terminal and the report: a model of free motion, and contacts with a person."""
 
 from __future__ import annotations
 

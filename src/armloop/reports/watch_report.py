@@ -20,7 +20,7 @@ from armloop.reports.watch_tables import (
     moment,
     named,
 )
-from armloop.reports.words import counted, number, percent, place, unit
+from armloop.reports.words import number, percent, place, unit
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
@@ -40,7 +40,7 @@ def watch_report(
     Raises:
         InputError: models or store cannot be read.
     """
-    sections = [_overview(outcome)]
+    sections, say = [_overview(outcome)], Prose("watch", outcome=outcome)
     if outcome.arms:
         sections.insert(0, _heat(outcome))
         one = _chosen(outcome, arm)
@@ -51,18 +51,12 @@ def watch_report(
                 sections.append(_trends(outcome, one["arm"], examine(history, how.hours, how.healthy)))
     sections += [_alarm(alarm, alarm["id"] in outcome.new) for alarm in reversed(outcome.alarms)]
     if outcome.aside:
-        sections.append(
-            Section(
-                "What was set aside",
-                [f"{counted(len(outcome.aside), 'log')} could not be used."],
-                [],
-                [aside_table(outcome.aside)],
-            )
-        )
+        tables = [aside_table(outcome.aside)]
+        sections.append(Section("What was set aside", say.paragraphs("aside"), tables=tables))
     return render(
         Report(
             "Arms under watch",
-            Prose("watch", outcome=outcome)["lead"],
+            say["lead"],
             sections,
             _cards(outcome),
         )
@@ -175,19 +169,16 @@ def _alarm(alarm: dict[str, Any], new: bool) -> Section:
                     percent(effect["share"]) if k == 0 else "",
                 ]
             )
-    tables = (
-        [
-            make_table(
-                ["effect", "parameter", "value ± std. error", "unit", "share"], rows, None, left=(0, 1, 3)
-            )
-        ]
-        if rows
-        else []
+    headers = ["effect", "parameter", "value ± std. error", "unit", "share"]
+    tables = [make_table(headers, rows, None, left=(0, 1, 3))] if rows else []
+    say = Prose(
+        "watch",
+        alarm=alarm,
+        new=new,
+        since=moment(alarm["since"]),
+        found=moment(alarm["when"]),
+        delay=delay_words(alarm),
+        course=course_words(alarm),
     )
-    paragraphs = [
-        f"{'New. ' if new else ''}Began about {moment(alarm['since'])} (log {alarm['since_log']}), found "
-        f"{moment(alarm['when'])} after {delay_words(alarm)}. {course_words(alarm).capitalize()} of "
-        f"{alarm['course']['of']}. Log evidence {alarm['log_evidence']:.1f}, threshold {alarm['limit']:.1f}.",
-        *alarm_words(alarm),
-    ]
+    paragraphs = [*say.paragraphs("alarm"), *alarm_words(alarm)]
     return Section(f"{alarm['arm']}: {named(alarm)} ({moment(alarm['when'])})", paragraphs, [], tables)

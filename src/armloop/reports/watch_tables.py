@@ -1,4 +1,4 @@
-"""What a call of watch came to, in words and tables for a terminal."""
+"""Alarms and logs set aside by a monitoring run, in words and tables for a terminal."""
 
 from __future__ import annotations
 

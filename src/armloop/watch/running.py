@@ -1,4 +1,4 @@
-"""The running state of one arm's tests: what they need of the past, however long that is (sequential testing).
+"""State of sequential tests: what those of an arm need of the past, however long that is.
 
 Kept are the arm's first logs, from which warmth is learned, and the last few hundred; of the others only what they came
 to. All that is computed of a log depends on it and on those before it, so that logs that come one by one leave the same

@@ -1,4 +1,4 @@
-"""An arm that changes while it follows its reference: watched, named, and supplied, in one simulation."""
+"""Online diagnosis and compensation, simulated: an arm that changes while it follows its reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Additional dry friction of one joint."""
+"""Additional Coulomb (dry) friction of one joint."""
 
 from __future__ import annotations
 

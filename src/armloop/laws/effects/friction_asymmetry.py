@@ -1,4 +1,4 @@
-"""Dry friction that differs between the two directions of one joint."""
+"""Direction-dependent Coulomb friction: it differs between the two directions of one joint."""
 
 from __future__ import annotations
 

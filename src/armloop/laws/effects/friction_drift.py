@@ -1,4 +1,4 @@
-"""Dry friction that fades as one joint warms up."""
+"""Friction drift: dry friction that fades as one joint warms up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A base that does not stand level."""
+"""Base tilt: gravity on an arm whose base does not stand level."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A spring across one joint: a hose, a cable loom, a spring balancer."""
+"""Parallel joint spring: a hose, a cable loom, a spring balancer."""
 
 from __future__ import annotations
 

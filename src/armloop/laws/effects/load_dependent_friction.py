@@ -1,4 +1,4 @@
-"""Dry friction that grows with the torque that passes the joint's gear."""
+"""Load-dependent friction: dry friction that grows with the torque that passes the joint's gear."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rigid body fixed to the last link: a load, a tool."""
+"""Payload: a rigid body fixed to the last link, a load or a tool."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction with memory: before a joint slides, it stretches like a spring that yields."""
+"""Presliding hysteresis: before a joint slides, it stretches like a spring that yields; friction with memory."""
 
 from __future__ import annotations
 

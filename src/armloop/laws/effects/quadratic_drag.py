@@ -1,4 +1,4 @@
-"""Drag that grows with the square of one joint's speed: churning oil, a fan."""
+"""Quadratic drag: it grows with the square of one joint's speed, by churning oil or a fan."""
 
 from __future__ import annotations
 

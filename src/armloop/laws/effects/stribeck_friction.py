@@ -1,4 +1,4 @@
-"""Dry friction that is larger at low speed: the Stribeck part of Eq. (34) of the paper."""
+"""Stribeck friction: dry friction that is larger at low speed, a part of Eq. (34) of the paper."""
 
 from __future__ import annotations
 

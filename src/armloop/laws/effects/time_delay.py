@@ -1,4 +1,4 @@
-"""A torque that is recorded later than the motion it belongs to."""
+"""Time delay of the torque record: it is later than the motion it belongs to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A torque reading of one joint that is too large or too small by a factor."""
+"""Gain error of a torque sensor: the readings of one joint are too large or too small by a factor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A constant error of one joint's torque reading."""
+"""Offset of a torque sensor: a constant error of the readings of one joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torque that repeats with the joint's angle: cogging, gear mesh."""
+"""Torque ripple: what repeats with the joint's angle, by cogging or gear mesh."""
 
 from __future__ import annotations
 

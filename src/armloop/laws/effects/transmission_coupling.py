@@ -1,4 +1,4 @@
-"""Two joints whose motors share gears, as in many wrists."""
+"""Transmission coupling: two joints whose motors share gears, as in many wrists."""
 
 from __future__ import annotations
 

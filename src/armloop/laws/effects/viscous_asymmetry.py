@@ -1,4 +1,4 @@
-"""Viscous friction that differs between the two directions of one joint."""
+"""Direction-dependent viscous friction: it differs between the two directions of one joint."""
 
 from __future__ import annotations
 
