@@ -6,6 +6,7 @@ import numpy as np
 
 from armloop.reports.html import Section
 from armloop.reports.words import numbers
+from armloop.util.arrays import TINY
 from armloop_paper import paper
 from armloop_paper.beyond_range import nrmse, picture, rmse_table
 from armloop_paper.context import Context
@@ -21,7 +22,7 @@ def run(context: Context) -> Outcome:
     error = {name: np.median(nrmse(SCARA, draws, name), axis=0) for name in METHODS}
     better = [bool(x) for x in error["stepwise"] < error["sindy"]]
     ratios = [float(x) for x in error["sindy"] / error["stepwise"]]
-    gain = [float(x) for x in error["stepwise"] / np.maximum(error["armloop"], 1e-300)]
+    gain = [float(x) for x in error["stepwise"] / np.maximum(error["armloop"], TINY)]
     text = [
         "The models of Fig. 5 predict q(t) = π/2 + π/12 sin(πt) of joints 1, 2, 4 and 0.2 + 0.05 sin(πt) of joint "
         "3, half of it outside the range of the data.",

@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import lasso_path
 
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 
 #: Duality gap, relative to the objective, at which the solution counts as converged.
 TOLERANCE = 1e-4
@@ -106,9 +106,9 @@ def duality_gap(G: Array, b: Array, yy: float, penalty: float, xi: Array) -> flo
 def _gap(b: Array, g: Array, yy: float, penalty: float, xi: Array) -> float:
     rss = max(yy - float(xi @ (b + g)), 0.0)
     objective = 0.5 * rss + penalty * float(np.abs(xi).sum())
-    shrink = min(1.0, penalty / max(float(np.abs(g).max()), 1e-300))
+    shrink = min(1.0, penalty / max(float(np.abs(g).max()), TINY))
     dual = shrink * (yy - float(xi @ b)) - 0.5 * shrink**2 * rss
-    return (objective - dual) / max(objective, 0.5e-8 * yy, 1e-300)
+    return (objective - dual) / max(objective, 0.5e-8 * yy, TINY)
 
 
 def _exact_for_signs(
@@ -135,7 +135,7 @@ def _exact_for_signs(
             x, value, keep = bold, bold_value, ~crosses
         else:
             move = goal - x
-            part = np.where(crosses, np.abs(x) / np.maximum(np.abs(move), 1e-300), np.inf)
+            part = np.where(crosses, np.abs(x) / np.maximum(np.abs(move), TINY), np.inf)
             first = float(part.min())
             keep = part > first
             x = np.where(keep, x + first * move, 0.0)

@@ -14,7 +14,7 @@ from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet, products
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop_paper.experiments import STEPS, Experiment, as_motion
 from armloop_paper.gram import library_moments
 from armloop_paper.lasso import lasso, stopped_early
@@ -98,7 +98,7 @@ def _penalised(
     G, B = library_moments(library, motion, tau)
     scale = np.ones(len(G))
     if reading.scaled:
-        scale = 1 / np.sqrt(np.maximum(np.diag(G) / motion.samples, 1e-300))
+        scale = 1 / np.sqrt(np.maximum(np.diag(G) / motion.samples, TINY))
         G = G * scale[:, None] * scale
     weight = reading.weight(experiment.penalty, motion.samples)
     solve = stopped_early if reading.early else lasso

@@ -24,6 +24,8 @@ def test_columns_of_any_size_that_are_apart_all_stay() -> None:
     assert kept.tolist() == [0, 1, 2, 3]
     np.testing.assert_array_equal(sums, np.eye(4))
     assert identifiable(np.zeros((2, 2)))[0].tolist() == []
+    # whatever the unit: what is nothing is so beside the largest
+    assert identifiable(1e-30 * np.eye(2))[0].tolist() == [0, 1]
 
 
 def test_a_column_stays_whose_own_part_is_more_than_rounding() -> None:

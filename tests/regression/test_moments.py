@@ -37,6 +37,13 @@ def test_sums_add_up_and_are_taken_away_again():
     assert (rest.yy, rest.count) == (pytest.approx(first.yy), 20.0)
 
 
+def test_no_samples_add_nothing():
+    X, y = columns()
+    whole = Moments.none(6) + Moments.of(X, y)
+    assert (whole.G == X.T @ X).all() and (whole.b == X.T @ y).all()
+    assert (whole.yy, whole.count) == (float(y @ y), 60.0)
+
+
 def test_some_columns_are_a_problem_of_their_own():
     X, y = columns()
     some = np.array([4, 1])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 # No joint of an arm turns beyond, moves faster, accelerates harder or bears more (rad, rad/s, rad/s², N·m or A).
 _LARGEST = {"q": 1e4, "v": 1e3, "vdot": 1e6, "tau": 1e6}
@@ -116,7 +116,7 @@ def is_time_series(q: Array, runs: Sequence[slice]) -> bool:
         return False
     ranks = np.argsort(np.argsort(q, axis=0, kind="stable"), axis=0, kind="stable").astype(float)
     steps = np.mean(np.square(ranks[inside + 1] - ranks[inside]), axis=0)
-    ratio = steps / np.maximum(np.var(ranks, axis=0), 1e-300)
+    ratio = steps / np.maximum(np.var(ranks, axis=0), TINY)
     return bool(ratio.min() < 2.0 - max(1.0, 8.0 / np.sqrt(len(inside))))
 
 
@@ -234,7 +234,7 @@ class _Windows:
         """(n, n) correlation of the rate of each q with each v."""
         products = self.change.T @ self.integral
         sizes = np.outer(np.linalg.norm(self.change, axis=0), np.linalg.norm(self.integral, axis=0))
-        return np.asarray(products / np.maximum(sizes, 1e-300))
+        return np.asarray(products / np.maximum(sizes, TINY))
 
 
 def _windows(log: Recorded) -> _Windows | None:

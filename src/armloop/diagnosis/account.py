@@ -15,7 +15,7 @@ from armloop.diagnosis.search import Outcome, search
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects.found import RANGE
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
 
 #: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
@@ -93,7 +93,7 @@ class Account:
         bursts = np.logical_or.reduce([contact.rows for contact in contacts])
         before = (residual / evidence.scale)[evidence.rows & bursts[:, None]]
         after = held_out[bursts[evidence.row_samples]]
-        return 1 - float((after**2).sum()) / max(float((before**2).sum()), 1e-300)
+        return 1 - float((after**2).sum()) / max(float((before**2).sum()), TINY)
 
 
 def slid_then(motion: Motion, moving: Mask, seconds: float) -> Mask:

@@ -16,6 +16,7 @@ from armloop.laws.effects import Effect, Estimate
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
+from armloop.util.arrays import TINY
 
 Array = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
         parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
-        clear.append(float(np.max(np.abs(free) / np.sqrt(np.diag(spread)[block] + 1e-300), initial=0.0)))
+        clear.append(float(np.max(np.abs(free) / np.sqrt(np.diag(spread)[block] + TINY), initial=0.0)))
         start += len(free)
     return Fit(tuple(effects), tuple(shapes), tuple(parameters), tuple(clear), np.array(outside), stacked)
 
@@ -163,7 +164,7 @@ def covariance(X: Array, left: Array, rows: Stacked) -> Array:
     again = clustered_covariance(X, left, cell) - clustered_covariance(X, left, common)
     G = X.T @ X
     scale = unit_scale(G)
-    values, vectors = np.linalg.eigh(again / np.outer(scale, scale).clip(min=1e-300))
+    values, vectors = np.linalg.eigh(again / np.outer(scale, scale).clip(min=TINY))
     spread = in_time + (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
     unit = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
     own = scale[:, None] * np.linalg.solve(unit, scale[:, None] * (X.T @ rows.model_errors))

@@ -25,6 +25,7 @@ from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
+from armloop.util.arrays import TINY
 from armloop.util.progress import Progress
 
 Array = NDArray[np.float64]
@@ -210,7 +211,7 @@ def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
     if there.sum() < _FEWEST:
         return 1.0
     now, then = residual[there], residual[later[there]]
-    return float(np.clip(np.mean(now * then) / max(float(np.mean(now**2)), 1e-300), 0.0, 1.0))
+    return float(np.clip(np.mean(now * then) / max(float(np.mean(now**2)), TINY), 0.0, 1.0))
 
 
 def _energy(fit: Fit, j: int) -> float:

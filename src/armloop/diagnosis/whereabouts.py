@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: A stretch of time or a half of the motion is named where it holds this part of the energy above the baseline …
 _MOST = 0.8
@@ -51,7 +51,7 @@ def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
     energy = np.maximum(fit.held_out[mine] ** 2 - 1.0, 0.0)
     rows = np.flatnonzero(evidence.rows[:, joint])
     halves = _halves(evidence, rows, joint)
-    shares = [float(energy[chosen].sum() / max(energy.sum(), 1e-300)) for _, chosen in halves]
+    shares = [float(energy[chosen].sum() / max(energy.sum(), TINY)) for _, chosen in halves]
     best = int(np.argmax(shares))
     named = shares[best] >= _MOST
     return Whereabouts(

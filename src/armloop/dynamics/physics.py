@@ -22,7 +22,7 @@ from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Postures drawn over the limits, and from how many of the worst a lower eigenvalue is searched.
 _POSTURES, _WORST = 1000, 12
@@ -151,7 +151,7 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     M = mass_matrix(model, q)
     least = _least(M)
     tilt = np.linalg.norm(M - M.transpose(0, 2, 1), axis=(1, 2)) / np.maximum(
-        np.linalg.norm(M, axis=(1, 2)), 1e-300
+        np.linalg.norm(M, axis=(1, 2)), TINY
     )
 
     def mass(q: Array) -> Array:
@@ -317,7 +317,7 @@ def _yaw(model: ReconstructedModel, low: Array, high: Array, rng: np.random.Gene
     turned = q.copy()
     turned[:, 0] = rng.uniform(low[0], high[0], _MOTIONS)
     here, there = (_torque(model, x, v, vdot) for x in (q, turned))
-    return float(np.sqrt(np.mean((here - there) ** 2) / max(float(np.mean(here**2)), 1e-300)))
+    return float(np.sqrt(np.mean((here - there) ** 2) / max(float(np.mean(here**2)), TINY)))
 
 
 def _torque(model: ReconstructedModel, q: Array, v: Array, vdot: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 _DAY = 86400.0
 #: Difference of the Bayesian information criterion that decides (Kass and Raftery 1995: strong).
@@ -56,7 +56,7 @@ def course(when: Array, values: Array, programme: NDArray[np.intp] | None = None
     steps, ramps = index[2:-1], index[:-2]
     step = _best(np.asarray(index >= steps[:, None], dtype=float), y, level)
     drift = _best(np.maximum(t - t[ramps, None], 0.0), y, level)
-    noise = 1e-18 * float(y @ y) + 1e-300
+    noise = 1e-18 * float(y @ y) + TINY
     # both have as many parameters: the levels, size, begin
     gap = len(y) * float(np.log((step[0] + noise) / (drift[0] + noise)))
     form = "drift" if gap > _DECIDES else "step" if gap < -_DECIDES else "cannot_tell"

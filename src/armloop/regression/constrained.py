@@ -15,7 +15,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from armloop.regression.moments import unit_length
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Rows c of new constraints c·θ ≥ 0 that θ violates; empty if there is none.
 Cuts = Callable[[Array], Array]
@@ -71,7 +71,7 @@ def constrained_least_squares(
             raise TooCostly(f"the constraints cost {cost:.3g}")
     left = cuts(theta)
     if len(left):
-        sizes = np.maximum(np.abs(left * theta).sum(axis=1), 1e-300)
+        sizes = np.maximum(np.abs(left * theta).sum(axis=1), TINY)
         worst = float((left @ theta / sizes).min())
         if worst < -_FEASIBLE:
             raise ArithmeticError(
@@ -94,7 +94,7 @@ def _bounded(theta: Array, rows: Array, pushes: Array) -> Array:
 
 def _nearest(target: Array, A: Array) -> tuple[Array, Array]:
     """The point nearest to ``target`` with A z ≥ 0, and how hard each of these conditions pushes it, up to a factor."""
-    size = max(float(np.abs(target).max()), 1e-300)
+    size = max(float(np.abs(target).max()), TINY)
     try:
         pushes, _ = nnls(A.T, -target / size, maxiter=30 * len(A))
     except RuntimeError as error:

@@ -31,7 +31,7 @@ def identifiable(G: Array, tolerance: float = DEPENDENT) -> tuple[Index, Array]:
         (k,) columns kept, rising, and (k, p) the sums of coefficients that their own stand for.
     """
     sizes = np.sqrt(np.maximum(np.diag(G), 0.0))
-    alive = sizes > 1e-12 * max(float(sizes.max(initial=0.0)), 1e-300)
+    alive = sizes > 1e-12 * sizes.max(initial=0.0)
     scale = np.where(alive, 1 / np.where(alive, sizes, 1.0), 0.0)
     C = G * np.outer(scale, scale)
     kept: list[int] = []

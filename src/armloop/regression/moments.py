@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: A column whose part outside the others is smaller than this (squared, relative) is theirs already.
 DEPENDENT = 1e-9
@@ -36,6 +36,11 @@ class Moments:
     def of(X: Array, y: Array) -> Moments:
         """Moments of one block: X (N, p), y (N,)."""
         return Moments(X.T @ X, X.T @ y, float(y @ y), float(len(y)))
+
+    @staticmethod
+    def none(p: int) -> Moments:
+        """Moments of no samples of p columns."""
+        return Moments(np.zeros((p, p)), np.zeros(p), 0.0, 0.0)
 
     def __add__(self, other: Moments) -> Moments:
         return Moments(self.G + other.G, self.b + other.b, self.yy + other.yy, self.count + other.count)
@@ -68,7 +73,7 @@ class Moments:
         others = np.arange(len(self.b)) if others is None else others
         size, b = np.diag(self.G)[others], self.b[others]
         if len(support) == 0:
-            return self.yy, b**2 / np.maximum(size, 1e-300)
+            return self.yy, b**2 / np.maximum(size, TINY)
         scale = unit_length(np.diag(self.G)[support])
         S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
         L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
@@ -77,7 +82,7 @@ class Moments:
         H = inverse @ (self.G[support] if whole else self.G[np.ix_(support, others)])
         h = inverse @ self.b[support]
         own = size - np.einsum("kp,kp->p", H, H)
-        gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, 1e-300), 0.0)
+        gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, TINY), 0.0)
         return max(self.yy - float(h @ h), 0.0), gains
 
     def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
@@ -96,7 +101,7 @@ class Moments:
 
 def unit_length(squares: Array) -> Array:
     """(p,) factors that make columns of these squared lengths (p,) one long; finite for a column of nothing."""
-    return np.asarray(1 / np.sqrt(np.maximum(squares, 1e-300)))
+    return np.asarray(1 / np.sqrt(np.maximum(squares, TINY)))
 
 
 def total(parts: Iterable[Moments]) -> Moments:

@@ -9,7 +9,7 @@ import numpy as np
 
 from armloop.regression.estimators import LISTED, REGISTRY, Estimator, Problem, Reduction
 from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 from armloop.util.errors import InputError
 
 ESTIMATORS = tuple(LISTED)
@@ -104,7 +104,7 @@ class Sparse:
 
         def score(columns: Index) -> float:
             rss = moments.squared_error(moments.solve(columns), columns)
-            return count * float(np.log(max(rss, _floor(moments, power), 1e-300))) + cost * len(columns)
+            return count * float(np.log(max(rss, _floor(moments, power), TINY))) + cost * len(columns)
 
         best = score(support)
         for column in doubtful:

@@ -7,7 +7,7 @@ from scipy.stats import chi, norm
 from sklearn.cluster import KMeans
 
 from armloop.data.regimes.kmeans import fitted
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Size that counts as exactly zero, relative to the largest.
 _NOTHING = 1e-6
@@ -35,7 +35,7 @@ def robust_indicator(a: Array, weight: float = 0.2) -> Array:
     """
     total = size(a)
     x = np.minimum(total / limit(total, a.shape[1]), 1e6) ** 8
-    return np.asarray(x / (1 + x) + weight * total / max(float(total.max()), 1e-300))
+    return np.asarray(x / (1 + x) + weight * total / max(float(total.max()), TINY))
 
 
 def size(a: Array) -> Array:
@@ -53,7 +53,7 @@ def units(a: Array) -> Array:
     units stand.
     """
     rms = np.sqrt(np.mean(a**2, axis=0))
-    least = max(_NOTHING * float(rms.max(initial=0.0)), 1e-300)
+    least = max(_NOTHING * float(rms.max(initial=0.0)), TINY)
     own = np.maximum(rms, max(least, _AT_REST * float(rms.max(initial=0.0))))
     for unit in (own, np.full_like(own, own.max())):
         total = np.linalg.norm(a / unit, axis=1)
@@ -83,7 +83,7 @@ def limit(total: Array, joints: int) -> float:
     joints = max(1, joints)
     floor = noise_floor(total)
     if floor is None:
-        return float(np.quantile(total, 0.01)) or 1e-300
+        return float(np.quantile(total, 0.01)) or TINY
     return floor * float(chi.ppf(0.999, joints) / chi.median(joints))
 
 
@@ -94,7 +94,7 @@ def noise_floor(total: Array) -> float | None:
     means are a factor of ten apart, or of three if the groups are narrow (Ashman's D above 4). Exact zeros say
     nothing about noise; they are the quiet part only if nothing else is.
     """
-    least = _NOTHING * max(float(total.max(initial=0.0)), 1e-300)
+    least = _NOTHING * max(float(total.max(initial=0.0)), TINY)
     level = np.log10(total[total > least])
     if len(level) > 1 and np.ptp(level) > 0:
         thin = level[:: max(1, len(level) // 4000)]

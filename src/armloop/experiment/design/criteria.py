@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 Criterion = Callable[[Array], tuple[float, Array]]
 """F (p, p) -> its measure, and the measure's gradient (p, p)."""
@@ -131,7 +131,7 @@ def _log_volume(F: Array) -> tuple[float, Array]:
 
 def _eigen(F: Array) -> tuple[Array, Array]:
     values, vectors = np.linalg.eigh(F)
-    return np.maximum(values, 0.0) + _FLOOR * max(float(values.mean()), 1e-300), vectors
+    return np.maximum(values, 0.0) + _FLOOR * max(float(values.mean()), TINY), vectors
 
 
 def _with(vectors: Array, weights: Array) -> Array:

@@ -16,6 +16,7 @@ from armloop.data.blocks import block_sums
 from armloop.identification.goodness.regression import left_out
 from armloop.identification.goodness.split import correlation_time, split
 from armloop.identification.goodness.witness import JointRows, Witness
+from armloop.util.arrays import TINY
 from armloop.util.progress import Progress, silent
 
 #: A joint with fewer rows is not judged; how long a residual's memory may be, s.
@@ -104,7 +105,7 @@ def _of_joint(joint: int, rows: JointRows) -> Parts:
     blocks = block_sums((residual**2)[judged], cut.block[judged])
     predictable = float(np.clip(removed.sum(), 0.0, left))
     # of the part that is predictable, a ratio of sums over blocks (Cochran, Sampling Techniques, 1977, Ch. 6)
-    scatter = removed - predictable / max(left, 1e-300) * blocks
+    scatter = removed - predictable / max(left, TINY) * blocks
     error = float(np.sqrt(len(removed) * np.mean(scatter**2))) if len(removed) > 1 else left
     return Parts(
         joint,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.identification.goodness.split import FOLDS, Split
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
 _PENALTIES = tuple(10.0**k for k in range(-5, 2))
@@ -38,7 +38,7 @@ def left_out(X: Array, y: Array, cut: Split) -> Array:
 def _ridge(X: Array, y: Array, block: NDArray[np.intp], asked: Array) -> Array:
     """Ridge regression on standardised columns; the penalty by the error on blocks left out."""
     mean, scale = X.mean(axis=0), X.std(axis=0)
-    used = scale > 1e-9 * np.maximum(np.abs(mean), 1e-300)
+    used = scale > 1e-9 * np.maximum(np.abs(mean), TINY)
     Z = np.column_stack([(X[:, used] - mean[used]) / scale[used], np.ones(len(X))])
     inner = block % 4
     parts = [(Z[inner == k], y[inner == k]) for k in range(4)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 
 FOLDS = 4
 #: A block is so many times as long as the gap beside it; there are at least so many blocks, however long the gap
@@ -102,5 +102,5 @@ def correlation_time(residual: Array, place: Array, run: Index, longest: float) 
         np.fft.irfft(np.abs(np.fft.rfft(x, width)) ** 2, width)[: most + 1] for x in (values, known)
     )
     alike = power / np.maximum(count, 1.0)
-    forgotten = np.flatnonzero(alike < _STRANGERS * max(alike[0], 1e-300))
+    forgotten = np.flatnonzero(alike < _STRANGERS * max(alike[0], TINY))
     return step * float(forgotten[0] if len(forgotten) else most)

@@ -26,7 +26,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop.util.errors import LogError
 
 #: Corners tried, as parts of the highest.
@@ -113,7 +113,7 @@ def choose_bandwidth(
     for table in made:
         left = _held_out(replace(table, moving=rows, tau=made[0].tau))
         size = [root_mean_square(made[0].tau[own, j]) for j, own in enumerate(rows.T)]
-        relative = [left[j] / max(float(size[j]), 1e-300) for j in np.flatnonzero(counted)]
+        relative = [left[j] / max(float(size[j]), TINY) for j in np.flatnonzero(counted)]
         errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, 1e-12))))))
     good = [corner for corner, error in zip(corners, errors, strict=True) if error <= _AS_GOOD * min(errors)]
     return Bandwidth(max(good), tuple(zip(corners, errors, strict=True)))

@@ -22,7 +22,7 @@ from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.bandwidth import Table, root_mean_square, table_at
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Fewer logs than this say nothing of how zeros are spread.
 FEWEST_LOGS = 3
@@ -127,7 +127,7 @@ def _clearly(model: _Mixed, before: Array, after: Array) -> bool:
     """Whether blocks left out have less error, by several standard errors of the mean."""
     gain = np.zeros(int(model.table.blocks.max()) + 1)
     for j, own in model.judged:
-        weight = 1 / max(float(np.mean(before[own, j] ** 2)), 1e-300)
+        weight = 1 / max(float(np.mean(before[own, j] ** 2)), TINY)
         np.add.at(gain, model.table.blocks[own], weight * (before[own, j] ** 2 - after[own, j] ** 2))
     gain = gain[np.unique(model.table.blocks)]
     return bool(gain.mean() > _SURE * gain.std(ddof=1) / np.sqrt(len(gain)))

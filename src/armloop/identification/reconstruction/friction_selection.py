@@ -29,7 +29,7 @@ from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, 
 from armloop.identification.reconstruction.training import Training
 from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 
@@ -216,7 +216,7 @@ class _State:
         self.pooled, self._places = pooled, places
         self._counts = pooled.counts
         self._count = np.maximum(self._counts.sum(axis=0), 1.0)
-        self._rms = np.sqrt(np.maximum(pooled.squares.sum(axis=0) / self._count, 1e-300))
+        self._rms = np.sqrt(np.maximum(pooled.squares.sum(axis=0) / self._count, TINY))
         self.taken: list[list[int]] = [[] for _ in pooled.candidates]
         self.prior: Prior | None = None
         self.prior_name: str | None = None
@@ -293,7 +293,7 @@ class _State:
         In ratios, so that no joint and no fold that happens to be hard outweighs the others. ``joints`` are those
         whose errors the gain is a part of.
         """
-        ratios = np.log(np.maximum(self._errors, 1e-300) / np.maximum(errors, 1e-300))
+        ratios = np.log(np.maximum(self._errors, TINY) / np.maximum(errors, TINY))
         whole = self._count.sum() if joints is None else self._count[joints].sum()
         gains = (self._counts * ratios).sum(axis=1) / whole
         scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf

@@ -245,7 +245,7 @@ def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
         np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
         for j in range(motion.joints)
     ]
-    sums = [Moments(np.zeros((len(w), len(w))), np.zeros(len(w)), 0.0, 0.0) for w in wheres]
+    sums = [Moments.none(len(w)) for w in wheres]
     friction = [
         smooth(samples, np.column_stack([term.column(motion, j) for term in FRICTION]))
         for j in range(motion.joints)

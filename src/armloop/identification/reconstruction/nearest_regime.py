@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from armloop.data.motion import Motion
 from armloop.data.regimes.indicators import units
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Of the largest speed or acceleration: less counts as none.
 _NONE = 1e-6
@@ -29,7 +29,7 @@ class Sorter:
         self._condition = condition
         self._units = [units(a) for a in (motion.v, motion.vdot)]
         sizes = self._sizes(motion)
-        self._floor = _NONE * np.maximum(sizes.max(axis=0, initial=0.0), 1e-300)
+        self._floor = _NONE * np.maximum(sizes.max(axis=0, initial=0.0), TINY)
         points, first = np.unique(self._place(motion), axis=0, return_index=True)
         self._labels = condition[first]
         self._tree = cKDTree(points)

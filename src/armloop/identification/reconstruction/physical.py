@@ -20,7 +20,7 @@ from armloop.dynamics.physics import lowest
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.constrained import Cuts, TooCostly, constrained_least_squares
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop.util.errors import ExcitationError
 
 #: Postures of the motion, and more within the joint limits, at which M(q) is kept positive definite from the start.
@@ -208,9 +208,9 @@ def _within(solution: Solution, cuts: Cuts, known: Array, most: float) -> tuple[
 
     theta, _ = constrained_least_squares(solution.G, solution.b, solution.theta, recorded, most)
     A = np.unique(np.vstack(rows), axis=0)
-    sizes = np.maximum(np.abs(A * theta).sum(axis=1), 1e-300)
+    sizes = np.maximum(np.abs(A * theta).sum(axis=1), TINY)
     A = A[np.abs(A @ theta) < 1e-4 * sizes]
-    return theta, A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), 1e-300)
+    return theta, A / np.maximum(np.linalg.norm(A, axis=1, keepdims=True), TINY)
 
 
 def _violated(body: Body, coefficients: Array, clear: Array, rng: np.random.Generator) -> Array:

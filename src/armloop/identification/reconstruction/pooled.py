@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 from armloop.identification.reconstruction.joint_sums import JointSums
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments, total, unit_length
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: For every joint the candidates of its friction that are used, by their place.
 Choice = list[list[int]]
@@ -119,7 +119,7 @@ class Pooled:
             held_out: fit also what judges the model.
         """
         wholes = self._all if held_out else self._wholes
-        weights = np.array([part.count / max(part.yy, 1e-300) for part in wholes])
+        weights = np.array([part.count / max(part.yy, TINY) for part in wholes])
         for last in [False] * _REWEIGHTINGS + [True]:
             G, b = self._equations(wholes, choice, weights, prior)
             theta = self._solved(G, b, choice)
@@ -128,7 +128,7 @@ class Pooled:
                     max(part.squared_error(own), 1e-12 * part.yy) / max(part.count, 1.0)
                     for part, own in zip(wholes, self._spread(theta, choice), strict=True)
                 ]
-                weights = 1 / np.maximum(errors, 1e-300)
+                weights = 1 / np.maximum(errors, TINY)
         return Solution(theta, G, b, weights, self._repeats)
 
     def relative_errors(self, theta: Array, choice: Choice) -> Array:

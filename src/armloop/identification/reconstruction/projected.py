@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from armloop.data.blocks import block_sums
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 
 _RIDGE = 1e-7
 #: Directions of the model's columns that are weaker than this part of the strongest span nothing.
@@ -178,11 +178,11 @@ class Projected:
         a, b = self._left[judge] ** 2, after[judge] ** 2
         joint, block, fold = rows.joint[judge], rows.block[judge], rows.fold[judge]
         before, left = (np.bincount(joint, weights=x) for x in (a, b))
-        shares = (before - left) / np.maximum(before, 1e-300)
+        shares = (before - left) / np.maximum(before, TINY)
         most = int(np.argmax(before - left))
         here = joint == most
         x, y = block_sums(a[here], block[here]), block_sums(b[here], block[here])
-        parts = (x - y) / np.maximum(x + y, 1e-300)
+        parts = (x - y) / np.maximum(x + y, TINY)
         spread = float(parts.std(ddof=1)) * np.sqrt(len(parts)) if len(parts) > 1 else np.inf
         gains = np.bincount(fold, weights=a) - np.bincount(fold, weights=b)
         return Trial(

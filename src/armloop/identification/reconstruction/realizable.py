@@ -20,7 +20,7 @@ from armloop.dynamics.consistent import barrier_factor, nearest_bodies, scales
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: What the prior weighs beside the cost in units of chi-square: in the end less than a standard error of anything, and
 #: the links keep clear of those that only just exist.
@@ -89,7 +89,7 @@ def realizable_solution(
     G = solution.G / repeats
     gives = np.linalg.lstsq(G[np.ix_(free, free)], G[np.ix_(free, kept)])[0]
     cost = G[np.ix_(kept, kept)] - G[np.ix_(kept, free)] @ gives
-    size = np.sqrt(np.maximum(np.diag(cost), 1e-300))
+    size = np.sqrt(np.maximum(np.diag(cost), TINY))
     values, vectors = np.linalg.eigh(cost / np.outer(size, size))
     factor = (vectors * np.sqrt(np.maximum(values, 0.0))).T * size
 
@@ -109,7 +109,7 @@ def realizable_solution(
     chi_square = 0.0 if exact else float(np.sum((factor @ miss) ** 2))
     if (theta[r:][positive] < 0).any():
         chi_square = np.inf  # a negative inertia beside the links'
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(cost / np.outer(size, size)))[:r], 1e-300)) / size[:r]
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(cost / np.outer(size, size)))[:r], TINY)) / size[:r]
     off = np.abs(miss[:r]) / spread
     # As many conditions bind as there are directions in which the cone's wall is steeper than the data.
     data, wall = factor @ T, barrier_factor(x, n)

@@ -25,7 +25,7 @@ from armloop.identification.reconstruction.sums import Choice
 from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 from armloop.util.progress import Progress
 
 #: Part of the squared residual that repeats after a period of the filter from which on it is no noise.
@@ -146,11 +146,11 @@ class Leftover:
         """
         noise = (self.squares - self.products).sum(axis=0) / np.maximum(self.pairs.sum(axis=0), 1.0)
         repeats = np.where(self.pairs >= _FEWEST, self.products / np.maximum(self.pairs, 1.0), 0.0)
-        share = repeats / np.maximum(repeats + np.maximum(noise, 0.0), 1e-300)
+        share = repeats / np.maximum(repeats + np.maximum(noise, 0.0), TINY)
         label, joint = np.unravel_index(int(np.argmax(share)), share.shape)
         return float(share[label, joint]), int(joint), int(label) + 1
 
     def criterion(self, terms: Array, correlation: float) -> float:
         """Schwarz's criterion of so many terms per joint (n,), summed over the joints."""
         m = np.maximum(self.count / correlation, 2.0)
-        return float(np.sum(m * np.log(np.maximum(self.total, 1e-300)) + np.log(m) * terms))
+        return float(np.sum(m * np.log(np.maximum(self.total, TINY)) + np.log(m) * terms))

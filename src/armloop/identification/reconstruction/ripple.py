@@ -22,7 +22,7 @@ from armloop.data.signals import Conditioning, ShortRunError, preprocess
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 
 #: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
 _BAND = 0.4
@@ -80,7 +80,7 @@ def notes(effects: Sequence[AddedEffect]) -> list[str]:
 
 def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Array] | None:
     """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None."""
-    power = spectrum(left.q, left.left, orders) / max(float(np.sum(left.left**2)), 1e-300)
+    power = spectrum(left.q, left.left, orders) / max(float(np.sum(left.left**2)), TINY)
     for k in np.argsort(power)[::-1][:_MOST]:
         order = float(orders[k])
         beside = (np.abs(orders - order) <= _BESIDE * order) & (np.abs(orders - order) > _NEAREST)
@@ -92,7 +92,7 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
             mine = fold == f
             after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
         a, b = block_sums(y**2, left.block), block_sums(after**2, left.block)
-        parts = (a - b) / np.maximum(a + b, 1e-300)
+        parts = (a - b) / np.maximum(a + b, TINY)
         score = float(parts.sum()) / max(float(parts.std(ddof=1)) * np.sqrt(len(parts)), 1e-12)
         if score > student.isf(_CHANCE / (len(orders) * joints), len(parts) - 1):
             bread = np.linalg.inv(X.T @ X)

@@ -220,14 +220,13 @@ class Problems:
         n, size = len(self.columns.friction), self.columns.library.size
         own = self.columns.span(joint)
         given = [joint, *range(n + own.start, n + own.stop)]
+        p = size + len(given) - 1
         if not cells:
-            p = size + len(given) - 1
-            return Moments(np.zeros((p, p)), np.zeros(p), 0.0, 0.0)
+            return Moments.none(p)
         whole = _total(self.sums.cells[cell] for cell in cells)
         if tuple(cells) not in self._grams:
             self._grams[tuple(cells)] = self.columns.library.gram(whole)
         cross, square = whole.cross[:, given], whole.given[np.ix_(given, given)]
-        p = size + len(given) - 1
         G = np.empty((p, p))
         G[:size, :size] = self._grams[tuple(cells)]
         G[:size, size:], G[size:, :size] = cross[:, 1:], cross[:, 1:].T

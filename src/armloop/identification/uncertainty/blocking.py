@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import TINY, Array, Mask
 
 #: Blocks are so many correlation times long, and where data are short at least so many: what spills over their
 #: ends takes one part in twenty (in four) from the variance of an exponentially correlated residual.
@@ -42,7 +42,7 @@ def correlation_time(residual: Array, rows: Mask, motion: Motion, period: float)
             products += _autocovariance(z[part], lags)
             pairs += _autocovariance(rows[part].astype(float), lags)
     known = np.flatnonzero(pairs > max(1.0, _PARTNERS * pairs[0]))
-    rho = products[known] / pairs[known] / max(products[0] / pairs[0], 1e-300)
+    rho = products[known] / pairs[known] / max(products[0] / pairs[0], TINY)
     ends = np.flatnonzero(rho <= 0)
     last = int(ends[0]) if len(ends) else len(rho) - 1
     area = np.trapezoid(np.maximum(rho[: last + 1], 0.0), known[: last + 1] * period)

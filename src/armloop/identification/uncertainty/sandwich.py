@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
 _RIDGE = 1e-10
@@ -94,5 +94,5 @@ class Equations:
         inverse = np.linalg.inv(total + _RIDGE * np.eye(len(total)))
         noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
         weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
-        effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300)
+        effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY)
         return np.maximum(effective - 1, 1.0)

@@ -29,7 +29,7 @@ from armloop.identification.uncertainty.sandwich import Equations
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, identifiable
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0
@@ -242,7 +242,7 @@ class Assembled:
 
     def misfit(self) -> float:
         """Sum over the joints of mean squared residual relative to mean squared torque."""
-        return float((self.squares / np.maximum(self.power, 1e-300)).sum())
+        return float((self.squares / np.maximum(self.power, TINY)).sum())
 
 
 def _summed(blocks: Array, p: int) -> Array:
@@ -310,7 +310,7 @@ def _equations(
     for portion in _walk(problem, samples, fitted):
         if squares is not None:
             squares[portion.joint] += portion.r @ portion.r
-        weight = 1 / max(spread[portion.stage, portion.joint], 1e-300) if problem.weighted else 1.0
+        weight = 1 / max(spread[portion.stage, portion.joint], TINY) if problem.weighted else 1.0
         own = stages[portion.where] == portion.stage
         seen = stages[portion.where] <= portion.stage
         rows, columns = portion.where[own], portion.where[seen]

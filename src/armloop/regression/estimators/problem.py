@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from armloop.regression.moments import DEPENDENT, Moments, total, unit_length
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import TINY, Array, Index
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class Reduction:
             h = solve_triangular(L, d * moments.b[forced], lower=True)
             G, b, yy = G - H.T @ H, b - H.T @ h, yy - float(h @ h)
             onto = d[:, None] * solve_triangular(L, H, lower=True, trans="T")
-        left = np.diag(G) > DEPENDENT * np.maximum(size, 1e-300)
+        left = np.diag(G) > DEPENDENT * np.maximum(size, TINY)
         free, G, b, onto = free[left].astype(np.intp), G[np.ix_(left, left)], b[left], onto[:, left]
         yy = max(yy, 0.0)
         unit, signal = 1 / np.sqrt(np.diag(G)), np.sqrt(yy) or 1.0
