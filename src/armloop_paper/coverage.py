@@ -21,6 +21,7 @@ from armloop.identification.uncertainty.standard_errors import Fitted
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
+from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
 from armloop_paper.simulated import Collection, Disturbance, collection, true_model
 
@@ -180,11 +181,7 @@ def _summary(name: str, runs: Sequence[_Run]) -> Covered:
         coefficients={k: int((kinds == k).sum()) for k in names},
         blocks={k: float(np.mean(np.abs(error) <= half, axis=0)[kinds == k].mean()) for k in names},
         independent={k: float(np.mean(np.abs(error) <= plain, axis=0)[kinds == k].mean()) for k in names},
-        bias={k: _finite(np.sqrt(np.nanmean(off[kinds == k] ** 2))) for k in names},
-        width={k: _finite(np.nanmedian(wide[kinds == k])) for k in names},
+        bias={k: finite(np.sqrt(np.nanmean(off[kinds == k] ** 2))) for k in names},
+        width={k: finite(np.nanmedian(wide[kinds == k])) for k in names},
         block_count=float(np.mean([run.blocks for run in runs])),
     )
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None

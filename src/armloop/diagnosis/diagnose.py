@@ -33,6 +33,7 @@ from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
+from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
 from armloop.util.workers import one_thread
 
@@ -182,7 +183,7 @@ class Diagnosis:
             "joints": self.standing.joints,
             **({"encoder_zeros": self.zeros.tolist()} if self.zeros.any() else {}),
             "effects": effects,
-            "error": _null(self.errors()),
+            "error": finite(self.errors()),
         }
 
 
@@ -201,15 +202,6 @@ def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
 def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:
     """Entries of what this motion cannot tell from an effect."""
     return [{**entry(*one.place), "share": share, "why": why_alike(effect, one)} for one, share in confounded]
-
-
-def _null(value: Any) -> Any:
-    """The same for JSON, which has null in place of NaN."""
-    if isinstance(value, dict):
-        return {key: _null(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_null(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 @one_thread

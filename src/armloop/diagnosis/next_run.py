@@ -19,6 +19,7 @@ from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.isolability import Stage
 from armloop.diagnosis.planning import FAR_ENOUGH, Planner, Wish, training_ranges
 from armloop.experiment.design import sampled
+from armloop.experiment.design.limits import LIMITED
 from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import Effect
 from armloop.laws.effects.base import entry
@@ -67,14 +68,13 @@ class NextRun:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        names = ("position", "velocity", "acceleration", "torque")
         return {
             "purpose": self.purpose,
             "duration": self.reference.duration,
             "alternatives": [told.to_dict() for told in self.told],
             "std_error_factor": [{**entry(*e.place), "factor": x} for e, x in self.sharper],
             "joint": self.joint,
-            "use": {name: row.tolist() for name, row in zip(names, self.use, strict=True)},
+            "use": dict(zip(LIMITED, self.use.tolist(), strict=True)),
         }
 
 

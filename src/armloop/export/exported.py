@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Motion
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
+from armloop.util.finite import finite
 
 _MOST = 400
 
@@ -47,8 +48,8 @@ class Exported:
             "files": [str(path) for path in self.files],
             "read_back_by": self.consumer or None,
             "rms": self.rms.tolist(),
-            "difference": None if self.difference is None else self.difference.tolist(),
-            "difference_from_model": None if self.unsaid is None else self.unsaid.tolist(),
+            "difference": finite(self.difference),
+            "difference_from_model": finite(self.unsaid),
             "cannot_say": self.missing,
             "notes": self.notes,
         }

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.util.arrays import TINY, Array
+from armloop.util.finite import finite
 
 _DAY = 86400.0
 #: Difference of the Bayesian information criterion that decides (Kass and Raftery 1995: strong).
@@ -36,7 +37,7 @@ class Course:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        drift = None if not np.isfinite(self.per_day) else self.per_day
+        drift = finite(self.per_day)
         return {"form": self.form, "size": self.size, "per_day": drift, "margin": self.margin}
 
 

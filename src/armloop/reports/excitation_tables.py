@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armloop.experiment.design.limits import LIMITED
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import number
 
 if TYPE_CHECKING:
     from armloop.experiment.design import DataRatio, Excitation
-
-_LIMITS = ("position", "velocity", "acceleration", "torque")
 
 
 def measures_table(result: Excitation) -> Table:
@@ -39,7 +38,7 @@ def measures_table(result: Excitation) -> Table:
 def use_table(result: Excitation) -> Table:
     """The largest part of each limit that the reference uses, per joint."""
     rows = []
-    for name, parts, bounded in zip(_LIMITS, result.use, _bounded(result), strict=True):
+    for name, parts, bounded in zip(LIMITED, result.use, _bounded(result), strict=True):
         rows.append(
             [
                 name,

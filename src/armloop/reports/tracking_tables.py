@@ -53,12 +53,8 @@ def metrics_table(
             row += (
                 [None] * 5
                 if m is None
-                else [_there(x[j]) for x in (m.effort, 100 * m.clipped, m.stick, m.settling, m.unsettled)]
+                else [x[j] for x in (m.effort, 100 * m.clipped, m.stick, m.settling, m.unsettled)]
             )
             rows.append(row)
     headers = ["RMS", "max", "effort [N·m, N]", "clipped [%]", "stick [s]", "settling [s]", "unsettled"]
     return make_table(["controller", "joint", "unit", *headers], rows, title)
-
-
-def _there(value: float) -> float | None:
-    return None if value != value else float(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import json
-import math
 import os
 import secrets
 import stat
@@ -15,6 +14,7 @@ from typing import Any
 
 from armloop.util import outputs
 from armloop.util.errors import InputError
+from armloop.util.finite import finite
 
 #: Bytes of a file's name that its draft keeps; with the rest of the draft's name they fit wherever the file does.
 _KEPT = 120
@@ -82,17 +82,7 @@ def strict(value: Any, indent: int | None = None) -> str:
     try:
         return json.dumps(value, indent=indent, allow_nan=False)
     except ValueError:  # looked at item by item only where there is one to find
-        return json.dumps(_finite(value), indent=indent, allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    return value
+        return json.dumps(finite(value), indent=indent, allow_nan=False)
 
 
 def write_figure(path: str | Path, figure: Any, **how: Any) -> None:

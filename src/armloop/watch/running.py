@@ -20,6 +20,7 @@ from armloop.monitoring.alarms import Alarm, Reached
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.units import Units
 from armloop.util.arrays import Array
+from armloop.util.finite import finite
 from armloop.watch.history import Head, History
 from armloop.watch.store import Store, lists, matrix, placing
 
@@ -97,7 +98,7 @@ class Running:
             ],
             "columns": [column.key for column in units.columns],
             "reached": vars(self.reached),
-            "most": _finite(self.most.tolist()),
+            "most": finite(self.most),
             "alarms": self.alarms,
             "last": None if self.last is None else _told(self.last),
             "limit": self.limit,
@@ -162,16 +163,12 @@ def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> Histo
     return History(tuple(heads), units, matrix(table["piece"]).astype(np.intp))
 
 
-def _finite(values: Sequence[float]) -> list[float | None]:
-    return [value if np.isfinite(value) else None for value in values]
-
-
 def _numbers(values: Sequence[float | None]) -> list[float]:
     return [-np.inf if value is None else value for value in values]
 
 
 def _told(last: Last) -> dict[str, Any]:
-    return {**vars(last), "alarm": vars(last.alarm), "evidence": _finite(last.evidence)}
+    return {**vars(last), "alarm": vars(last.alarm), "evidence": finite(last.evidence)}
 
 
 def _read(last: dict[str, Any]) -> Last:

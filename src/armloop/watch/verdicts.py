@@ -23,6 +23,7 @@ from armloop.monitoring.units import Stream, scores, streams
 from armloop.monitoring.warmth import FRICTION, Adjusted, adjust, without_warmth
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
+from armloop.util.finite import finite
 from armloop.watch.fleet import model_and_digest
 from armloop.watch.history import Head, History
 from armloop.watch.running import Last, Running, stored
@@ -299,12 +300,7 @@ def _by_place(listed: Sequence[Stream], most: Array) -> list[dict[str, Any]]:
     for stream, value in zip(listed, most.tolist(), strict=True):
         found[stream.place] = max(found.get(stream.place, -np.inf), value)
     return [
-        {
-            "effect": name,
-            "joint": joint,
-            "other_joint": other,
-            "log_evidence": value if np.isfinite(value) else None,
-        }
+        {"effect": name, "joint": joint, "other_joint": other, "log_evidence": finite(value)}
         for (name, joint, other), value in found.items()
     ]
 

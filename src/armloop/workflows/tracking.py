@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from armloop.drake.experiments.collection import collect
 from armloop.drake.experiments.metrics import BAND
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan
@@ -23,6 +21,7 @@ from armloop.drake.view.live import LiveView
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
 from armloop.util.files import write_figure, write_json
+from armloop.util.finite import finite
 from armloop.util.progress import Progress
 
 SCHEMA = "armloop/tracking/1"
@@ -119,7 +118,7 @@ def result_answer(result: TrackingResult) -> dict[str, Any]:
             "effort": m.effort.tolist(),
             "clipped": m.clipped.tolist(),
             "stick_s": m.stick.tolist(),
-            "settling_s": [None if np.isnan(x) else x for x in m.settling.tolist()],
-            "unsettled": [None if np.isnan(x) else x for x in m.unsettled.tolist()],
+            "settling_s": finite(m.settling),
+            "unsettled": finite(m.unsettled),
         }
     return answer

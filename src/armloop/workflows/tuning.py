@@ -15,6 +15,7 @@ from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning, look_at
 from armloop.dynamics import with_mass_matrix
 from armloop.model import ReconstructedModel
 from armloop.util.files import write_figure, write_json, write_text
+from armloop.util.finite import finite
 from armloop.util.progress import Progress
 
 SCHEMA = "armloop/tune/1"
@@ -83,14 +84,8 @@ def _answer(loop: TunedLoop) -> dict[str, Any]:
     return {
         "gains": {"kp": gains.kp.tolist(), "ki": gains.ki.tolist(), "kd": gains.kd.tolist()},
         "stable": loop.stable,
-        "loop": [
-            {key: value if np.isfinite(value) else None for key, value in asdict(m).items()}
-            for m in loop.margins
-        ],
-        "along_reference": {
-            "phase_margin": [x if np.isfinite(x) else None for x in phase.tolist()],
-            "sensitivity_peak": peak.tolist(),
-        },
+        "loop": [finite(asdict(m)) for m in loop.margins],
+        "along_reference": {"phase_margin": finite(phase), "sensitivity_peak": peak.tolist()},
         "step_deviation": loop.deviation().tolist(),
         "eta_deg": {name: result.eta.tolist() for name, result in loop.tracking.items()},
     }

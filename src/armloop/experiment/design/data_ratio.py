@@ -12,6 +12,7 @@ from armloop.data.motion import Motion
 from armloop.experiment.design.criteria import ROUND_OFF
 from armloop.experiment.design.information import Regression
 from armloop.util.arrays import Array
+from armloop.util.finite import finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +41,12 @@ class DataRatio:
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values; a ratio beyond the largest amount of data that was tried is null."""
         low, middle, high = np.quantile(self.ratios, [0.1, 0.5, 0.9], method="nearest")
-        ratios = {"median": middle, "low": low, "high": high}
         return {
-            **{key: _finite(x) for key, x in ratios.items()},
+            **finite({"median": middle, "low": low, "high": high}),
             "most": int(self.trajectories[-1]),
             "error": {
-                "optimised": [_finite(x) for x in _rms(self.optimised)],
-                "random": [_finite(x) for x in np.median(_rms(self.random), axis=0)],
+                "optimised": finite(_rms(self.optimised)),
+                "random": finite(np.median(_rms(self.random), axis=0)),
             },
         }
 
@@ -107,10 +107,6 @@ def _errors(parts: Sequence[_Known], noises: int, rng: np.random.Generator) -> A
         error = vectors @ ((vectors.T @ b) / values[:, None]) if known else np.full_like(b, np.inf)
         errors[:, k] = np.sqrt(np.mean(error**2, axis=0))
     return errors
-
-
-def _finite(x: float) -> float | None:
-    return float(x) if np.isfinite(x) else None
 
 
 def _rms(errors: Array) -> Array:

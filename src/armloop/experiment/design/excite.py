@@ -12,7 +12,7 @@ from armloop.experiment.design.columns import double_feature_columns, rigid_body
 from armloop.experiment.design.criteria import CRITERIA, ROUND_OFF, condition_number
 from armloop.experiment.design.data_ratio import DataRatio, data_ratio
 from armloop.experiment.design.information import Regression
-from armloop.experiment.design.limits import Limits, TorqueLaw, check_rest, nominal_torque
+from armloop.experiment.design.limits import LIMITED, Limits, TorqueLaw, check_rest, nominal_torque
 from armloop.experiment.design.optimise import Problem
 from armloop.experiment.design.random import random_references
 from armloop.experiment.design.series import Series, sampled
@@ -21,6 +21,7 @@ from armloop.experiment.excitation import FourierReference, MotionRanges
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
+from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
 from armloop.util.workers import one_thread
 
@@ -90,7 +91,6 @@ class Excitation:
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop excite --json``, without the path."""
-        names = ("position", "velocity", "acceleration", "torque")
         table = {key: [getattr(m, key) for m in self.random] for key in ("condition", "logdet", "error")}
         return {
             "library": self.settings.library,
@@ -99,9 +99,10 @@ class Excitation:
             "duration": self.timing.duration,
             "period": self.timing.period,
             "harmonics": self.timing.harmonics,
-            **{key: _finite(getattr(self.measure, key)) for key in table},
+            # a measure is infinite where some coefficients are not determined at all
+            **{key: finite(getattr(self.measure, key)) for key in table},
             "random": {key: _spread(values) for key, values in table.items()},
-            "use": {name: row.tolist() for name, row in zip(names, self.use, strict=True)},
+            "use": dict(zip(LIMITED, self.use.tolist(), strict=True)),
             "notes": self.notes,
         }
 
@@ -219,9 +220,4 @@ def _effort_notes(arm: Arm, torque: TorqueLaw) -> list[str]:
 
 def _spread(values: list[float]) -> dict[str, float | None]:
     low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="nearest")
-    return {"median": _finite(median), "low": _finite(low), "high": _finite(high), "count": len(values)}
-
-
-def _finite(value: float) -> float | None:
-    """JSON knows no infinity; where a measure has it, some coefficients are not determined at all."""
-    return float(value) if np.isfinite(value) else None
+    return finite({"median": median, "low": low, "high": high, "count": len(values)})

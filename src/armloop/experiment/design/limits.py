@@ -19,6 +19,8 @@ from armloop.util.errors import InputError
 TorqueLaw = Callable[[Motion], Array]
 """Predicted joint torques (N, n) of a motion, N*m (N)."""
 
+#: What is limited, in the order of `Limits.use`.
+LIMITED = ("position", "velocity", "acceleration", "torque")
 #: Steps in which a motion is made smaller until its torque fits.
 _SHRINK = 0.97
 _SMALLEST = 0.02
