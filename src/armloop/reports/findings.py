@@ -75,15 +75,15 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     faulty = [a for a in added if a.effect.sensor]
     if not faulty:
         return []
-    arm = [effect_label(a.effect) for a in added if not a.effect.sensor]
-    what = "recording" if all(a.effect.name == "time_delay" for a in faulty) else "sensor"
-    who = f"{listed([effect_label(a.effect) for a in faulty])}: the {what} is at fault, not the arm."
-    apart = (
-        " The augmented model keeps this apart from the dynamics: it predicts what is recorded, and its "
-        "feedforward, inertia and gravity are those of the arm"
+    who = listed([effect_label(a.effect) for a in faulty])
+    say = Prose(
+        "findings",
+        who=who[:1].upper() + who[1:],
+        what="recording" if all(a.effect.name == "time_delay" for a in faulty) else "sensor",
+        arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
+        remedies=[remedy(a) for a in faulty],
     )
-    apart += f" with {listed(arm)}." if arm else ", unchanged."
-    return [who[:1].upper() + who[1:] + apart, *(f"{unit(remedy(a))}." for a in faulty)]
+    return say.paragraphs("blame")
 
 
 def confounded(diagnosis: Diagnosis) -> list[tuple[str, list[tuple[str, str]]]]:

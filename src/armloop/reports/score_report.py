@@ -30,9 +30,9 @@ def score_figure(score: Score, arm: Arm) -> Figure:
 
 def score_report(score: Score, arm: Arm) -> str:
     """One HTML page on a score."""
-    text = Prose("score", score=score).paragraphs("text")
-    picture = Picture(score_figure(score, arm), "RMSE over the RMS of the measured torque, joint by joint.")
-    section = Section("Prediction error", text, [picture], [score_table(score, arm)])
+    say = Prose("score", score=score)
+    picture = Picture(score_figure(score, arm), say["errors"])
+    section = Section("Prediction error", say.paragraphs("text"), [picture], [score_table(score, arm)])
     card = Card(percent(mean_nrmse(score)), "Prediction error", "nRMSE while moving, mean of the joints")
     return render(
         Report(f"A model of {arm.name}, evaluated", "Predicted and measured torques.", [section], [card])
