@@ -6,7 +6,7 @@ from exact_parts import model_of
 from numpy.testing import assert_allclose
 from pydrake.systems.framework import DiagramBuilder
 
-from armloop.drake.control.computed_torque import ComputedTorque
+from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
 from armloop.drake.control.feedforward import Feedforward
 from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
@@ -110,7 +110,7 @@ def test_what_is_sampled_is_sampled_from_the_start():
     model, gains = model_of(load_arm("three_axis")), PidGains([80.0] * 3, [8.0] * 3, [2.0] * 3)
     systems = [
         PidController(gains, 0.5),
-        ComputedTorque(model, gains, period=0.5),
+        ComputedTorque(model, AccelerationGains([80.0] * 3, [2.0] * 3, [8.0] * 3), period=0.5),
         RateLimiter(np.ones(3), np.ones(3), 0.5),
         ReferenceSource(paper_reference(), 0.5),
     ]

@@ -29,11 +29,17 @@ def _is_number(x: Any) -> bool:
     return type(x) is not bool and isinstance(x, Real) and isfinite(float(x))
 
 
+def _is_whole(x: Any) -> bool:
+    return type(x) is not bool and isinstance(x, Integral)
+
+
 #: What an option can be, by the words that a message says it with.
 _KINDS: dict[str, Callable[[Any], bool]] = {
     "a word": lambda x: isinstance(x, str),
     "a finite number": _is_number,
-    "a whole number": lambda x: isinstance(x, Integral) and not isinstance(x, bool),
+    "a number above 0": lambda x: _is_number(x) and x > 0,
+    "a whole number": _is_whole,
+    "a whole number above 0": lambda x: _is_whole(x) and x > 0,
     "True or False": lambda x: type(x).__name__ in ("bool", "bool_"),  # numpy's, too
     "a function": callable,
 }
@@ -59,6 +65,23 @@ def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one p
     if not fits or not np.isfinite(found).all():
         size = " x ".join(map(str, shape))
         raise InputError(f"{what} must be {size} finite numbers, {each}; it is {_shown(given)}")
+    return found.astype(np.float64)
+
+
+def levels_of(given: Any, n: int, what: str) -> Array:
+    """What was given, one number for all or one per joint, as (n,) finite numbers of at least 0; raises ``InputError``."""
+    import numpy as np
+
+    try:
+        found = np.asarray(given)
+        found = found if found.ndim else np.full(n, found)
+        fits = found.dtype.kind in "fiu" and found.shape == (n,)
+    except (TypeError, ValueError):
+        fits = False
+    if not fits or not (np.isfinite(found) & (found >= 0)).all():
+        raise InputError(
+            f"{what} must be {n} finite numbers of at least 0, one per joint; it is {_shown(given)}"
+        )
     return found.astype(np.float64)
 
 

@@ -129,5 +129,5 @@ def test_by_default_half_of_the_effort_and_times_above_zero() -> None:
     system = AdaptiveFeedforward(model)
     assert_allclose(system._bound, [0.5 * joint.effort for joint in three_axis().joints])
     for wrong in ({"ramp": 0.0}, {"trial": 0.05}, {"bound": [1.0, 0.0, 1.0]}):
-        with pytest.raises(ValueError, match="must be above 0"):
+        with pytest.raises(ValueError, match="above 0"):
             AdaptiveFeedforward(model, **wrong)  # type: ignore[arg-type]

@@ -102,5 +102,5 @@ def test_what_remembers_has_a_system_of_its_own(arm) -> None:
 def test_a_width_is_above_zero_and_there_are_one_or_as_many_as_joints() -> None:
     assert per_joint(1, 2) == [1.0, 1.0] and per_joint((0.1, 2), 2) == [0.1, 2.0]
     for wrong in (0, -1.0, [0.1], [0.1, 0.0], [0.1, 0.2, 0.3]):
-        with pytest.raises(ValueError, match="one number or one for each of 2 joints"):
+        with pytest.raises(ValueError, match=r"smoothing (must be 2 finite numbers|is .* must be above 0)"):
             per_joint(wrong, 2)

@@ -19,7 +19,7 @@ def test_a_step_lasts_a_millisecond_by_default_and_longer_than_nothing() -> None
         timing = system.GetUniquePeriodicDiscreteUpdateAttribute()
         assert (timing.period_sec(), timing.offset_sec()) == (period, 0.0)
     for step in (0.0, -1e-3):
-        with pytest.raises(ValueError, match="it must be above 0 s"):
+        with pytest.raises(ValueError, match="time_step must be a number above 0"):
             StickingForwardDynamics(model, step)
 
 

@@ -9,10 +9,14 @@ from numpy.typing import ArrayLike
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, LeafSystem, State
 
+from armloop.drake.given import require_of
 from armloop.laws.effects.base import Pointwise
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.monitoring.blockwise import Known
+from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.given import levels_of, require
 
 Effects = tuple[AddedEffect, ...]
 
@@ -77,14 +81,16 @@ class AdaptiveFeedforward(LeafSystem):
     ) -> None:
         """model : of n joints; ramp, trial : s; bound : (n,) N*m (N), by default half of the drives' effort.
 
-        Raises `ValueError` when a time or a bound is not above 0.
+        Raises `InputError` when a time or a bound is not above 0.
         """
+        require_of(Arm, **{"the model's arm": getattr(model, "arm", None)})
+        require("a number above 0", ramp=ramp, trial=trial)
         super().__init__()
         n = self._n = model.arm.n
         effort = np.array([joint.effort for joint in model.arm.joints])
-        limits = 0.5 * effort if bound is None else np.broadcast_to(np.asarray(bound, dtype=float), (n,))
+        limits = 0.5 * effort if bound is None else levels_of(bound, n, "bound")
         if not (ramp > 0 and trial > _LOOK and (limits > 0).all()):
-            raise ValueError(f"ramp {ramp} s, trial {trial} s and bound {limits} must be above 0")
+            raise InputError(f"ramp {ramp} s, trial {trial} s and bound {limits} must be above 0")
         self._model, self._ramp, self._trial, self._bound = model, ramp, trial, limits
         # by identity, for parameters cannot be hashed; the effects are kept so that no other takes their place
         self._laws: dict[int, tuple[Effects, list[Pointwise]]] = {}

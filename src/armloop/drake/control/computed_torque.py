@@ -10,12 +10,15 @@ import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
 from armloop.drake.control.pid import check_gains
+from armloop.drake.given import require_joints, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.model.pointwise import InverseDynamics
 from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.given import require
 
 FRICTION_SOURCES = ("reference", "state", "none")
 
@@ -33,7 +36,7 @@ class InverseDynamicsModel(Protocol):
 class AccelerationGains:
     """Gains (n,) on the acceleration: kp 1/s^2, kd 1/s, ki 1/s^3 (none by default).
 
-    Raises `ValueError` when they are not finite numbers of at least 0, one per joint.
+    Raises `InputError` when they are not finite numbers of at least 0, one per joint.
     """
 
     kp: Array
@@ -42,12 +45,14 @@ class AccelerationGains:
 
     def __post_init__(self) -> None:
         if self.ki is None:
-            object.__setattr__(self, "ki", np.zeros_like(np.atleast_1d(np.asarray(self.kp, dtype=float))))
+            object.__setattr__(self, "ki", np.zeros(len(self.kp) if np.ndim(self.kp) else 1))
         check_gains(self, "kp", "kd", "ki")
 
     @staticmethod
     def critical(n: int, bandwidth: float = 20.0) -> AccelerationGains:
         """Return kp = w^2, kd = 2 w for n joints: errors decay critically damped at w = `bandwidth`, rad/s."""
+        require("a whole number above 0", n=n)
+        require("a number above 0", bandwidth=bandwidth)
         return AccelerationGains(np.full(n, bandwidth**2), np.full(n, 2 * bandwidth))
 
 
@@ -92,9 +97,17 @@ def ComputedTorque_(T: type) -> Any:
             period: float | None = None,
             converter: Any = None,
         ) -> None:
-            """model : such as one of `armloop.model.load_model`; gains : of its n joints; period : s."""
-            if friction_at not in FRICTION_SOURCES:
-                raise ValueError(f"friction_at is {friction_at!r}; it must be {', '.join(FRICTION_SOURCES)}")
+            """model : such as one of `armloop.model.load_model`; gains : of its n joints; period : s.
+
+            Raises `InputError` where they are none, or not of the same joints.
+            """
+            require_predicts(model)
+            require_of(AccelerationGains, gains=gains)
+            require_joints(model, len(gains.kp), "the gains are for")
+            if period is not None:
+                require("a number above 0", period=period)
+            if not isinstance(friction_at, str) or friction_at not in FRICTION_SOURCES:
+                raise InputError(f"friction_at is {friction_at!r}; it must be {', '.join(FRICTION_SOURCES)}")
             if not isinstance(model, ReconstructedModel):
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
@@ -125,6 +138,8 @@ def ComputedTorque_(T: type) -> Any:
 
         def set_model(self, model: InverseDynamicsModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            require_predicts(model)
+            require_joints(model, self._n, "this controller is for")
             self._drive = _drive(model)
             self._arguments = model, self._arguments[1]
 

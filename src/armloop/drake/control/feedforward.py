@@ -9,11 +9,14 @@ from typing import Any, Protocol
 import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
+from armloop.drake.given import require_joints, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
+from armloop.util.errors import InputError
+from armloop.util.given import require
 
 
 class FeedforwardModel(Protocol):
@@ -57,11 +60,11 @@ def Feedforward_(T: type) -> Any:
         ) -> None:
             """model : see `FeedforwardModel`; step : 1, 2 or 3; n : joints of a model without an arm; stacked : one port.
 
-            Raises `ValueError` for another step, or where the model's number of joints is not known or not n.
+            Raises `InputError` for what is no model, another step, a number of joints that is not known or another.
             """
+            require_predicts(model)
+            require_step(step, " (a model knows its joints)")
             n = _joints(model, n)
-            if step not in (1, 2, 3):
-                raise ValueError(f"step is {step!r}; it must be 1, 2 or 3 (a model knows its joints)")
             if not isinstance(model, ReconstructedModel):
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
@@ -82,6 +85,8 @@ def Feedforward_(T: type) -> Any:
 
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            require_predicts(model)
+            require_joints(model, self._n, "this feedforward is for")
             self._arguments = model, *self._arguments[1:]
             self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[1])
 
@@ -119,10 +124,11 @@ def _joints(model: FeedforwardModel, n: int | None) -> int:
     known: int | None = getattr(getattr(model, "arm", None), "n", None)
     if known is None:
         if n is None:
-            raise ValueError(f"{type(model).__name__} has no arm: say its number of joints with n=")
+            raise InputError(f"{type(model).__name__} has no arm: say its number of joints with n=")
+        require("a whole number above 0", n=n)
         return n
-    if n is not None and known != n:
-        raise ValueError(f"n is {n}; the model's arm has {known} joints")
+    if n is not None and not (isinstance(n, int) and known == n):
+        raise InputError(f"n is {n}; the model's arm has {known} joints")
     return int(known)
 
 

@@ -11,25 +11,26 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator
 
+from armloop.drake.given import require_of
 from armloop.drake.scalar_types import scalar_template
 from armloop.util.arrays import Array
+from armloop.util.given import levels_of, require
 
 
 def check_gains(gains: Any, *names: str) -> None:
-    """Make fields arrays (n,); raises `ValueError` when they are not finite, of at least 0, as many as the first."""
+    """Make fields arrays (n,); raises `InputError` when they are not finite, of at least 0, as many as the first."""
+    first = getattr(gains, names[0])
+    n = len(first) if np.ndim(first) else 1
     for name in names:
-        value = np.atleast_1d(np.asarray(getattr(gains, name), dtype=float))
-        object.__setattr__(gains, name, value)
-        alike = value.ndim == 1 and value.shape == getattr(gains, names[0]).shape
-        if not (alike and np.isfinite(value).all() and (value >= 0).all()):
-            raise ValueError(f"{name} must be finite numbers of at least 0, one per joint; it is {value}")
+        value = getattr(gains, name)
+        object.__setattr__(gains, name, levels_of(value if np.ndim(value) else [value], n, name))
 
 
 @dataclass(frozen=True, eq=False)
 class PidGains:
     """Gains (n,): kp N*m/rad, ki N*m/(rad s), kd N*m*s/rad (N/m, .. for a prismatic joint).
 
-    Raises `ValueError` when they are not finite numbers of at least 0, one per joint.
+    Raises `InputError` when they are not finite numbers of at least 0, one per joint.
     """
 
     kp: Array
@@ -42,6 +43,7 @@ class PidGains:
     @staticmethod
     def paper(n: int) -> PidGains:
         """Return the gains of Sect. 4.3, 80, 8, 2, for n joints."""
+        require("a whole number above 0", n=n)
         return PidGains(np.full(n, 80.0), np.full(n, 8.0), np.full(n, 2.0))
 
 
@@ -61,9 +63,16 @@ class PidController(Diagram):
     """
 
     def __init__(self, gains: PidGains, period: float, resolution: ArrayLike = 0.0) -> None:
-        """gains : n joints; period : s; resolution : rad (m) per encoder count, 0 for ideal encoders."""
-        super().__init__()
+        """gains : n joints; period : s; resolution : rad (m) per encoder count, 0 for ideal encoders.
+
+        Raises `InputError` for gains that are none, a period not above 0 or a resolution below 0.
+        """
+        require_of(PidGains, gains=gains)
+        require("a number above 0", period=period)
         n = len(gains.kp)
+        resolution = levels_of(resolution, n, "resolution")
+        super().__init__()
+        self.period = float(period)
         builder = DiagramBuilder()
         template = _EncodedPidLaw_ if np.any(resolution) else _PidLaw_
         law = builder.AddNamedSystem("law", template[None](gains, resolution))

@@ -11,6 +11,8 @@ from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import vector, with_signature
+from armloop.util.errors import InputError
+from armloop.util.given import require
 
 
 @scalar_template("RateLimiter_", __name__)
@@ -33,13 +35,16 @@ def RateLimiter_(T: type) -> Any:
         ) -> None:
             """effort : (n,) N*m (N); rate : (n,) N*m/s (N/s); period : s.
 
-            Raises `ValueError` when they are not above 0, or not for the same joints.
+            Raises `InputError` when they are not above 0, or not for the same joints.
             """
-            limits, rates = (np.atleast_1d(np.asarray(x, dtype=float)) for x in (effort, rate))
+            require("a number above 0", period=period)
+            limits, rates = (np.atleast_1d(np.asarray(x)) for x in (effort, rate))
+            if not {limits.dtype.kind, rates.dtype.kind} <= set("fiu"):
+                raise InputError("effort and rate must be numbers above 0, one per joint")
             if limits.shape != rates.shape or limits.ndim != 1:
-                raise ValueError(f"effort is for {limits.size} joints, rate for {rates.size}")
+                raise InputError(f"effort is for {limits.size} joints, rate for {rates.size}")
             if not (np.all(limits > 0) and np.all(rates > 0) and period > 0):
-                raise ValueError("effort, rate and period must be above 0")
+                raise InputError("effort, rate and period must be above 0")
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = effort, rate, period
             self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))

@@ -18,14 +18,16 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import Demultiplexer
 
 from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.given import require_joints, require_predicts, require_reference, require_step
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import vector
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
-from armloop.util.errors import ModelError
+from armloop.util.errors import InputError, ModelError
 from armloop.util.functions import NUMPY
+from armloop.util.given import numbers_of, require
 
 _CHUNK = 1000  # rows of feedforward evaluated at once, when the first of them is needed
 
@@ -70,7 +72,14 @@ class ReferenceSource(Diagram):
     def __init__(
         self, reference: Reference, period: float, model: FeedforwardModel | None = None, step: int = 3
     ) -> None:
-        """reference : what to follow; period : s; model, step : see `Feedforward`."""
+        """reference : what to follow; period : s; model, step : see `Feedforward`.
+
+        Raises `InputError` for what is none, or where the model is of another number of joints.
+        """
+        require("a number above 0", period=period)
+        require_reference(reference)
+        if not period <= reference.duration:
+            raise InputError(f"the period is {period:g} s, the reference lasts {reference.duration:g} s only")
         super().__init__()
         self.tables = reference.evaluate(period * np.arange(round(reference.duration / period) + 1))
         n = self.tables[0].shape[1]
@@ -116,6 +125,10 @@ def _ReferenceTable_(T: type) -> Any:
             self._rows, self._filled = other._rows.copy(), list(other._filled)
 
         def set_model(self, model: FeedforwardModel | None, step: int) -> None:
+            require_step(step)
+            if model is not None:
+                require_predicts(model)
+                require_joints(model, self._n, "the reference is for")
             self._model, self._step = model, step
             self._equations = None
             if isinstance(model, ReconstructedModel):
@@ -126,7 +139,9 @@ def _ReferenceTable_(T: type) -> Any:
             self._filled = [model is None] * (len(self._rows) // _CHUNK + 1)
 
         def set_torques(self, tau: Array) -> None:
-            self._rows[:, 3 * self._n :] = tau
+            self._rows[:, 3 * self._n :] = numbers_of(
+                tau, (len(self._rows), self._n), "tau", "a row per period"
+            )
             self._filled = [True] * len(self._filled)
 
         def _calc_row(self, context: Any, output: Any) -> None:
@@ -147,9 +162,12 @@ def _ReferenceTable_(T: type) -> Any:
                 rows[:, 3 * n :] = np.stack([np.broadcast_to(x, len(rows)) for x in columns], axis=1)
             else:
                 assert self._model is not None
-                rows[:, 3 * n :] = [
-                    self._model.feedforward(*state, self._step) for state in zip(q, v, vdot, strict=True)
-                ]
+                tau = [self._model.feedforward(*state, self._step) for state in zip(q, v, vdot, strict=True)]
+                if np.shape(tau) != (len(rows), n):
+                    raise InputError(
+                        f"feedforward of {type(self._model).__name__} must give {n} numbers; it gives {tau[0]!r:.60}"
+                    )
+                rows[:, 3 * n :] = tau
             wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
             if len(wrong):
                 time = self._period * (part.start + wrong[0])

@@ -7,8 +7,11 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, State
 
 from armloop.data.motion import Motion
+from armloop.drake.given import require_model
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known, Watch, advance, block_sums
+from armloop.util.errors import InputError
+from armloop.util.given import require
 
 #: A joint counts as sliding above this part of the fastest speed that the model was fitted on.
 _SLIDES = 0.02
@@ -39,12 +42,14 @@ class ResidualMonitor(LeafSystem):
     ) -> None:
         """model : of n joints; period : s between samples; block : s; learn : s at the start, healthy.
 
-        Raises `ValueError` when the times do not fit each other.
+        Raises `InputError` when the times do not fit each other.
         """
+        require_model(model)
+        require("a number above 0", period=period, block=block, learn=learn)
         super().__init__()
         count, blocks = round(block / period), round(learn / block)
         if not (period > 0 and count >= 10 and blocks >= 4):
-            raise ValueError(
+            raise InputError(
                 f"period {period} s, block {block} s, learn {learn} s: a block needs ten samples, learning four blocks"
             )
         n = self._n = model.arm.n

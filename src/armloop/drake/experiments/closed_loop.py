@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, System
 
 from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
 from armloop.drake.control.feedforward import FeedforwardModel
@@ -17,12 +17,14 @@ from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceSource
 from armloop.drake.experiments.scenarios import Plant, plant_for, plant_names
+from armloop.drake.given import require_of, require_predicts, require_reference, require_step
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
 """The controllers that `add_arm_with_controller` knows; `add_arm_under` takes a law of your own."""
@@ -67,6 +69,8 @@ class ControlledArm:
 
         step : how much of it PID is fed; computed torque takes the whole
         """
+        if isinstance(model, ReconstructedModel):
+            model.arm.require_same(self.plant.arm, "the model")
         if isinstance(self.controller, PidController):
             self.reference.set_model(model, step)
         else:
@@ -101,15 +105,19 @@ def add_arm_with_controller(
     effects : what the plant has and the model may not know
     torque_rate : (n,) N*m/s (N/s), how fast the drives can change their torques (`RateLimiter`); any by default
 
-    Raises `ArmError` for an arm that cannot be simulated, `ValueError` when gains, reference, model and controller do
+    Raises `ArmError` for an arm that cannot be simulated, `InputError` when gains, reference, model and controller do
     not fit each other.
     """
+    require_of(DiagramBuilder, builder=builder)
     spec = arm if isinstance(arm, Plant) else _plant(arm, model)
     n, config, period = spec.arm.n, spec.config, spec.config.time_step
     _check_controller(controller, gains, model, step)
+    if isinstance(model, ReconstructedModel):
+        model.arm.require_same(spec.arm, "the model")
+    require_reference(reference)
     followed = reference.evaluate([0.0])[0].shape[1]
     if not len(gains.kp) == followed == n:
-        raise ValueError(
+        raise InputError(
             f"{spec.arm.name} has {n} joints; the gains are for {len(gains.kp)}, the reference for {followed}"
         )
     law: LeafSystem
@@ -147,15 +155,27 @@ def add_arm_under(
     law : input ports `state` and those that it wants of `q_ref`, `v_ref`, `vdot_ref` and, with a `model`, `tau_ff`;
         output port `tau` (n,)
 
-    Raises `ValueError` when the law lacks a port, or has another one.
+    Raises `InputError` when the law lacks a port, or has another one, or one of other joints.
     """
+    require_of(DiagramBuilder, builder=builder)
+    require_of(Plant, plant=plant)
+    require_of(System, law=law)
     config, period = plant.config, plant.config.time_step
     ports = [law.get_input_port(k).get_name() for k in range(law.num_input_ports())]
     wanted = [port for port in ports if port in _REFERENCE]
     if not law.HasOutputPort("tau") or "state" not in ports or len(wanted) + 1 < len(ports):
-        raise ValueError(
+        raise InputError(
             f"{name}: has the input ports {', '.join(ports) or 'none'}; a control law has state, those that it wants of "
             f"{', '.join(_REFERENCE)}, and the output port tau"
+        )
+    n = plant.arm.n
+    sizes = {port: law.GetInputPort(port).size() for port in ports} | {"tau": law.GetOutputPort("tau").size()}
+    for port, size in sizes.items():
+        if size != (2 * n if port == "state" else n):
+            raise InputError(f"{name}: its port {port} has {size} entries, {plant.arm.name} has {n} joints")
+    if isinstance(law, PidController) and law.period != period:
+        raise InputError(
+            f"{name}: has a period of {law.period:g} s, the plant {period:g} s; give both the same"
         )
     source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
     body = builder.AddSystem(ArmPlant(plant.arm, config.friction, effects=effects, time_step=period))
@@ -184,10 +204,13 @@ def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
 def _check_controller(
     controller: str, gains: PidGains | AccelerationGains, model: FeedforwardModel | None, step: int
 ) -> None:
-    if controller not in CONTROLLERS:
-        raise ValueError(f"controller is {controller!r}; there are: {', '.join(CONTROLLERS)}")
+    if not isinstance(controller, str) or controller not in CONTROLLERS:
+        raise InputError(f"controller is {controller!r:.60}; there are: {', '.join(CONTROLLERS)}")
+    require_step(step)
+    if model is not None:
+        require_predicts(model)
     wanted = PidGains if controller == "pid" else AccelerationGains
     if not isinstance(gains, wanted):
-        raise ValueError(f"{controller} takes {wanted.__name__}; the gains are {type(gains).__name__}")
+        raise InputError(f"{controller} takes {wanted.__name__}; the gains are {type(gains).__name__}")
     if controller == "computed_torque" and (model is None or step != 3):
-        raise ValueError("computed_torque needs a model, and all three steps of it")
+        raise InputError("computed_torque needs a model, and all three steps of it")

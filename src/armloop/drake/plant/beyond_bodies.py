@@ -8,6 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 
+from armloop.drake.given import require_model
 from armloop.drake.plant.friction_system import PreslidingFriction, Stop
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
@@ -15,6 +16,8 @@ from armloop.dynamics import ModelEquations
 from armloop.laws.effects.base import number
 from armloop.laws.friction import KINDS, FrictionLaw
 from armloop.model import ReconstructedModel
+from armloop.util.errors import InputError
+from armloop.util.given import levels_of, require
 
 #: Effects that a description of links and drives holds.
 _BODIES = ("payload", "rotor_inertia")
@@ -49,9 +52,11 @@ def BeyondBodies_(T: type) -> Any:
             converter: Any = None,
         ) -> None:
             """model : of n joints; smoothing : rad/s (m/s), of all joints or of each."""
+            require_model(model)
             n = self._n = model.arm.n
             widths = per_joint(smoothing, n)
             LeafSystem_[T].__init__(self, converter=converter)
+            self.arm = model.arm
             self._arguments = model, tuple(widths)
             functions = functions_of(T)
             sliding = explicit_part(model, widths)
@@ -103,16 +108,17 @@ def friction_systems(
     model: ReconstructedModel, smoothing: float | Sequence[float], period: float
 ) -> list[Any]:
     """The systems that make a plant of a model's bodies the whole model, for `add_joint_forces`."""
+    require("a number above 0", period=period)
     systems: list[Any] = [BeyondBodies(model, smoothing)]
     elements = presliding_elements(model)
     return systems + ([PreslidingFriction(model.arm.n, elements, period)] if elements else [])
 
 
 def per_joint(smoothing: float | Sequence[float], n: int) -> list[float]:
-    """The smoothing of each of n joints; raises ``ValueError`` unless it is above 0 and one or n numbers."""
-    widths = [float(smoothing)] * n if isinstance(smoothing, int | float) else [*map(float, smoothing)]
-    if len(widths) != n or not all(width > 0 for width in widths):
-        raise ValueError(
+    """The smoothing of each of n joints; raises ``InputError`` unless it is above 0 and one or n numbers."""
+    widths: list[float] = levels_of(smoothing, n, "smoothing").tolist()
+    if not all(width > 0 for width in widths):
+        raise InputError(
             f"smoothing is {smoothing}; it must be above 0 rad/s, one number or one for each of {n} joints"
         )
     return widths

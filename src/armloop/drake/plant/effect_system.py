@@ -10,6 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, LeafSystem_, System
 from pydrake.systems.primitives import Adder
 
+from armloop.drake.given import require_of, require_order, require_plant
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature, within
 from armloop.dynamics import effect_law
@@ -17,6 +18,8 @@ from armloop.laws.effects import Value, effect_kind
 from armloop.laws.effects.base import number
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
+from armloop.util.errors import InputError
+from armloop.util.given import require
 
 
 @scalar_template("EffectTorque_", __name__)
@@ -60,9 +63,11 @@ def EffectTorque_(T: type) -> Any:
 
             Raises `ModelError` for an effect without such a law.
             """
-            if not smoothing > 0:
-                raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
+            require("a number above 0", smoothing=smoothing)
+            require_of(Arm, arm=arm)
+            require_of(Mapping, parameters=parameters)
             LeafSystem_[T].__init__(self, converter=converter)
+            self.arm = arm
             self._arguments = arm, name, joint, dict(parameters)
             self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
             self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
@@ -120,15 +125,36 @@ def add_joint_forces(
         generalized forces must be free
     systems : such as `JointFrictionSystem`, `PreslidingFriction`, `EffectTorque`, not yet in the builder
 
-    Returns the systems added.
+    Returns the systems added. Raises `InputError` for a plant that is not finalized or floats, whose joints are others
+    than those of a system's arm or stand in another order, and for a system without these ports.
     """
+    require_of(DiagramBuilder, builder=builder)
+    require_plant(plant)
+    require_of(Sequence, systems=systems)
+    if all(plant is not system for system in builder.GetSystems()):
+        raise InputError("the plant is in no diagram of this builder: call builder.AddSystem(plant) first")
+    if builder.IsConnectedOrExported(plant.get_applied_generalized_force_input_port()):
+        raise InputError(
+            "the plant's port applied_generalized_force is taken; give all systems in one call of add_joint_forces"
+        )
     n = plant.num_velocities()
+    if not systems:
+        raise InputError("systems is empty; give those whose force acts on the plant")
     for system in systems:
+        name = type(system).__name__
+        if not (
+            isinstance(system, System) and system.HasInputPort("state") and system.HasOutputPort("force")
+        ):
+            raise InputError(f"{name}: has not the input port state and the output port force")
+        if any(system is other for other in builder.GetSystems()):
+            raise InputError(
+                f"{system.get_name() or name}: is in the builder already; add_joint_forces adds it"
+            )
         size = system.GetInputPort("state").size()
         if size != 2 * n:
-            raise ValueError(
-                f"{system.get_name() or type(system).__name__}: is for {size // 2} joints, the plant has {n}"
-            )
+            raise InputError(f"{system.get_name() or name}: is for {size // 2} joints, the plant has {n}")
+        if isinstance(arm := getattr(system, "arm", None), Arm):
+            require_order(plant, arm)
     total = builder.AddSystem(Adder(len(systems), n))
     for index, system in enumerate(systems):
         builder.AddSystem(system)

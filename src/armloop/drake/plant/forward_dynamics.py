@@ -6,10 +6,12 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem_
 
+from armloop.drake.given import require_model
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
+from armloop.util.given import require
 
 SMOOTHING = 0.01
 """Speed within which dry friction changes sign, rad/s (m/s)."""
@@ -56,8 +58,8 @@ def ForwardDynamics_(T: type) -> Any:
             converter: Any = None,
         ) -> None:
             """model : of n joints; smoothing : rad/s (m/s); check : whether to try M over the training range."""
-            if not smoothing > 0:
-                raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
+            require_model(model)
+            require("a number above 0", smoothing=smoothing)
             equations = ModelEquations(model, functions_of(T), smoothing=smoothing, symmetric=symmetric)
             if check:
                 require_mass_matrix(model)

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armloop.laws.friction import stribeck_fall
+from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY, Functions
+from armloop.util.given import require
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class JointFriction:
     stribeck_velocity : v_s > 0 in rad/s (m/s)
     viscous : f_v >= 0 in N*m*s/rad (N*s/m)
 
-    Raises `ValueError` for a value outside these ranges.
+    Raises `InputError` for a value outside these ranges.
     """
 
     static: float = 0.0
@@ -29,15 +31,14 @@ class JointFriction:
     viscous: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (self.static, self.coulomb, self.stribeck_velocity, self.viscous)
-        if not all(np.isfinite(values)):
-            raise ValueError(f"friction parameters must be finite numbers; they are {values}")
+        for name in ("static", "coulomb", "stribeck_velocity", "viscous"):
+            require("a finite number", **{name: getattr(self, name)})
         if self.coulomb < 0 or self.viscous < 0:
-            raise ValueError(f"coulomb {self.coulomb} and viscous {self.viscous} must not be negative")
+            raise InputError(f"coulomb {self.coulomb} and viscous {self.viscous} must not be negative")
         if self.static < self.coulomb:
-            raise ValueError(f"static {self.static} must be at least coulomb {self.coulomb}")
+            raise InputError(f"static {self.static} must be at least coulomb {self.coulomb}")
         if self.stribeck_velocity <= 0:
-            raise ValueError(f"stribeck_velocity {self.stribeck_velocity} must be above 0")
+            raise InputError(f"stribeck_velocity {self.stribeck_velocity} must be above 0")
 
     def level(self, v: Any, functions: Functions = NUMPY) -> Any:
         """Return the level of the dry part at `v`, a number of any kind."""

@@ -7,10 +7,21 @@ from typing import Any, NamedTuple
 
 from pydrake.systems.framework import LeafSystem_
 
+from armloop.drake.given import require_of
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.laws.hysteresis import stop_step
+from armloop.util.errors import InputError
+from armloop.util.given import require
+
+
+def _each_of(given: Any, kind: type, name: str) -> tuple[Any, ...]:
+    """The list that was given; raises `InputError` where it is none of things of a class."""
+    require_of(Sequence, **{name: given})
+    for k, each in enumerate(given):
+        require_of(kind, **{f"{name} {k + 1}": each})
+    return tuple(given)
 
 
 @scalar_template("JointFrictionSystem_", __name__)
@@ -34,10 +45,10 @@ def JointFrictionSystem_(T: type) -> Any:
             self, friction: Sequence[JointFriction], smoothing: float = 0.01, *, converter: Any = None
         ) -> None:
             """friction : n joints; smoothing : rad/s (m/s)."""
-            if not smoothing > 0:
-                raise ValueError(f"smoothing is {smoothing}; it must be above 0 rad/s")
+            require("a number above 0", smoothing=smoothing)
+            friction = _each_of(friction, JointFriction, "friction")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = tuple(friction), smoothing
+            self._arguments = friction, smoothing
             self._n = len(self._arguments[0])
             self._state = self.DeclareVectorInputPort("state", 2 * self._n)
             self.DeclareVectorOutputPort("force", self._n, self._calc_force, {self.all_input_ports_ticket()})
@@ -93,11 +104,17 @@ def PreslidingFriction_(T: type) -> Any:
             self, n: int, elements: Sequence[Stop], period: float, *, converter: Any = None
         ) -> None:
             """n : joints; elements : any number of `Stop`; period : s."""
-            LeafSystem_[T].__init__(self, converter=converter)
+            require("a whole number above 0", n=n)
+            require("a number above 0", period=period)
+            elements = _each_of(elements, Stop, "elements")
             for e in elements:
-                if not (1 <= e.joint <= n and e.width > 0):
-                    raise ValueError(f"{e}: joint must be from 1 to {n} and width above 0")
-            self._arguments = n, tuple(Stop(*e) for e in elements), period
+                require("a whole number", joint=e.joint)
+                require("a number above 0", width=e.width)
+                require("a finite number", level=e.level)
+                if not 1 <= e.joint <= n or e.level < 0:
+                    raise InputError(f"{e}: joint must be from 1 to {n}, level at least 0 and width above 0")
+            LeafSystem_[T].__init__(self, converter=converter)
+            self._arguments = n, elements, period
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self.DeclareDiscreteState(n + len(elements))
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
@@ -142,6 +159,7 @@ PreslidingFriction = with_signature(PreslidingFriction_[None])
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:
     """Return the elements of a model's friction law: its `hysteresis` terms (`model.friction.terms`)."""
+    require_of(Sequence, **{"terms (model.friction.terms)": terms})
     return [
         Stop(j + 1, float(term.coefficient), float(term.parameter))
         for j, joint in enumerate(terms)

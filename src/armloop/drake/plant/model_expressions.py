@@ -6,6 +6,7 @@ from typing import Any
 
 from pydrake.symbolic import Expression
 
+from armloop.drake.given import require_model
 from armloop.drake.scalars import functions_of
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
@@ -21,4 +22,5 @@ def model_equations(model: ReconstructedModel, T: type = Expression, **options: 
 
     Raises `ModelError` where an effect or a term has no such law.
     """
+    require_model(model)
     return ModelEquations(model, functions_of(T), **options)

@@ -24,12 +24,14 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from armloop.drake.given import require_of
 from armloop.drake.plant.fault_injection import Realisation, UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import JointLoads, Law, ServoGains
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
-from armloop.util.errors import ArmError, ScenarioError
+from armloop.util.errors import ArmError, InputError, ScenarioError
+from armloop.util.given import numbers_of, require
 
 PAYLOAD_DENSITY = 7850.0
 """A payload is a steel ball, kg/m^3: its mass and centre are exact, its own inertia is small and known."""
@@ -76,9 +78,16 @@ class ArmPlant(Diagram):
 
         Raises `ArmError` when the arm's inertias cannot move, `ScenarioError` when an effect does not fit it.
         """
+        require_of(Arm, arm=arm)
+        require_of(Sequence, friction=friction, effects=effects)
+        for j, each in enumerate(friction):
+            require_of(JointFriction, **{f"friction of joint {j + 1}": each})
+        for k, effect in enumerate(effects):
+            require_of(UndeclaredEffect, **{f"effect {k + 1}": effect})
+        require("a number above 0", time_step=time_step)
         super().__init__()
         if len(friction) != arm.n:
-            raise ValueError(f"friction is given for {len(friction)} joints; {arm.name} has {arm.n}")
+            raise InputError(f"friction is given for {len(friction)} joints; {arm.name} has {arm.n}")
         self.arm = arm
         self._servo, self._law = servo, law
         self.effects = realise(arm, effects)
@@ -144,7 +153,9 @@ class ArmPlant(Diagram):
 
     def set_state(self, root_context: Context, q: Array, v: Array) -> None:
         """Put the arm at positions `q` and velocities `v`, (n,) each, inside a diagram's context."""
+        require_of(Context, root_context=root_context)
         context = self.plant.GetMyMutableContextFromRoot(root_context)
+        q, v = numbers_of(q, (self.arm.n,), "q"), numbers_of(v, (self.arm.n,), "v")
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
         self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
 

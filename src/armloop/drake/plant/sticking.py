@@ -7,12 +7,14 @@ from typing import Any
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
 
+from armloop.drake.given import require_model
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
+from armloop.util.given import require
 
 
 @scalar_template("StickingForwardDynamics_", __name__, [float, AutoDiffXd])
@@ -49,8 +51,8 @@ def StickingForwardDynamics_(T: type) -> Any:
             converter: Any = None,
         ) -> None:
             """model : of n joints; time_step : h in s; check : whether to try M over the training range."""
-            if not time_step > 0:
-                raise ValueError(f"time_step is {time_step}; it must be above 0 s")
+            require_model(model)
+            require("a number above 0", time_step=time_step)
             if check:
                 require_mass_matrix(model)
             LeafSystem_[T].__init__(self, converter=converter)

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from armloop.data.tables import place, read_columns, read_header, write_columns
 from armloop.experiment.excitation.reference import Reference
 from armloop.util.arrays import Array
-from armloop.util.errors import LogError
+from armloop.util.errors import InputError, LogError
+from armloop.util.given import numbers_of
 
 #: How far q may differ from the integral of v within a row's step, relative to the fastest step: coarse tables and
 #: rounded ones pass, degrees beside radians do not.
@@ -27,12 +28,24 @@ class TableReference:
 
     time : (N,) s, from 0, N >= 2; q, v, vdot : (N, n). Before the first and after the last instant the arm is to
     rest where the table begins and ends.
+
+    Raises `InputError` for shapes that do not agree, numbers that are not finite, and instants that do not rise.
     """
 
     time: Array
     q: Array
     v: Array
     vdot: Array
+
+    def __post_init__(self) -> None:
+        rows, n = (*np.shape(self.q), 0, 0)[:2]
+        for name, shape in (("time", (rows,)), ("q", (rows, n)), ("v", (rows, n)), ("vdot", (rows, n))):
+            values = numbers_of(
+                getattr(self, name), shape, f"{name} of a reference", "time (N,), q, v and vdot (N, n)"
+            )
+            object.__setattr__(self, name, values)
+        if rows < 2 or n < 1 or not (np.diff(self.time) > 0).all():
+            raise InputError("time of a reference must rise from row to row, two rows at least")
 
     @property
     def duration(self) -> float:
