@@ -65,7 +65,11 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("components", 0, "kind"), ["magic", None, ..., 3], "kind|unknown"),
     (("components", 0, "parameters"), [None, [], [1.0] * 7, ["a"] * 30, [1e300] * 30, ...], "parameters"),
     (("components", 0, "base_parameters"), [None, [], {"m1": "x"}, {"m1": None}, ...], "base_parameters"),
-    (("friction",), [None, {}, [[], []], [[]] * 40, "none", ...], "friction"),
+    (
+        ("friction",),
+        [None, {}, [[], []], [[]] * 40, [["sign"], [], []], {"sign": 1}, "none", ...],
+        "friction",
+    ),
     (("friction", 0, 0, "kind"), ["magic", None, 3, ...], "magic|kind"),
     (("friction", 0, 0, "coefficient"), ["big", None, 1e300, [], ...], "coefficient"),
     (("friction", 0, 1, "parameter"), [-1.0, "x", None, 1e300], "parameter"),

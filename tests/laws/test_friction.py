@@ -142,10 +142,6 @@ def test_a_law_survives_its_dictionary_and_keeps_joints_apart():
     "data",
     [
         [[{"kind": "magic", "coefficient": 1.0}]],
-        [[{"kind": "sign"}]],
-        [[{"kind": "sign", "coefficient": "much"}]],
-        [["sign"]],
-        {"sign": 1},
         [[{"kind": "stribeck", "coefficient": 1.0}]],
         [[{"kind": "stribeck", "coefficient": 1.0, "parameter": -0.1}]],
         [[{"kind": "hysteresis", "coefficient": 1.0, "parameter": float("nan")}]],

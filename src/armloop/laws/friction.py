@@ -304,18 +304,13 @@ class FrictionLaw:
 
     @staticmethod
     def from_dict(data: Any) -> FrictionLaw:
-        """Rebuild from :meth:`to_dict`; raises ``ModelError`` for unknown or misshapen terms."""
-        try:
-            return FrictionLaw(
+        """Rebuild from :meth:`to_dict`, as `armloop.schemas.model` checks it; raises ``ModelError`` for unknown terms."""
+        return FrictionLaw(
+            tuple(
                 tuple(
-                    tuple(
-                        FrictionTerm(t["kind"], float(t["coefficient"]), float(t.get("parameter", 0)))
-                        for t in joint
-                    )
-                    for joint in data
+                    FrictionTerm(t["kind"], float(t["coefficient"]), float(t.get("parameter", 0)))
+                    for t in joint
                 )
+                for joint in data
             )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            if isinstance(error, ModelError):
-                raise
-            raise ModelError(f"friction: a list of terms per joint is needed: {error!r}") from error
+        )

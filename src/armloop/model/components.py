@@ -44,7 +44,7 @@ class Component(Protocol):
 
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> Component:
-        """Rebuild from :meth:`to_dict`."""
+        """Rebuild from :meth:`to_dict`, the content of a file as `armloop.schemas.model` checks it."""
         ...
 
 
@@ -97,8 +97,6 @@ class SparseTerms:
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> SparseTerms:
         joints = data["joints"]
-        if len(joints) != arm.n:
-            raise ModelError(f"terms of step {data['step']}: {len(joints)} joints, the arm has {arm.n}")
         names = list(dict.fromkeys(name for joint in joints for name in joint))
         waves = _waves_in(names, arm.n)
         factors = Factors(arm.n, waves)
@@ -191,12 +189,7 @@ class RigidBody:
 
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> RigidBody:
-        parameters = np.array(data["parameters"], dtype=float)
-        if parameters.shape not in ((10 * arm.n,), (11 * arm.n,)):
-            raise ModelError(
-                f"rigid_body: {parameters.size} parameters, {arm.n} links need {10 * arm.n} or {11 * arm.n}"
-            )
-        base = data["base_parameters"]
+        base, parameters = data["base_parameters"], np.array(data["parameters"], dtype=float)
         return RigidBody(parameters, tuple(base), np.array(list(base.values()), dtype=float))
 
 

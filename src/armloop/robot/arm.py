@@ -27,6 +27,7 @@ from armloop.util.quiet import quiet
 from armloop.util.resources import urdf_names, urdf_path
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+_ARRAYS = ("X_PF", "axis", "mass", "com", "inertia", "X_tool", "gravity")
 
 
 @dataclass(frozen=True)
@@ -140,43 +141,18 @@ class Arm:
             limits = {key: getattr(joint, key) for key in ("lower", "upper", "velocity", "effort")}
             finite = {key: value for key, value in limits.items() if np.isfinite(value)}
             joints.append({"name": joint.name, "kind": joint.kind, **finite})
-        arrays = ("X_PF", "axis", "mass", "com", "inertia", "X_tool", "gravity")
         return {
             "name": self.name,
             "fingerprint": self.fingerprint(),
             "joints": joints,
-            **{key: getattr(self, key).tolist() for key in arrays},
+            **{key: getattr(self, key).tolist() for key in _ARRAYS},
         }
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Arm:
-        """Rebuild an arm from :meth:`to_dict`; raises ``ArmError`` if a field is missing or misshapen."""
-        try:
-            joints = tuple(Joint(**joint) for joint in data["joints"])
-            for joint in joints:
-                if joint.kind not in ("revolute", "prismatic"):
-                    raise ValueError(
-                        f"joint {joint.name!r} is {joint.kind!r}, it must be revolute or prismatic"
-                    )
-            n = len(joints)
-            shapes = {
-                "X_PF": (n, 4, 4),
-                "axis": (n, 3),
-                "mass": (n,),
-                "com": (n, 3),
-                "inertia": (n, 3, 3),
-                "X_tool": (4, 4),
-                "gravity": (3,),
-            }
-            arrays: dict[str, Any] = {
-                key: np.array(data[key], dtype=float).reshape(shape) for key, shape in shapes.items()
-            }
-            arm = Arm(name=str(data["name"]), joints=joints, **arrays)
-        except (KeyError, TypeError, ValueError) as error:
-            raise ArmError(f"the arm description is incomplete or misshapen: {error}") from error
-        if not all(np.isfinite(value).all() for value in arrays.values()):
-            raise ArmError("the arm description holds a number that is not finite")
-        return arm
+        """Rebuild an arm from :meth:`to_dict`, the content of a file as `armloop.schemas.model` checks it."""
+        arrays: dict[str, Any] = {key: np.array(data[key], dtype=float) for key in _ARRAYS}
+        return Arm(data["name"], tuple(Joint(**joint) for joint in data["joints"]), **arrays)
 
     def require_same(self, other: Arm, what: str) -> None:
         """Raise ``ArmError`` unless ``other`` has this arm's joints and geometry."""
