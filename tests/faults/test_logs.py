@@ -182,3 +182,21 @@ def test_what_a_terminal_would_obey_is_spelt_out(place: Path, capsys: pytest.Cap
     (place / "a\x1b[31mb.csv").write_text("x")
     assert main(["evaluate", "model.json", "a\x1b[31mb.csv"]) == 2
     one_line(capsys.readouterr().err, r"a\\x1b\[31mb\.csv: the header lacks")
+
+
+def test_names_in_capitals_are_names(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As some systems and recorders write them."""
+    (place / "run.csv").rename(place / "RUN.CSV")
+    assert main(["evaluate", "model.json", "RUN.CSV"]) == 0
+    first = capsys.readouterr().out
+    assert main(["convert", "RUN.CSV", "--out", "COPY.PARQUET"]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", "model.json", "COPY.PARQUET"]) == 0
+    assert capsys.readouterr().out == first.replace("RUN.CSV", "COPY.PARQUET")
+    (place / "logs" / "three_axis").mkdir(parents=True)
+    (place / "RUN.CSV").rename(place / "logs" / "three_axis" / "RUN.CSV")
+    assert main(["watch", "--models", "model.json", "--logs", "logs", "--store", "store"]) == 0
+    assert (
+        main(["excite", "three_axis", "--duration", "5", "--starts", "1", "--random", "3", "--out", "R.CSV"])
+        == 0
+    )

@@ -49,6 +49,19 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "a folder in such a home": ("collect three_axis --out ~/logs", "~/logs: ~ stands for no folder"),
     "a path longer than any": (f"{RECONSTRUCT} --report {'d/' * 2100}r.html", "d/d/.* … .*too long"),
+    "standard output for a model": (
+        f"{RECONSTRUCT[:-6]} -",
+        "-: --out cannot be standard output; give a file's name",
+    ),
+    "standard output for an export": (
+        "export model.json --to c --out -",
+        "-: --out cannot be standard output",
+    ),
+    "standard output for a bundle": (
+        "export model.json --to drake --out -",
+        "-: .* cannot be standard output",
+    ),
+    "standard output for logs": ("collect three_axis --out -", "-: --out cannot be standard output"),
     "an infinite cutoff": (f"{RECONSTRUCT} --cutoff inf", "--cutoff inf"),
     "an unknown estimator": (f"{RECONSTRUCT} --estimator magic", "unknown estimator 'magic'"),
     "an unknown option": (f"{RECONSTRUCT} --magic", "unrecognized arguments: --magic"),

@@ -41,7 +41,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     ),
     "a lock in text": (
         lambda x: al.load_arm("three_axis", {"joint_3": "0.1"}),
-        "lock joint_3 must be a finite number",
+        "lock joint_3 must be a number",
     ),
     "a tip by its number": (
         lambda x: al.load_arm("three_axis", tip=3),

@@ -45,9 +45,11 @@ def write(path: Path, *parts: str) -> Path:
 GOOD = "".join(PARTS[:5])
 
 WRONG: dict[str, tuple[str, str]] = {
+    "a mass of a mountain": (GOOD.replace('value="2.0"', 'value="1e9"', 1), r"<mass> value=1e\+09 must be from 0 to 1e\+06"),
+    "a body out of this world": (GOOD.replace('xyz="0.1 0 0.02"', 'xyz="1e12 0 0"', 1), r"is 1e\+12 m away, as no part"),
     "a mass with a unit": (GOOD.replace('value="2.0"', 'value="1kg"', 1), r"link 'base': <mass> value='1kg'"),
     "a decimal comma": (GOOD.replace('value="2.0"', 'value="1,5"'), r"link 'base': <mass> value='1,5'"),
-    "a negative mass": (GOOD.replace('value="2.0"', 'value="-1"'), r"link 'base': <mass> value=-1 must not be neg"),
+    "a negative mass": (GOOD.replace('value="2.0"', 'value="-1"'), r"link 'base': <mass> value=-1 must be from 0"),
     "NaN mass": (GOOD.replace('value="2.0"', 'value="nan"'), r"<mass> value='nan' is not a finite number"),
     "no mass": (GOOD.replace('<mass value="2.0"/>', ""), r"link 'base': <inertial> has no <mass>"),
     "no inertia": (link("base").split("<inertia ")[0] + "</inertial></link>" + "".join(PARTS[1:5]), r"has no <inertia>"),

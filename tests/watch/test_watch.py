@@ -213,6 +213,32 @@ def test_what_is_wrong_is_one_line(
     assert words in said and len(said.splitlines()) == 1
 
 
+def test_a_call_that_sets_every_log_aside_says_so(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whoever looks at the status alone (cron) must not take it for an arm that is well."""
+    logs = tmp_path / "logs" / "stranger"
+    logs.mkdir(parents=True)
+    (logs / "broken.csv").write_text("time,q1,v1,tau1\n0,1,2\n", encoding="utf-8")
+    call = [
+        "watch",
+        "--models",
+        str(fleet / "models"),
+        "--logs",
+        str(tmp_path / "logs"),
+        "--store",
+        str(tmp_path / "s"),
+    ]
+    for more in ([], ["--json"], []):  # that they are known to be broken makes nothing better
+        assert main([*call, *more]) == 2
+        answer = capsys.readouterr()
+        assert "every log of this call was set aside, none is watched (1)" in answer.err
+        assert answer.err.count("\n") == 1 and "stranger" in answer.out
+    (tmp_path / "logs" / "healthy").mkdir()
+    shutil.copy(sorted((fleet / "logs" / "healthy").iterdir())[0], tmp_path / "logs" / "healthy")
+    assert main(call) == 0
+
+
 def test_a_folder_of_something_else_is_no_store(
     fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

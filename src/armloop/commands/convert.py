@@ -47,7 +47,7 @@ def run(options: Convert) -> None:
     from armloop.commands.shared import CURRENTS_ONLY, drive_gains, out_file, print_json, stated_arm
     from armloop.convert import Answers, convert, read_map
     from armloop.data.log import said_of_log
-    from armloop.data.tables import write_columns
+    from armloop.data.tables import CSV, PARQUET, kind_of, write_columns
     from armloop.util.errors import InputError
 
     arm = stated_arm(options)
@@ -60,7 +60,7 @@ def run(options: Convert) -> None:
         raise InputError("convert: --out is missing; give the log to write, such as --out run.parquet")
     out = Path(options.out)
     out_file(options.out, "--out")
-    if out.suffix not in (".csv", ".parquet"):
+    if kind_of(out) not in (CSV, PARQUET):
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; --out must end in .parquet or .csv")
     mapping = read_map(options.map) if options.map else None
     answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)

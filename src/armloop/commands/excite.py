@@ -68,7 +68,7 @@ def run(options: Excite) -> None:
 
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
-    if not options.out.endswith((CSV, PARQUET)):
+    if not options.out.lower().endswith((CSV, PARQUET)):
         raise InputError(f"--out {options.out}: a reference ends in {CSV} or {PARQUET}")
     arm = arm_of(options)
     library = options.library or default_library(arm)

@@ -49,7 +49,7 @@ def wish(options: NextRun, model: ReconstructedModel) -> Wish | None:
             raise InputError("ranges, reserve and duration are those of --next-run REF.csv: give it, too")
         return None
     out_file(options.next_run, "--next-run")
-    if not options.next_run.endswith((CSV, PARQUET)):
+    if not options.next_run.lower().endswith((CSV, PARQUET)):
         raise InputError(f"--next-run {options.next_run}: a reference ends in {CSV} or {PARQUET}")
     duration = 60.0 if options.next_run_duration is None else options.next_run_duration
     known = training_ranges(model)

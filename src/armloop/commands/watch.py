@@ -67,12 +67,14 @@ class Watch(Json):
 
 
 def run(options: Watch) -> int:
-    """Watch; the exit status is 3 if there is a new alarm."""
+    """Watch; the exit status is 3 if there is a new alarm; raises ``InputError`` where every log was set aside."""
     import sys
 
     from armloop.commands.shared import out_file, print_json, progress
+    from armloop.util.errors import InputError
     from armloop.util.files import write_text
     from armloop.watch import Options, watch
+    from armloop.watch.ingest import Counts
     from armloop.watch.sources import find_logs
     from armloop.watch.store import Store as Folder
 
@@ -82,7 +84,7 @@ def run(options: Watch) -> int:
     )
     tell = progress(options)
     told: list[str] = []
-    outcome = None
+    outcome, counts = None, Counts()
     batches = _batches(sys.stdin) if options.logs == ["-"] else iter([options.logs])
     for places in batches:
         outcome = watch(options.models, find_logs(places), options.store, how, tell)
@@ -92,6 +94,7 @@ def run(options: Watch) -> int:
             print(watch_words(outcome), flush=True)
             _announce(Folder(options.store), outcome.new)
         told += outcome.new
+        counts += outcome.counts
     if outcome is None:
         outcome = watch(options.models, [], options.store, how, tell)
     if options.report is not None:
@@ -104,6 +107,11 @@ def run(options: Watch) -> int:
         _announce(Folder(options.store), told)
     elif options.report is not None:
         print(f"written: {options.report}")
+    if not told and counts.aside and not counts.read + counts.known:
+        raise InputError(
+            f"every log of this call was set aside, none is watched ({counts.aside}); the reasons stand above and in "
+            f"{options.store}"
+        )
     return NEW_ALARM if told else 0
 
 

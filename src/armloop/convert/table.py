@@ -8,12 +8,13 @@ from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
 from armloop.convert.text import clock_seconds, numbers_of, read_text
+from armloop.data.tables import PARQUET, kind_of
 from armloop.util.errors import LogError
 
 
 def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
-    if path.suffix == ".parquet":
+    if kind_of(path) == PARQUET:
         columns, starts, dropped, units = _parquet(path)
         notes: list[str] = []
     else:

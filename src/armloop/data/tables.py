@@ -44,7 +44,7 @@ def read_header(path: Path) -> list[str]:
     try:
         if path.stat().st_size == 0:
             raise LogError(f"{path}: the file is empty; the first line must name the columns")
-        names = _parquet_header(path) if path.suffix == PARQUET else next(_csv_rows(path), (0, []))[1]
+        names = _parquet_header(path) if kind_of(path) == PARQUET else next(_csv_rows(path), (0, []))[1]
     except OSError as error:
         raise LogError(
             f"{path}: cannot be read ({error.strerror or error}); check its permissions"
@@ -57,7 +57,7 @@ def count_rows(path: Path) -> int:
 
     The header must have been read.
     """
-    if path.suffix == CSV:
+    if kind_of(path) == CSV:
         return index_rows(path).count
     import pyarrow.parquet
 
@@ -74,7 +74,7 @@ def read_columns(
     Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
     not a finite number, or the first row that has too few or too many cells.
     """
-    table = (_read_parquet if path.suffix == PARQUET else _read_csv)(path, names, rows)
+    table = (_read_parquet if kind_of(path) == PARQUET else _read_csv)(path, names, rows)
     faults = {
         name: int(np.argmin(good))
         for name, cells in table.items()
@@ -83,7 +83,7 @@ def read_columns(
     if faults:
         name = min(faults, key=lambda key: faults[key])
         value, row = table[name][faults[name]], faults[name] + (rows[0] if rows else 0)
-        cell = _csv_cell(path, name, row) if path.suffix == CSV else str(value)
+        cell = _csv_cell(path, name, row) if kind_of(path) == CSV else str(value)
         wrong = "too large a number" if np.isfinite(value) else "not a finite number"
         raise LogError(
             f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
@@ -108,7 +108,7 @@ def write_columns(
     table = pyarrow.table({name: np.ascontiguousarray(cells) for name, cells in columns.items()})
     table = table.replace_schema_metadata(dict(about)) if about else table
     with replacing(path) as draft:
-        if path.suffix == PARQUET:
+        if kind_of(path) == PARQUET:
             pyarrow.parquet.write_table(table, draft, row_group_size=ROW_GROUP)
         else:
             # pyarrow would put the names between quotes; the format shows them bare
@@ -119,7 +119,7 @@ def write_columns(
 
 def said_of(path: Path, key: str) -> str | None:
     """Return what a Parquet file whose header has been read says of itself; None where it says nothing, as a CSV does."""
-    if path.suffix == CSV:
+    if kind_of(path) == CSV:
         return None
     import pyarrow.parquet
 
@@ -129,7 +129,7 @@ def said_of(path: Path, key: str) -> str | None:
 
 def place(path: Path, row: int) -> str:
     """Name the data row with index `row` (from 0) as a user counts it: `row 3 (line 4)`."""
-    if path.suffix != CSV:
+    if kind_of(path) != CSV:
         return f"row {row + 1}"
     for index, (line, _) in enumerate(_csv_rows(path), start=-1):
         if index == row:
@@ -137,8 +137,13 @@ def place(path: Path, row: int) -> str:
     return f"row {row + 1}"
 
 
+def kind_of(path: Path) -> str:
+    """The suffix that says what a file is, in small letters: some systems write names in capitals."""
+    return path.suffix.lower()
+
+
 def _check_suffix(path: Path) -> None:
-    if path.suffix not in (CSV, PARQUET):
+    if kind_of(path) not in (CSV, PARQUET):
         raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
     check_name(path)
 

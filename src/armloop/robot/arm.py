@@ -192,7 +192,7 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
         raise ArmError(
             f"lock must be positions by joint, such as {{'finger_joint': 0.02}}; it is of type {kind}"
         )
-    require("a finite number", **{f"lock {name}": value for name, value in (lock or {}).items()})
+    require("a number", **{f"lock {name}": value for name, value in (lock or {}).items()})
     path = urdf_path(text_spec) if text_spec in urdf_names() else Path(text_spec)
     try:
         found = path.is_file()

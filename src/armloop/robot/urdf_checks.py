@@ -11,6 +11,7 @@ from collections import Counter
 
 import numpy as np
 
+from armloop.schemas.types import FARTHEST, HEAVIEST
 from armloop.util.arrays import Array
 from armloop.util.doubts import warn
 from armloop.util.errors import ArmError
@@ -46,8 +47,8 @@ def check_link(link: Element, where: str) -> None:
     if element is None:
         raise ArmError(f"{where}: <inertial> has no <mass>; give its value in kg")
     mass = number(element, "value", f"{where}: <mass>")
-    if not 0 <= mass < _LARGEST_ELSE:
-        raise ArmError(f"{where}: <mass> value={mass:g} must not be negative; give kg")
+    if not 0 <= mass <= HEAVIEST:
+        raise ArmError(f"{where}: <mass> value={mass:g} must be from 0 to {HEAVIEST:g}; give kg")
     element = inertial.find("inertia")
     if element is None:
         raise ArmError(
@@ -167,6 +168,11 @@ def _check_origin(element: Element, where: str) -> None:
     """Raise `ArmError` for an origin that is no place, and say it where it is one that no arm's is."""
     for origin in element.findall("origin"):
         xyz, rpy = (three(origin, key, f"{where}: <origin>") for key in ("xyz", "rpy"))
+        if np.abs(xyz).max() > FARTHEST:
+            raise ArmError(
+                f"{where}: <origin> xyz='{origin.get('xyz')}' is {np.linalg.norm(xyz):.3g} m away, as no part of an arm is; "
+                "give m"
+            )
         if np.abs(xyz).max() > _FAR:
             warn(f"{where}: <origin> xyz='{origin.get('xyz')}' is {np.linalg.norm(xyz):.3g} m away; give m")
         if np.abs(rpy).max() > _TURN:

@@ -8,6 +8,8 @@ from msgspec import UNSET, Meta, Struct, UnsetType
 
 from armloop.schemas.checking import Misfit, checked
 from armloop.schemas.types import (
+    FARTHEST,
+    HEAVIEST,
     MOST_JOINTS,
     MOST_TERMS,
     Count,
@@ -343,8 +345,15 @@ def _check_arm(arm: ArmData) -> None:
                 f"arm.inertia[{k + 1}] is no inertia: it must be symmetric, and no moment negative"
             )
     for k, mass in enumerate(arm.mass):
-        if mass < 0:
-            raise ModelError(f"arm.mass[{k + 1}] is {mass}; a mass must not be negative")
+        if not 0 <= mass <= HEAVIEST:
+            raise ModelError(f"arm.mass[{k + 1}] is {mass:g}; a mass must be from 0 to {HEAVIEST:g} kg")
+    places = {f"arm.com[{k + 1}]": list(com) for k, com in enumerate(arm.com)}
+    framed = {"arm.X_tool": arm.X_tool} | {f"arm.X_PF[{k + 1}]": pose for k, pose in enumerate(arm.X_PF)}
+    places |= {name: [row[3] for row in pose[:3]] for name, pose in framed.items()}
+    for name, xyz in places.items():
+        farthest = max(abs(x) for x in xyz)
+        if farthest > FARTHEST:
+            raise ModelError(f"{name} lies {farthest:g} m away, as no part of an arm does; give m")
     if not arm.name.isprintable():
         raise ModelError(f"arm.name is {arm.name!r:.60}, which cannot be shown; give it a name of its own")
     names = [joint.name for joint in arm.joints]

@@ -10,6 +10,8 @@ from msgspec import Meta
 MOST_JOINTS, MOST_TERMS = 24, 200_000
 
 #: A finite number. In SI units nothing of an arm is as large, and products of what is smaller do not overflow.
+#: No link of an arm or a crane is heavier, kg, and no part of it farther away, m.
+HEAVIEST, FARTHEST = 1e6, 1e5
 Finite = Annotated[float, Meta(ge=-1e12, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=1e12)]
 Positive = Annotated[float, Meta(gt=0.0, le=1e12)]

@@ -36,6 +36,7 @@ def _is_whole(x: Any) -> bool:
 #: What an option can be, by the words that a message says it with.
 _KINDS: dict[str, Callable[[Any], bool]] = {
     "a word": lambda x: isinstance(x, str),
+    "a number": lambda x: isinstance(x, Real),
     "a finite number": _is_number,
     "a number above 0": lambda x: _is_number(x) and x > 0,
     "a whole number": _is_whole,

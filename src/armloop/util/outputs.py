@@ -187,7 +187,11 @@ def _existing(folder: Path, option: str, must: str) -> Path:
 
 
 def _check_name(where: str, option: str) -> None:
-    """Raise ``InputError`` for a name whose ~ no shell has replaced: a folder of that name is not what was meant."""
+    """Raise ``InputError`` for a name that means something else: a ~ that no shell has replaced, or standard output."""
+    if where == "-":
+        raise InputError(
+            f"-: {option} cannot be standard output; give a file's name (./- for a file of this name)"
+        )
     if where.startswith("~"):
         raise InputError(
             f"{where}: ~ stands for no folder here; write {option} and a blank before it, or the whole path"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog, read_log
-from armloop.data.tables import CSV, PARQUET, read_columns, read_header
+from armloop.data.tables import CSV, PARQUET, kind_of, read_columns, read_header
 from armloop.model import ReconstructedModel
 from armloop.util.errors import InputError, LogError
 
@@ -98,7 +98,7 @@ def _below(place: Path) -> Iterator[Path]:
         seen.add(real)
         for name in names:
             path = Path(folder, name)
-            if path.suffix in (CSV, PARQUET) and not name.startswith(".") and path.is_file():
+            if kind_of(path) in (CSV, PARQUET) and not name.startswith(".") and path.is_file():
                 yield path
 
 
@@ -131,7 +131,7 @@ def _words(path: Path, name: str) -> list[str]:
     import pyarrow.parquet
 
     try:
-        if path.suffix == PARQUET:
+        if kind_of(path) == PARQUET:
             column = pyarrow.parquet.read_table(path, columns=[name])[name]
         else:
             convert = pyarrow.csv.ConvertOptions(
