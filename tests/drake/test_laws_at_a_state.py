@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from armloop.drake import AccelerationGains, ComputedTorque, PidController, PidGains, PreslidingFriction, Stop
+from armloop.drake import (
+    AccelerationGains,
+    ComputedTorque,
+    JointFriction,
+    JointFrictionSystem,
+    PidController,
+    PidGains,
+    PreslidingFriction,
+    Stop,
+)
 from armloop.drake.control.reference import TableSource
 from armloop.drake.experiments import collection, metrics, pickup
 from armloop.drake.plant.config import Instruments
@@ -53,6 +62,9 @@ def test_gains_are_finite_not_negative_and_one_a_joint(wrong: Any) -> None:
                 kind(*given)
     assert AccelerationGains.critical(2, 3.0).kp.tolist() == [9.0, 9.0]
     assert AccelerationGains.critical(2, 3.0).kd.tolist() == [6.0, 6.0]
+    # 20 rad/s by default
+    assert AccelerationGains.critical(1).kp.tolist() == [400.0]
+    assert AccelerationGains.critical(1).kd.tolist() == [40.0]
 
 
 class Linear:
@@ -85,6 +97,21 @@ def test_computed_torque() -> None:
     context.SetContinuousState([0.2])
     assert_allclose(continuous.get_output_port().Eval(context), expected)
     assert_allclose(continuous.EvalTimeDerivatives(context).CopyToVector(), [0.3])
+
+
+def test_sliding_friction_resists() -> None:
+    friction = (JointFriction(3.0, 2.0, 0.5, 4.0), JointFriction(1.0, 1.0, 0.1, 0.0))
+    v = np.array([0.25, -0.02])
+    system = JointFrictionSystem(friction, smoothing=0.1)
+    force = system.get_output_port().Eval(fixed(system, state=[9.0, 9.0, *v]))
+    assert_allclose(force, [-((2 + np.exp(-0.25)) * np.tanh(2.5) + 1.0), np.tanh(0.2)])
+    # 0.01 rad/s by default
+    system = JointFrictionSystem(friction)
+    force = system.get_output_port().Eval(fixed(system, state=[9.0, 9.0, 0.0, 0.01]))
+    assert_allclose(force, [0.0, -np.tanh(1.0)])
+    for wrong in (0.0, -0.1):
+        with pytest.raises(ValueError, match="it must be above 0"):
+            JointFrictionSystem(friction, smoothing=wrong)
 
 
 def test_presliding_elements_stretch_slide_and_come_back() -> None:

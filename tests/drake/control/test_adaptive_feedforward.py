@@ -26,9 +26,9 @@ def torque(size: float, name: str = "load", sensor: bool = False) -> Any:
 class Loop:
     """The system with its inputs fixed, looked at every 0.05 s."""
 
-    def __init__(self, bound: float = 100.0, trial: float = 0.2) -> None:
+    def __init__(self, bound: float = 100.0, **of: float) -> None:
         model: Any = SimpleNamespace(arm=three_axis())
-        self.system = AdaptiveFeedforward(model, ramp=1.0, trial=trial, bound=bound)
+        self.system = AdaptiveFeedforward(model, bound=bound, **of)
         self.context = self.system.CreateDefaultContext()
         self.known, self.error, self.integral = Known(), 0.1, 0.0
         self.step = 0
@@ -58,13 +58,11 @@ class Loop:
 
     @property
     def given_back(self) -> float:
-        output = BasicVector(1)
-        self.system._calc_given_back(self.context, output)
-        return float(output.CopyToVector()[0])
+        return float(self.system.GetOutputPort("given_back").Eval(self.context).item())
 
 
 def test_nothing_before_the_first_name_then_a_ramp_with_what_the_integrator_learned_taken_off() -> None:
-    loop = Loop()
+    loop = Loop(trial=0.2)
     loop.integral = 0.2
     assert_allclose(loop.to(0.6), 0.0)
     loop.known, loop.integral = Known(1, (torque(2.0),), since=0.58), 0.7
@@ -80,20 +78,52 @@ def test_nothing_before_the_first_name_then_a_ramp_with_what_the_integrator_lear
     assert loop.given_back == 0
 
 
+@pytest.mark.parametrize("since", [0.05 * 6, 0.53])
+def test_the_integrator_is_remembered_every_quarter_of_a_second(since: float) -> None:
+    loop = Loop()
+    for time, held in ((0.25, 0.1), (0.3, 0.2), (0.5, 0.3)):
+        loop.integral = held
+        loop.to(time)
+    loop.known, loop.integral = Known(1, (torque(2.0),), since=since), 0.7
+    loop.to(0.55)
+    assert_allclose(loop.to(1.05), 0.5 * np.array([2.0 - 0.5, 2.0, 0.0]))
+
+
+def test_of_a_change_longer_ago_than_it_remembers_the_oldest_tells() -> None:
+    loop = Loop()
+    for step in range(1, 243):  # remembered at 0.05 s, 0.3 s, ...: the last 240 of 242
+        loop.integral = 0.01 * step
+        loop.to(0.05 + 0.25 * (step - 1))
+    loop.known = Known(1, (torque(2.0),), since=0.0)
+    loop.to(60.35)
+    assert_allclose(loop.to(60.85), 0.5 * np.array([2.0 + 0.03 - 2.42, 2.0, 0.0]))
+
+
+def test_its_ramp_is_as_long_as_asked_for() -> None:
+    loop = Loop(ramp=2.0)
+    loop.known = Known(1, (torque(2.0),), since=0.0)
+    loop.to(0.05)
+    assert_allclose(loop.to(0.55), 0.25 * np.array([2.0, 2.0, 0.0]))
+
+
 def test_it_stays_within_its_bound_and_goes_on_from_one_name_to_the_next() -> None:
     loop = Loop(bound=1.5)
+    loop.to(0.2)
     loop.known = Known(1, (torque(-2.0),), since=0.1)
-    loop.to(0.05)
-    assert_allclose(loop.to(0.55), [-1.0, 1.0, 0.0])
-    # another name waits until the first is supplied, and until it has settled
+    loop.to(0.25)
+    assert_allclose(loop.to(0.75), [-1.0, 1.0, 0.0])
+    # another name waits until the first is supplied, and until it has settled: two ramps of 1 s
     loop.known = Known(2, (torque(-1.0), torque(-0.25, "more")), since=0.6)
-    assert_allclose(loop.to(1.05), [-1.5, 1.5, 0.0])
-    loop.to(2.1)
-    assert loop.system._taken(loop.context).now == loop.known.effects
-    began = loop.system._taken(loop.context).since
-    tau = loop.to(3.2)
-    assert 1.05 < began <= 2.1
-    assert_allclose(tau, [-1.25, 1.5, 0.0])
+    assert_allclose(loop.to(2.25), [-1.5, 1.5, 0.0])
+    assert_allclose(loop.to(2.75), [-1.5, 1.5, 0.0])
+    assert_allclose(loop.to(3.0), [0.25 * -2.0 + 0.75 * -1.25, 1.5, 0.0])
+    assert_allclose(loop.to(3.3), [-1.25, 1.5, 0.0])
+    # what comes later is judged with the first: 5 s after that one's ramp
+    loop.error = 0.2
+    loop.to(6.2)
+    assert loop.given_back == 0
+    loop.to(6.25)
+    assert loop.given_back == 1
 
 
 @pytest.mark.parametrize(("after", "back"), [(0.112, True), (0.108, False)])
@@ -128,6 +158,7 @@ def test_by_default_half_of_the_effort_and_times_above_zero() -> None:
     model: Any = SimpleNamespace(arm=three_axis())
     system = AdaptiveFeedforward(model)
     assert_allclose(system._bound, [0.5 * joint.effort for joint in three_axis().joints])
+    AdaptiveFeedforward(model, ramp=0.1, trial=0.06, bound=0.1)
     for wrong in ({"ramp": 0.0}, {"trial": 0.05}, {"bound": [1.0, 0.0, 1.0]}):
         with pytest.raises(ValueError, match="above 0"):
             AdaptiveFeedforward(model, **wrong)  # type: ignore[arg-type]

@@ -17,7 +17,9 @@ from armloop.drake.experiments.tracking import run_tracking
 from armloop.drake.plant.exact import exact_model
 from armloop.dynamics import Dynamics
 from armloop.experiment.excitation import MotionRanges, TableReference, fourier_reference, places_reference
+from armloop.laws.effects import REGISTRY, Element, Estimate, Law, Parameter, register
 from armloop.laws.friction import Direction, FrictionTerm
+from armloop.model import AddedEffect
 from armloop.robot.arm import load_arm
 from armloop.util.errors import InputError, ScenarioError
 
@@ -153,13 +155,39 @@ def test_what_is_wrong_with_limits_is_told(tmp_path):
             load_tracking(path)
 
 
+class PlacedDrag(Law):
+    """A gear that is tighter at some places."""
+
+    name = "placed_drag"
+    parameters = (Parameter("coefficient", "TAU*s/POS"),)
+    law = "c (1 + sin 3q) v"
+    elements = (Element(lambda x, p, f: (1.0 + f.sin(3.0 * x.q)) * x.v, "(1+sin(3*q{j}))*v{j}"),)
+
+
 @pytest.mark.parametrize("kind", ["cubic", "quadratic", "viscous_forward", "root"])
 def test_friction_that_is_not_linear_in_the_speed_is_in_the_torques(kind):
-    arm = load_arm("three_axis")
     friction = (FrictionTerm("sign", 0.3), FrictionTerm("viscous", 0.5), FrictionTerm(kind, 1.5))
-    model = model_of(arm, friction=friction)
-    reference = fourier_reference(MotionRanges.of(arm), 4.0, 2)
-    dynamics, t = Dynamics(model), np.arange(0.0, 4.0, 0.01)
+    told_as_they_are(model_of(load_arm("three_axis"), friction=friction), 4.0)
+
+
+@pytest.fixture
+def placed_drag():
+    REGISTRY.forget()
+    yield register(PlacedDrag)
+    REGISTRY.forget()
+
+
+def test_friction_that_depends_on_the_place_is_in_the_torques(placed_drag):
+    model = model_of(load_arm("three_axis"), friction=(FrictionTerm("sign", 0.3),))
+    drag = AddedEffect(placed_drag(3), {"coefficient": Estimate(2.0, 0.0, "")})
+    told_as_they_are(dataclasses.replace(model, effects=(drag,)), 2.0)
+
+
+def told_as_they_are(model, duration):
+    """The torques of a motion within limits are those of the model on it."""
+    arm = model.arm
+    reference = fourier_reference(MotionRanges.of(arm), duration, 2)
+    dynamics, t = Dynamics(model), np.arange(0.0, duration, 0.01)
     asked = np.abs(dynamics.torque(*reference.evaluate(t)))
     effort = np.where([False, False, True], 0.85, 1.5) * asked.max(axis=0)
     bounded = bounded_reference(reference, model, effort)

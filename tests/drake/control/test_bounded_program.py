@@ -60,12 +60,25 @@ def test_torques_keep_their_limits_by_moving_the_mass_otherwise() -> None:
     assert 0.1 < np.abs(answer.d[2, 4, 0]) < 0.5 and 0.5 < np.abs(answer.d[2, 4, 1]) < 2.0
 
 
-def test_torques_keep_their_rates() -> None:
+def test_torques_of_joints_that_move_each_other_belong_to_the_motion() -> None:
     offset = np.zeros((K, 2))
-    offset[4:] = 0.8
-    answer = solved(offset, rate=np.array([4.0, np.inf]))
+    offset[4:6] = [1.5, -2.0]
+    mass, none = np.tile([[2.0, 0.4], [0.4, 0.5]], (K, 1, 1)), np.zeros((K, 2, 2))
+    answer = solved(offset, J=[none, none, mass], limit=np.array([1.0, 1.5]))
+    moved = np.einsum("kij,kj->ki", mass, answer.d[2])
+    assert np.abs(answer.d[2]).max(axis=0).min() > 0.1
+    assert_allclose(answer.torque - offset, moved, atol=1e-3)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("limit", [1.0, 2.0])
+def test_torques_keep_their_rates(way: float, limit: float) -> None:
+    offset = np.zeros((K, 2))
+    offset[4:] = 0.8 * way
+    answer = solved(offset, rate=np.array([4.0, np.inf]), limit=np.full(2, limit))
     steps = np.abs(np.diff(answer.torque, axis=0))
-    assert steps[:, 0].max() == pytest.approx(4.0 * H, abs=2 * TOLERANCE)
+    assert steps[:, 0].max() == pytest.approx(4.0 * H, abs=2 * limit * TOLERANCE)
+    assert way * (answer.torque[-1, 0] - answer.torque[0, 0]) > 0.4
     assert_allclose(answer.torque[:, 1], offset[:, 1], atol=1e-3)
 
 
@@ -82,6 +95,24 @@ def test_friction_whose_sign_is_open_takes_what_it_may_at_a_price() -> None:
         answer = solved(offset, dry=dry, level=level, J=moved, reserve=np.full((K, 1), 2.0))
         assert_allclose(answer.torque[:-2], 1.0, atol=2e-3)
         assert_allclose((answer.torque - 1.5 - mass * answer.d[2])[:-2], friction, atol=5e-3)
+
+
+def test_friction_is_moved_from_what_it_is_as_far_as_its_price_beside_a_deviations_says() -> None:
+    """min d² / L² + e² / level² with k d + e = -m: e = -m level² / (k² L² + level²), L a hundredth."""
+    offset, level = np.array([[0.0], [2.5], [2.5]]), np.full((3, 1), 0.3)
+    stiff, none = np.full((3, 1, 1), 40.0), np.zeros((3, 1, 1))
+    answer = solved(
+        offset,
+        J=[stiff, none, none],
+        limit=np.array([2.0]),
+        dry=np.full((3, 1), 0.1),
+        level=level,
+        reserve=np.full((3, 1), 9.0),
+        last=np.zeros((3, 1)),
+    )
+    friction = answer.torque - offset - 40.0 * answer.d[0]
+    assert_allclose(answer.torque[1:], 2.0, atol=2 * TOLERANCE)
+    assert_allclose(friction[1:], 0.1 - 0.6 * 0.09 / (0.16 + 0.09), atol=10 * TOLERANCE)
 
 
 def test_the_torque_without_open_friction_keeps_the_reserve() -> None:

@@ -41,7 +41,15 @@ def test_in_a_loop_the_arm_starts_with_the_torque_that_holds_it():
 
 
 def test_what_does_not_fit_is_told():
+    RateLimiter([0.5], [0.5], 0.01)
     with pytest.raises(ValueError, match="effort is for 2 joints, rate for 1"):
         RateLimiter([1.0, 2.0], [3.0], 0.01)
-    with pytest.raises(ValueError, match="must be above 0"):
-        RateLimiter([1.0], [0.0], 0.01)
+    for wrong in (
+        ([1.0], [0.0], 0.01),
+        ([0.0], [1.0], 0.01),
+        ([1.0, 2.0], [1.0, -1.0], 0.01),
+        ([1.0, 0.0], [1.0, 1.0], 0.01),
+        ([1.0], [1.0], 0.0),
+    ):
+        with pytest.raises(ValueError, match="must be above 0"):
+            RateLimiter(*wrong)

@@ -198,7 +198,7 @@ class AdaptiveFeedforward(LeafSystem):
 
 def _learned(taken: _Taken, since: float, held: Array | None) -> Array | None:
     """(n,) minus what the integrator has learned since a moment; None where nothing tells."""
-    if held is None or not taken.integrals:
+    if held is None:
         return None
     before = [value for time, value in taken.integrals if time <= since] or [taken.integrals[0][1]]
     return before[-1] - held

@@ -90,7 +90,8 @@ def bounded_reference(
     equations = ModelEquations(model, NUMPY, sharp=True)
     dry, _, slow = _dry_friction(equations, *base)
     level = _dry_friction(equations, base[0], _CREEP + 0 * base[1], base[2])[1]
-    d, torques, near, moved = np.zeros((3, steps + 1, n)), base[0], 0.0, np.full(2, np.inf)
+    d, torques = np.zeros((3, steps + 1, n)), np.zeros((steps + 1, n))
+    near, moved = 0.0, np.full(2, np.inf)
     for _ in range(_ROUNDS):
         slow |= np.sign(base[1] + d[1]) != np.sign(base[1])
         reserve = effort - np.where(slow, level, 0.0)

@@ -65,7 +65,7 @@ class Program:
         K, n = self.offset.shape
         size, scale = K * n, np.tile(self.limit, K)
         same = sparse.identity(size, format="csr")
-        ahead = sparse.diags_array(np.ones(size - n), offsets=n, shape=(size, size), format="csr")[:-n]
+        ahead = sparse.eye_array(size, k=n, format="csr")[:-n]
         now, h = same[:-n], self.h / _TIME
         open_ = np.flatnonzero(self.level.ravel())
         level, reserve = (x.ravel()[open_] / scale[open_] for x in (self.level, self.reserve))

@@ -21,13 +21,14 @@ from armloop.util.errors import InputError
 from armloop.util.given import require
 
 FRICTION_SOURCES = ("reference", "state", "none")
+BANDWIDTH = 20.0  # rad/s, by default
 
 
 class InverseDynamicsModel(Protocol):
     """Anything that predicts the drive torque of one state, with friction at velocities of the caller's choice."""
 
     def feedforward(
-        self, q: Array, v: Array, vdot: Array, step: int = 3, sliding: Array | None = None
+        self, q: Array, v: Array, vdot: Array, step: int = ..., sliding: Array | None = None
     ) -> Array:
         """Return (n,) torques at q, v, vdot (n,), friction taken at `sliding` (n,)."""
 
@@ -49,7 +50,7 @@ class AccelerationGains:
         check_gains(self, "kp", "kd", "ki")
 
     @staticmethod
-    def critical(n: int, bandwidth: float = 20.0) -> AccelerationGains:
+    def critical(n: int, bandwidth: float = BANDWIDTH) -> AccelerationGains:
         """Return kp = w^2, kd = 2 w for n joints: errors decay critically damped at w = `bandwidth`, rad/s."""
         require("a whole number above 0", n=n)
         require("a number above 0", bandwidth=bandwidth)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydrake.systems.framework import LeafSystem
 
-from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
+from armloop.drake.control.computed_torque import BANDWIDTH, AccelerationGains, ComputedTorque
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController
 from armloop.drake.control.scenario_types import TrackingScenario
@@ -29,7 +29,6 @@ from armloop.util.registry import Registry
 
 MAIN_MODEL = "model"
 """The name in `models` of the one that serves every controller that has none of its own."""
-_BANDWIDTH = 20.0  # rad/s, of computed torque with a model that has no mass matrix to show
 
 
 class Controller:
@@ -162,7 +161,7 @@ def _as_stiff(scenario: TrackingScenario, model: FeedforwardModel | None) -> Acc
     """Return critically damped gains of the scenario's bandwidth, by default such that M_ii w^2 = kp at the start."""
     n, bandwidth = scenario.plant.arm.n, scenario.bandwidth
     if bandwidth is not None or not isinstance(model, ReconstructedModel):
-        return AccelerationGains.critical(n, bandwidth or _BANDWIDTH)
+        return AccelerationGains.critical(n, bandwidth or BANDWIDTH)
     inertia = np.diag(Dynamics(model, symmetric=True).mass_matrix(scenario.reference.evaluate([0.0])[0][0]))
     w = np.minimum(np.sqrt(scenario.gains.kp / inertia), 0.1 / scenario.plant.config.time_step)
     return AccelerationGains(w**2, 2 * w)
