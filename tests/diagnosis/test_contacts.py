@@ -114,7 +114,16 @@ class TestFinding:
         scanned = [
             SimpleNamespace(rows=slice(a, b), joint=j, level=innovation) for a, b, j in of.get("beside", ())
         ]
-        monkeypatch.setattr(contacts, "pulses", lambda *_: scanned)
+        far = np.zeros((100, 2), dtype=bool)
+        far[:, of.get("far", [])] = True
+        monkeypatch.setattr(contacts, "far_outside", lambda motion, ranges: far)
+
+        def pulses(samples: Any, left: Any, judged: Any) -> list[Any]:
+            assert left is innovation
+            self.judged = judged.sum(axis=0).tolist()
+            return scanned
+
+        monkeypatch.setattr(contacts, "pulses", pulses)
         monkeypatch.setattr(contacts, "beside", lambda samples, residual, rows: residual + rows.start)
         rows = np.full((100, 2), of.get("judged", True))
         evidence: Any = SimpleNamespace(
@@ -154,6 +163,12 @@ class TestFinding:
         assert self.left == [0.0, 34.0, 60.0, 80.0]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, back=[60])] == [20, 34, 80]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, sticks=[80])] == [20, 34, 60]
+
+    def test_what_is_known_or_lies_far_outside_of_the_trained_range_is_not_scanned(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.pushed(monkeypatch, known=30, far=[1])
+        assert self.judged == [70, 0]
 
     def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # of 9.9 s: 3.9 s and 4.0 s

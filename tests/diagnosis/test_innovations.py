@@ -36,6 +36,27 @@ def test_a_fast_reversal_is_no_rest_and_a_standstill_is() -> None:
     assert np.abs(standing[rest]).max() <= 2 * CREEP + 0.02
 
 
+def test_a_standstill_as_long_as_what_the_filter_smears_to_both_sides_is_a_rest_of_that_joint() -> None:
+    """The filter reaches ten samples: of a standstill rests what is farther than that from where the joint moves."""
+    N = 100
+    v = np.ones((N, 2))
+    moving = np.ones((N, 2), dtype=bool)
+    moving[30:60, 0] = moving[85:, 0] = False
+    motion = Motion(0.01 * np.arange(N), 0 * v, v, 0 * v, np.array([0, 40]))
+    given = Samples(motion, 0 * v, moving, 0.01, 5.0)
+    assert round(given.reach / given.period) == 10
+    rest = np.zeros((N, 2), dtype=bool)
+    # neither a run's beginning nor its end is a motion
+    rest[[*range(40, 50), *range(95, 100)], 0] = True
+    np.testing.assert_array_equal(at_rest(given), rest)
+    # without a filter nothing is smeared, and slower than a creep a joint rests
+    v[0], v[1], v[2] = CREEP, -0.99 * CREEP, 0.99 * CREEP
+    moving[:3] = True
+    rest = ~moving
+    rest[1:3] = True
+    np.testing.assert_array_equal(at_rest(Samples(motion, 0 * v, moving, 0.01)), rest)
+
+
 def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
     """Evidence of one joint of a baseline of 1 N·m, sampled every 0.04 s and not filtered."""
     given = np.array(v)[:, None]

@@ -215,7 +215,7 @@ class TestReasons:
     @pytest.mark.parametrize(("moves", "blocks", "still"), [(20, 8, ""), (19, 8, "[1, 2]"), (20, 7, "[2]")])
     def test_too_little_motion(self, moves: int, blocks: int, still: str) -> None:
         given = motion((100,), 2)
-        given.v[:moves, 0], given.v[moves:, 0], given.v[:, 1] = -0.011, 0.009, 0.0019
+        given.v[:moves, 0], given.v[moves:, 0], given.v[:, 1] = -0.011, 0.01, 0.002
         evidence: Any = SimpleNamespace(
             rows=np.ones((100, 2), dtype=bool),
             samples=SimpleNamespace(motion=given),

@@ -150,6 +150,7 @@ def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
     np.testing.assert_allclose(of(rmse=[1e-12, 0.4]).scale, [1e-3 * own[0], 0.4], rtol=1e-6)
     assert of(rmse=[0.4, 0.2]).variation.tolist() == [1.0, 1.0]
     np.testing.assert_allclose(of(rmse=[0.4, 0.2], worst=[0.8, 0.1]).variation, [4.0, 1.0])
+    np.testing.assert_allclose(of(rmse=[0.4, 0.2], worst=[None, 0.4]).variation, [1.0, 4.0])
 
 
 def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wrong: float = 99.0) -> Any:

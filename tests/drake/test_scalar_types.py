@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from exact_parts import EFFECT_PARAMETERS, energies, model_of, random_motion, rigid_body, scara_terms
 from numpy.testing import assert_allclose
-from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
+from pydrake.autodiffutils import AutoDiffXd, ExtractValue, InitializeAutoDiff
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.symbolic import Expression, Variable
@@ -30,6 +30,7 @@ from armloop.drake import (
     model_equations,
 )
 from armloop.drake.plant.plant import add_links
+from armloop.drake.scalars import within
 from armloop.dynamics import Dynamics, effect_law
 from armloop.laws.effects import EFFECTS, Context
 from armloop.laws.friction import Sliding, torque_along
@@ -251,3 +252,10 @@ def test_a_model_of_numbers_alone_stays_float():
 
     assert Feedforward(Numbers(), n=2).ToAutoDiffXdMaybe() is None
     assert PidController(PidGains.paper(2), 0.01, resolution=1e-4).ToSymbolicMaybe() is None
+
+
+@pytest.mark.parametrize("T", [float, AutoDiffXd, Expression])
+def test_an_interval_has_its_start_and_not_its_end(T):
+    for time, part in ((0.9, 0.0), (1.0, 1.0), (1.9, 1.0), (2.0, 0.0), (2.1, 0.0)):
+        value = within(T, T(time), 1.0, 2.0)
+        assert (value.Evaluate() if T is Expression else value) == part

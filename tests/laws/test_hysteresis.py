@@ -5,7 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from armloop.laws.hysteresis import stop_operator
+from armloop.laws.hysteresis import stop_operator, stop_step
+from armloop.util.functions import MATH
 
 
 def sample_by_sample(q, width, starts):
@@ -66,3 +67,8 @@ def test_a_width_that_is_none_is_refused(width):
 
 def test_no_samples_no_states():
     assert stop_operator(np.zeros((0, 2)), 0.1).shape == (0, 2)
+
+
+def test_one_step_stretches_as_far_as_the_width_both_ways():
+    steps = [(0.3, 0.1), (0.3, -0.5), (0.3, 0.4), (-0.3, -0.4)]
+    assert [stop_step(z, shift, 0.5, MATH) for z, shift in steps] == pytest.approx([0.4, -0.2, 0.5, -0.5])

@@ -92,12 +92,14 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
     laws, run = found_laws(diagnosis), Stage.of_run(diagnosis.evidence)
     rivals = pairs(diagnosis, laws, run)
     ways = {id(pair): planner.possible(pair.rivalries()) for pair in rivals}
+    joint = None
     if any(ways.values()):
         alike = planner.possible(lookalikes(diagnosis, laws, rivals, run))
         made = planner.alternatives([*(way for pair in rivals for way in ways[id(pair)]), *alike])
         purpose = "alternatives"
     elif diagnosis.unlisted is not None:
-        made, purpose = planner.unlisted(diagnosis.unlisted.joint), "unlisted"
+        joint = diagnosis.unlisted.joint
+        made, purpose = planner.unlisted(joint), "unlisted"
     else:
         made, purpose = planner.precision(laws), "precision"
     reference = planner.whole(made)
@@ -113,7 +115,6 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
     ]
     told.sort(key=lambda each: (each.then is None, each.now))
     sharper = _sharper(run, then, laws) if purpose == "precision" else []
-    joint = diagnosis.unlisted.joint if purpose == "unlisted" and diagnosis.unlisted is not None else None
     use = planner.limits.use(sampled(made.reference, planner.fine_step))
     return NextRun(purpose, reference, told, sharper, joint, use)
 

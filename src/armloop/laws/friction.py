@@ -206,7 +206,7 @@ def _entry(v: Array, a: Array, width: float) -> Array:
     speeding = v * a > 0
     distance = np.where(speeding, v**2 / (2 * np.where(speeding, np.abs(a), 1.0)), np.inf)
     distance = np.where(np.abs(v) > _AT_REST, distance, 0.0)
-    return np.asarray(np.sign(v) * (distance > 0) * np.clip(distance / width - 1, -1, 1))
+    return np.asarray(np.sign(v) * (distance > 0) * np.minimum(distance / width - 1, 1))
 
 
 @dataclass(frozen=True)

@@ -59,3 +59,13 @@ def test_what_counts_as_rest_as_clipped_and_as_settled():
 def test_a_reference_that_rests_between_two_ways_has_turned_when_it_last_moved():
     assert metrics.reversals(np.array([1.0, 2.0, 0.0, 0.0, -1.0, -1.0, 0.0, -2.0, 3.0])).tolist() == [2, 8]
     assert metrics.reversals(np.zeros(5)).tolist() == []
+
+
+def test_of_a_single_reversal_there_is_its_settling():
+    v_ref = np.where(np.arange(20) < 8, 1.0, -1.0)[:, None]
+    error = np.where(np.arange(20) < 13, 1.0, 0.0)[:, None]
+    none = 0 * error
+    found = measure(0.5, error, v_ref, v_ref, none, none)
+    assert (found.settling.tolist(), found.unsettled.tolist()) == ([2.5], [0.0])
+    found = measure(0.5, none + 1.0, v_ref, v_ref, none, none)
+    assert (found.settling.tolist(), found.unsettled.tolist()) == ([6.0], [1.0])

@@ -92,6 +92,9 @@ def test_a_file_may_hold_several_scenarios(tmp_path):
         load_tracking(f"{_written(path, TWO.replace('  score: []', '  Kp: []'))}:slow")
     with pytest.raises(ScenarioError, match=r"holds one scenario without a name; leave out :slow"):
         load_tracking(f"{_written(path, 'plant: three_axis')}:slow")
+    # one with a field that is misspelt is no file of several
+    with pytest.raises(ScenarioError, match=r"mine.yaml: field 'limts' is unknown"):
+        load_tracking(_written(path, "plant: three_axis\nlimts: {effort: [9.0]}"))
     assert set(load_tracking("three_axis_tracking:all_controllers").controllers) == {*LISTED} - {"bounded"}
 
 

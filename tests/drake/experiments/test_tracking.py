@@ -1,6 +1,7 @@
 """Tracking with an exact model: the loop itself, without the errors of a reconstruction."""
 
 import dataclasses
+import os
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from numpy.testing import assert_allclose
 from pydrake.systems.framework import DiagramBuilder
 
 from armloop.drake.control.controllers import LISTED
+from armloop.drake.experiments import tracking
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.tracking import add_controlled_arm, controllers_for, run_tracking, track
 from armloop.drake.plant.exact import exact_model
@@ -54,6 +56,21 @@ def test_order_of_controllers_on_a_short_run(short, exact):
     assert np.all(results["pid_step3"].eta < 0.01)
     assert_allclose(results["pid_again"].eta, results["pid_step3"].eta)
     assert results["pid"].unit == ("deg",) * 3
+
+
+def test_controllers_run_at_once_in_processes_of_their_own_unless_one_is_asked_for(short, monkeypatch):
+    monkeypatch.setattr(tracking, "track", lambda scenario, name, models, effects: (name, os.getpid()))
+    here = os.getpid()
+    for controllers, processes, elsewhere in (
+        (("pid", "exact"), 2, True),
+        (("pid", "exact"), 1, False),
+        (("pid", "exact"), 0, False),
+        (("pid",), 2, False),
+    ):
+        scenario = dataclasses.replace(short, controllers=controllers)
+        found = run_tracking(scenario, {}, processes=processes)
+        assert [name for name, _ in found.values()] == list(controllers)
+        assert all((process != here) == elsewhere for _, process in found.values())
 
 
 def test_run_is_repeatable_and_consistent(short):

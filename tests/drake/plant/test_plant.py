@@ -7,7 +7,7 @@ from pydrake.systems.analysis import Simulator
 
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import ServoGains
-from armloop.drake.plant.plant import ArmPlant
+from armloop.drake.plant.plant import PAYLOAD_DENSITY, ArmPlant, _payload
 from armloop.robot.arm import load_arm
 
 FRICTION = JointFriction(static=1.3, coulomb=1.0, stribeck_velocity=0.1, viscous=2.0)
@@ -148,3 +148,19 @@ def test_frictionless_plant_swings_and_keeps_its_energy():
 def test_friction_refuses_impossible_values(bad):
     with pytest.raises(ValueError, match="must"):
         JointFriction(**bad)
+
+
+def test_a_payload_has_its_mass_at_its_centre_and_its_own_inertia_about_that():
+    com = np.array([0.1, -0.2, 0.3])
+    about = 2.0 * (com @ com * np.eye(3) - np.outer(com, com))
+    for own, inertia in (
+        (0.05, 0.05),
+        (None, 0.4 * 2.0 * (3 * 2.0 / (4 * np.pi * PAYLOAD_DENSITY)) ** (2 / 3)),
+    ):
+        body = _payload(2.0, com, own)
+        assert body.get_mass() == pytest.approx(2.0)
+        assert_allclose(body.get_com(), com)
+        assert_allclose(
+            body.CalcRotationalInertia().CopyToFullMatrix3(), about + inertia * np.eye(3), atol=1e-12
+        )
+    assert _payload(0.0, com, 0.05).get_mass() == 0.0

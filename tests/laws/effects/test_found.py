@@ -58,6 +58,19 @@ def test_everyone_who_is_asked_gives_one_torque() -> None:
     assert_allclose(bias, tau, atol=1e-12)
 
 
+def test_it_fades_beyond_the_ends_of_its_range_wherever_that_lies() -> None:
+    """Found from 1 to 3 rad/s: full there, half a tenth of a rad/s beyond, nothing from two tenths on."""
+    low, high = np.array([0.0, 1.0, 0.0]), np.array([0.0, 3.0, 0.0])
+    added = AddedEffect(FoundLaw(2), found_law(ARM, 2, {"v2": (0.5, 0.0)}, (0 * low, low), (0 * high, high)))
+    law = added.pointwise(ARM, None)
+    for v, part in (
+        *((1.0, 1.0), (2.0, 1.0), (3.0, 1.0), (3.1, 0.5), (3.2, 0.0), (9.0, 0.0)),
+        *((0.9, 0.5), (0.8, 0.0), (-2.0, 0.0)),
+    ):
+        tau = law(np.zeros(3), np.array([0.0, v, 0.0]), np.zeros(3))
+        assert_allclose(tau, [0.0, 0.5 * v * part, 0.0], atol=1e-12)
+
+
 def test_drake_differentiates_it() -> None:
     system = EffectTorque(ARM, "unlisted", 2, LAW.values)
     state = np.concatenate([MOTION.q[7], MOTION.v[7]])
