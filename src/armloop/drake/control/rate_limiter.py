@@ -43,8 +43,8 @@ def RateLimiter_(T: type) -> Any:
                 raise InputError("effort and rate must be numbers above 0, one per joint")
             if limits.shape != rates.shape or limits.ndim != 1:
                 raise InputError(f"effort is for {limits.size} joints, rate for {rates.size}")
-            if not (np.all(limits > 0) and np.all(rates > 0) and period > 0):
-                raise InputError("effort, rate and period must be above 0")
+            if not (np.all(limits > 0) and np.all(rates > 0)):
+                raise InputError("effort and rate must be above 0")
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments = effort, rate, period
             self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))
