@@ -110,7 +110,7 @@ def test_sliding_friction_resists() -> None:
     force = system.get_output_port().Eval(fixed(system, state=[9.0, 9.0, 0.0, 0.01]))
     assert_allclose(force, [0.0, -np.tanh(1.0)])
     for wrong in (0.0, -0.1):
-        with pytest.raises(ValueError, match="it must be above 0"):
+        with pytest.raises(ValueError, match="smoothing must be a number above 0"):
             JointFrictionSystem(friction, smoothing=wrong)
 
 
