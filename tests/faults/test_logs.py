@@ -63,6 +63,18 @@ def scaled(kind: str, factor: float) -> Lay:
     return signals(change)
 
 
+def with_vdot(factor: float) -> Lay:
+    """The log with accelerations, a factor off."""
+
+    def change(lines: list[str]) -> list[str]:
+        cells = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+        vdot = factor * np.gradient(cells[:, 4:7], cells[:, 0], axis=0)
+        rows = [f"{line},{a:.6g},{b:.6g},{c:.6g}" for line, (a, b, c) in zip(lines[1:], vdot, strict=True)]
+        return [f"{lines[0]},vdot1,vdot2,vdot3", *rows]
+
+    return text(change)
+
+
 def a_turn_off(x: dict[str, np.ndarray]) -> None:
     x["q"][:, 1] += 2 * np.pi
 
@@ -99,6 +111,34 @@ LOGS: dict[str, tuple[Lay, str, str]] = {
         REFUSED,
         r"line \d+: field larger than .*; is a quote left open",
     ),
+    "blank lines at the top": (
+        text(lambda lines: ["", "", *lines]),
+        REFUSED,
+        "line 1 is blank; the first line must",
+    ),
+    "a comment at the top": (
+        text(lambda lines: ["# made by a recorder", *lines]),
+        REFUSED,
+        "line 1 is a comment, '# made by a recorder'; .*`armloop convert`",
+    ),
+    "semicolons": (
+        text(lambda lines: [line.replace(",", ";") for line in lines]),
+        REFUSED,
+        "the header is one column, .*`armloop convert` read",
+    ),
+    "names in capitals": (
+        text(lambda lines: [lines[0].upper(), *lines[1:]]),
+        REFUSED,
+        "`armloop convert` reads other",
+    ),
+    "accelerations in degrees": (
+        with_vdot(180 / np.pi),
+        REFUSED,
+        r"column vdot1 is 57\.\d times the rate of v1",
+    ),
+    "accelerations turned": (with_vdot(-1.0), REFUSED, r"column vdot1 is -(1|0\.99\d*) times the rate of v1"),
+    "no accelerations": (with_vdot(0.0), REFUSED, r"column vdot1 is next to zero, while v1 changes"),
+    "accelerations": (with_vdot(1.0), TAKEN, ""),
     "a note between rows": (
         text(lambda lines: [*lines[:400], "# pause", *lines[400:]]),
         REFUSED,
@@ -200,3 +240,22 @@ def test_names_in_capitals_are_names(place: Path, capsys: pytest.CaptureFixture[
         main(["excite", "three_axis", "--duration", "5", "--starts", "1", "--random", "3", "--out", "R.CSV"])
         == 0
     )
+
+
+def test_what_convert_would_have_to_guess(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = (place / "run.csv").read_text().splitlines()
+    zeros = [lines[0] + ",q1", *(f"{line},0" for line in lines[1:])]
+    again = [lines[0] + ",q1", *(f"{line},{line.split(',')[1]}" for line in lines[1:])]
+    (place / "other_q1.csv").write_text("\n".join(zeros) + "\n")
+    (place / "same_q1.csv").write_text("\n".join(again) + "\n")
+    before = contents(place)
+    assert main(["convert", "other_q1.csv", "--out", "c.csv"]) == 2
+    one_line(capsys.readouterr().err, "other_q1.csv: column q1 stands twice, with other numbers")
+    assert contents(place) == before
+    assert main(["convert", "same_q1.csv", "--out", "c.csv"]) == 0
+    # Python's 1_000 is no number of a log
+    tau = [",".join([*line.split(",")[:-1], "0_1"]) if k == 60 else line for k, line in enumerate(lines)]
+    (place / "tau.csv").write_text("\n".join(tau) + "\n")
+    capsys.readouterr()
+    assert main(["convert", "tau.csv", "--out", "d.csv"]) == 2
+    one_line(capsys.readouterr().err, "column tau3, row 60: not a number")

@@ -126,6 +126,14 @@ WRONG: dict[str, tuple[str, str]] = {
         "no Dask scheduler answers",
     ),
     "a store of no text": ("watch --models model.json --logs run.csv --store s\udcff", "the name is no text"),
+    "an arm without a page": (
+        "watch --models model.json --logs run.csv --store s --arm a",
+        "--arm .* page of --report",
+    ),
+    "an angle of another unit": (
+        "convert run.csv --angle-unit deg --out c.csv",
+        "--angle-unit deg, but the motion log says itself that q is in rad",
+    ),
     "no command": ("", "required: COMMAND"),
     "an unknown command": ("magic", "magic"),
     "an arm that is a folder": ("collect . --out c", "no such file"),

@@ -78,6 +78,8 @@ def run(options: Watch) -> int:
     from armloop.watch.sources import find_logs
     from armloop.watch.store import Store as Folder
 
+    if options.arm is not None and options.report is None:
+        raise InputError("--arm chooses whose trends the page of --report shows: give it, too")
     out_file(options.report, "--report")
     how = Options(
         options.false_alarm_hours, options.healthy, not options.sums_only, options.scheduler, options.jobs

@@ -160,6 +160,14 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     elif answers.tau_unit is not None:
         tau = QuantityMap(tau.columns, answers.tau_unit, tau.sign, tau.offset, tau.gains)
     if answers.angle_unit is not None:
+        told = {
+            str(canonical(unit, "q")) for unit in (q.unit if isinstance(q.unit, list) else [q.unit]) if unit
+        }
+        if told & {"rad", "deg"} - {answers.angle_unit}:
+            raise LogError(
+                f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
+                f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
+            )
         rates = {"rad": "rad/s", "deg": "deg/s"}
         q = QuantityMap(q.columns, _said(q.unit, answers.angle_unit), q.sign, q.offset)
         if v is not None:

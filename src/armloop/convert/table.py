@@ -17,6 +17,7 @@ def read_table(path: Path) -> Recording:
     if kind_of(path) == PARQUET:
         columns, starts, dropped, units = _parquet(path)
         notes: list[str] = []
+        twice: list[str] = []
     else:
         table = read_text(path)
         columns, starts, dropped, units, notes = (
@@ -26,14 +27,30 @@ def read_table(path: Path) -> Recording:
             table.units,
             table.notes,
         )
+        twice = table.twice
     notes += [f"columns left out: {', '.join(dropped)}"] if dropped else []
     own = _own(columns) if not units else None
     if own is not None:
+        _require_once(path, own, twice)
         return Recording(path, "motion log", columns, own, starts=starts, notes=notes)
     found = suggest(list(columns), units=units)
+    _require_once(path, found.mapping, twice)
     return Recording(
         path, "table", columns, found.mapping, starts=starts, notes=notes, unsure=found.unsure, units=units
     )
+
+
+def _require_once(path: Path, mapping: Mapping | None, twice: list[str]) -> None:
+    """Raise ``LogError`` where a column that is needed stands twice with other numbers."""
+    if mapping is None:
+        return  # a map will say what is needed
+    quantities = [mapping.q, mapping.tau, *(each for each in (mapping.v, mapping.vdot) if each is not None)]
+    needed = {mapping.time.column, *(name for each in quantities for name in each.names())}
+    for name in twice:
+        if name in needed:
+            raise LogError(
+                f"{path}: column {name} stands twice, with other numbers; give each a name of its own"
+            )
 
 
 def _own(columns: dict[str, Array]) -> Mapping | None:

@@ -25,13 +25,17 @@ _CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
 
 @dataclass
 class TextTable:
-    """Columns of text; ``starts`` holds the first row below each header, ``units`` what a row below it says."""
+    """Columns of text; ``starts`` holds the first row below each header, ``units`` what a row below it says.
+
+    ``twice`` names those that stand a second time with other numbers.
+    """
 
     columns: dict[str, Array]
     starts: list[int]
     dropped: list[str]
     units: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    twice: list[str] = field(default_factory=list)
 
 
 def header_of(path: Path) -> list[str]:
@@ -111,7 +115,8 @@ def read_text(path: Path) -> TextTable:
     except pyarrow.ArrowInvalid as error:
         raise _fault(path, body, numbers, separator, len(names_read), error) from error
     columns: dict[str, Array] = {}
-    dropped = []
+    dropped: list[str] = []
+    twice: list[str] = []
     for k, name in enumerate(names_read):
         cells = table.column(k)
         if not name:
@@ -119,6 +124,9 @@ def read_text(path: Path) -> TextTable:
         kind = cells.type
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
+            numeric = pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)
+            if not numeric or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
+                twice.append(name)
         elif (
             pyarrow.types.is_floating(kind)
             or pyarrow.types.is_integer(kind)
@@ -136,7 +144,7 @@ def read_text(path: Path) -> TextTable:
             notes.append(f"{name}: dates or times of day, counted in s from the first row")
         else:
             dropped.append(f"{name} (empty)" if pyarrow.types.is_null(kind) else f"{name} ({kind})")
-    return TextTable(columns, starts, dropped, units, notes)
+    return TextTable(columns, starts, dropped, units, notes, twice)
 
 
 def numbers_of(cells: Any) -> Array:
@@ -267,7 +275,8 @@ def _first_text(cells: object) -> str | None:
 def _forgiving(cells: object) -> Array:
     def number(text: str | None) -> float:
         try:
-            return float(text) if text is not None else float("nan")
+            # not Python's own 1_000, nor digits of another script
+            return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
         except ValueError:
             return float("nan")
 

@@ -321,8 +321,16 @@ def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
 
 
 def _columns(path: Path, header: Sequence[str]) -> tuple[int, bool]:
+    if header and header[0].startswith(("#", "%", "//")):
+        raise LogError(
+            f"{path}: line 1 is a comment, {header[0][:40]!r}; the first line must name the columns: take it out, or let "
+            "`armloop convert` read the file"
+        )
     if len(header) == 1 and re.search(r"[;\t ]", header[0]):
-        raise LogError(f"{path}: the header is one column, {header[0][:40]!r}; put commas between the names")
+        raise LogError(
+            f"{path}: the header is one column, {header[0][:40]!r}; put commas between the names, or let `armloop convert` "
+            "read the file"
+        )
     found: dict[str, set[int]] = {"q": set(), "v": set(), "tau": set(), "vdot": set()}
     for name in header:
         match = _JOINT_COLUMN.fullmatch(name)
@@ -350,7 +358,8 @@ def _columns(path: Path, header: Sequence[str]) -> tuple[int, bool]:
     if missing:
         raise LogError(
             f"{path}: the header lacks {_listed(missing)}; "
-            "it must be time,q1..qn,v1..vn,tau1..taun (optionally vdot1..vdotn; v may be left out) with one n"
+            "it must be time,q1..qn,v1..vn,tau1..taun (optionally vdot1..vdotn; v may be left out) with one n; "
+            "`armloop convert` reads other names and units"
         )
     return n, bool(found["vdot"])
 

@@ -26,6 +26,8 @@ _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
 _JUMP, _UNUSUAL = 0.1, 30.0
 # Window of the comparison of rates, s, and the rate (rms, rad/s or m/s) from which a joint is judged.
 _WINDOW, _MOVES = 0.05, 0.05
+# Rate of v (rms, rad/s² or m/s²) from which vdot is judged by it.
+_ACCELERATES = 0.5
 # So long may one column stand still while the other moves, s.
 _FROZEN = 0.2
 # Windows that are compared at most, and rows that tell whether a log is a time series.
@@ -85,6 +87,7 @@ def faults(log: Recorded) -> Iterator[Finding]:
     yield from _jumps(log)
     if windows is not None:
         yield from _unlike(windows)
+    yield from _accelerations(log)
 
 
 def doubts(log: Recorded) -> Iterator[Finding]:
@@ -263,6 +266,29 @@ def _scale(windows: _Windows) -> Iterator[Finding]:
                 f"column v{j + 1}",
                 f"is {factor:.3g} times the rate of q{j + 1}, {_likely_cause(factor)}; "
                 "time, q and v must be in s, rad (m) and rad/s (m/s)",
+            )
+
+
+def _accelerations(log: Recorded) -> Iterator[Finding]:
+    """vdot that is proportional to the rate of v, by a factor that is not one, or that stands beside a v that changes."""
+    if log.vdot is None:
+        return
+    windows = _windows(replace(log, q=log.v, v=log.vdot, vdot=None))
+    if windows is None:
+        return
+    similar = windows.similarity()
+    of_v, of_vdot = windows.rates()
+    for j in np.flatnonzero(of_v > _ACCELERATES):
+        factor = float(similar[j, j] * of_vdot[j] / of_v[j])
+        if of_vdot[j] < 0.02 * of_v[j]:
+            yield Finding(
+                f"column vdot{j + 1}",
+                f"is next to zero, while v{j + 1} changes; leave out all columns vdot to have v differentiated",
+            )
+        elif abs(similar[j, j]) > 0.9 and not 0.5 < factor < 2.0:
+            yield Finding(
+                f"column vdot{j + 1}",
+                f"is {factor:.3g} times the rate of v{j + 1}; it must be in rad/s² (m/s²), or left out",
             )
 
 

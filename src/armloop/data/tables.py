@@ -44,7 +44,11 @@ def read_header(path: Path) -> list[str]:
     try:
         if path.stat().st_size == 0:
             raise LogError(f"{path}: the file is empty; the first line must name the columns")
-        names = _parquet_header(path) if kind_of(path) == PARQUET else next(_csv_rows(path), (0, []))[1]
+        line, names = (
+            (1, _parquet_header(path)) if kind_of(path) == PARQUET else next(_csv_rows(path), (1, []))
+        )
+        if line > 1:
+            raise LogError(f"{path}: line 1 is blank; the first line must name the columns")
     except OSError as error:
         raise LogError(
             f"{path}: cannot be read ({error.strerror or error}); check its permissions"
