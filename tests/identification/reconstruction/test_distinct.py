@@ -32,6 +32,9 @@ def test_of_columns_that_are_one_function_on_the_data_the_first_is_kept() -> Non
     X = np.column_stack([a, 3 * a, b, -b + 1e-4 * c, 0 * a, a + b])
     first, others = np.array([0]), np.arange(1, 6)
     assert repeated(X.T @ X, first, others).tolist() == [True, False, True, False, False]
+    # whatever the columns' units
+    scale = np.array([1e-3, 1e3, 1e-6, 1e-5, 1.0, 1e-4])
+    assert repeated((X * scale).T @ (X * scale), first, others).tolist() == [True, False, True, False, False]
     apart = np.column_stack([a, a + 0.01 * c])
     assert not repeated(apart.T @ apart, first, np.array([1])).any()
 

@@ -82,6 +82,8 @@ def test_without_a_filter_no_noise_is_asked_for_and_without_a_long_run_it_is_sai
     assert set(map(str, asked)) == {"None"}
     with pytest.raises(ShortRunError):
         make(logs(2, 1), HOW, OPTIONS)
+    with pytest.raises(ShortRunError):
+        make(logs(2), HOW, OPTIONS)
 
 
 @pytest.mark.parametrize(("most", "stride"), [(60, 1), (30, 2), (21, 2), (20, 3), (15, 4), (12, 6), (13, 4)])

@@ -137,3 +137,29 @@ def test_the_profiled_column_is_the_one_that_leaves_least() -> None:
     assert profiled(joint, moments, np.array([0, 3])).tolist() == [4]
     joint.profile = np.zeros(0, dtype=int)
     assert profiled(joint, moments, np.array([0])).tolist() == []
+
+
+@pytest.mark.parametrize(("whole", "asked", "given"), [(True, True, 2), (True, False, 0), (False, True, 0)])
+def test_an_estimator_that_asks_for_parts_gets_those_of_all_samples(
+    whole: bool, asked: bool, given: int
+) -> None:
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(60, 3)), rng.normal(size=60)
+    fitted, every = Moments.of(X[:40], y[:40]), Moments.of(X, y)
+    none = np.zeros(0, dtype=np.intp)
+    joint = steps._Joint(fitted, every, 3, np.ones(3, dtype=bool), none, none, 1.0)
+    seen: list[Any] = []
+
+    def fit(moments: Moments, forced: Any, power: float, parts: Any) -> Any:
+        seen.append(parts)
+        return np.arange(3), np.zeros(3)
+
+    sparse: Any = SimpleNamespace(
+        how=SimpleNamespace(needs_parts=asked, shrinks=False),
+        fit=fit,
+        prune=lambda moments, support, forced, power: support,
+    )
+    joint.select(every if whole else fitted, np.arange(3), sparse)
+    assert {len(parts) for parts in seen} == {given}
+    for part, rows in zip(seen[0], (slice(40), slice(40, 60)), strict=False):
+        np.testing.assert_allclose(part.G, X[rows].T @ X[rows], atol=1e-12)

@@ -6,9 +6,10 @@ from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, conditioned_s
 
 from armloop.data.blocks import folds
 from armloop.data.motion import Motion, Samples
+from armloop.data.regimes import Clusters, Condition
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.stepwise import stepwise
+from armloop.identification.reconstruction.stepwise import _impure, stepwise
 from armloop.identification.reconstruction.trials import HeldOut
 from armloop.model import ReconstructedModel
 from armloop.regression.sparse import Sparse
@@ -189,3 +190,40 @@ def test_samples_of_a_joint_at_rest_are_not_used(noisy: Samples):
     spoilt = found_on(Samples(noisy.motion, tau, moving, noisy.period), max_order=1)
     clean = found_on(Samples(noisy.motion, noisy.tau, moving, noisy.period), max_order=1)
     assert [c.to_dict() for c in spoilt.components] == [c.to_dict() for c in clean.components]
+
+
+def conditions(counts: tuple[int, int, int], **of: float) -> tuple[Motion, Clusters]:
+    """Two joints: so many samples at rest, at a constant velocity of 1 rad/s each, and accelerating by 1 rad/s^2 each."""
+    kind = np.repeat([Condition.STATIC, Condition.CONSTANT_VELOCITY, Condition.VARYING_VELOCITY], counts)
+    N = len(kind)
+    q = np.tile(np.linspace(-1.0, 1.0, N)[:, None], 2)
+    still = kind == Condition.STATIC
+    for j in (0, 1):
+        q[still, j] = np.linspace(0.0, 2 * of.get(f"cover{j + 1}", 1.0), still.sum()) - 1.0
+    v, vdot = np.ones((N, 2)), np.ones((N, 2))
+    v[still] = of.get("slow", 0.0)
+    vdot[kind == Condition.CONSTANT_VELOCITY] = of.get("steady", 0.0)
+    motion = Motion(np.arange(float(N)), q, v, vdot, np.array([0]))
+    return motion, Clusters(kind, np.zeros((N, 2)), np.zeros((3, 2)), [], 3, 1)
+
+
+@pytest.mark.parametrize(
+    ("counts", "of", "told"),
+    [
+        ((100, 100, 100), {}, ""),
+        ((99, 200, 200), {}, "too few samples in one"),
+        ((200, 200, 99), {}, "too few samples in one"),
+        ((100, 100, 100), {"slow": 0.09, "steady": 0.09}, ""),
+        ((100, 100, 100), {"slow": 0.11}, "static data move with 0.22 (constant-velocity 2)"),
+        ((100, 100, 100), {"steady": 0.11}, "constant-velocity data accelerate with 0.22 (varying 2)"),
+        ((100, 100, 100), {"cover1": 0.31}, ""),
+        ((100, 100, 100), {"cover1": 0.29}, "static data cover 29% of the range of q1"),
+        ((100, 100, 100), {"cover1": 0.29, "cover2": 0.25}, "static data cover 25% of the range of q2"),
+    ],
+)
+def test_steps_are_regressed_one_by_one_where_the_conditions_are_really_there(
+    counts: tuple[int, int, int], of: dict[str, float], told: str
+) -> None:
+    note = _impure(*conditions(counts, **of))
+    assert told in note and bool(note) == bool(told)
+    assert not note or note.endswith("so all three steps are regressed together")

@@ -11,7 +11,7 @@ from armloop.features.wave_moments import WaveProducts
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.sums import Choice, Columns
+from armloop.identification.reconstruction.sums import Choice, Columns, Problems, StepSums
 from armloop.laws.friction import FrictionTerm
 
 LAW = [FrictionTerm("sign", 0.7), FrictionTerm("viscous", 2.0), FrictionTerm("stribeck", -0.2, 0.1)]
@@ -48,3 +48,12 @@ def test_friction_columns_are_smeared_like_the_torque(chunk: Chunk) -> None:
         np.testing.assert_allclose(columns.chosen(usable, j, np.arange(3)), own, atol=1e-14)
         some = usable.take(np.arange(5, 50))
         np.testing.assert_allclose(columns.chosen(some, j, np.arange(3)), own[5:50], atol=1e-14)
+
+
+def test_a_joint_that_moves_in_no_sample_has_a_problem_of_no_samples() -> None:
+    library = WaveProducts(Factors(2, ()), np.zeros((0, 1), dtype=np.intp))
+    problem = Problems(Columns(library, (tuple(LAW), tuple(LAW[:1]))), StepSums({}, {}))
+    for joint, columns in ((0, 3), (1, 1)):
+        moments = problem.moments(joint)
+        assert moments.G.shape == (columns, columns) and moments.b.shape == (columns,)
+        assert not moments.G.any() and (moments.yy, moments.count) == (0.0, 0.0)
