@@ -53,6 +53,19 @@ class TestContrast:
         np.testing.assert_array_equal(one_way[:, 0], full)
         assert not found[~full].any() and found[full].any()
 
+    def test_a_run_that_just_holds_all_three_has_one(self) -> None:
+        left = np.zeros((30, 1))
+        left[10:20] = 2.0
+        found, one_way = contrast(samples((30,)), left, 0.2)
+        assert np.flatnonzero(one_way[:, 0]).tolist() == np.flatnonzero(found[:, 0]).tolist() == [15]
+        assert found[15, 0] == pytest.approx(2.0)
+
+    def test_a_joint_that_rests_all_the_while_does_not_turn(self) -> None:
+        run = samples()
+        run.moving[400:600] = False
+        _, one_way = contrast(run, np.zeros((1000, 1)), 0.2)
+        assert one_way[420:580].all() and not one_way[386:415].any()
+
     def test_says_where_a_joint_turns_or_rests_meanwhile(self) -> None:
         run = samples(joints=2)
         run.motion.v[400:, 0] *= -1.0
@@ -74,6 +87,14 @@ class TestPulses:
         assert found.joint == 1 and abs(found.rows.start - 400) <= 1 and abs(found.rows.stop - 440) <= 1
         np.testing.assert_array_equal(found.level, np.abs(contrast(run, left, 0.8)[0]))
 
+    @pytest.mark.parametrize("seconds", [0.2, 0.4, 0.8, 1.6])
+    def test_an_event_is_as_long_as_it_stands_out_most(self, seconds: float) -> None:
+        run, length = samples((2000,)), round(50 * seconds)
+        left = np.zeros((2000, 1))
+        left[800 : 800 + length] = 5.0
+        (found,) = pulses(run, left, run.moving)
+        assert (found.rows.start, found.rows.stop) == (800, 800 + length)
+
     def test_noise_holds_none_and_two_events_are_two(self) -> None:
         run = samples()
         for seed in range(20):
@@ -93,6 +114,10 @@ class TestPulses:
         judged = np.ones((1000, 1), dtype=bool)
         judged[380:460] = False
         assert pulses(run, left, judged) == []
+        also = np.array(left)
+        also[700:740] = 2.5
+        (found,) = pulses(run, also, judged)
+        assert abs(found.rows.start - 700) <= 1 and not found.level[380:460].any()
         run.motion.v[440:] = -1.0
         assert pulses(run, left, run.moving) == []
 
@@ -141,3 +166,26 @@ def test_beside_a_line_nothing_is_left_but_the_event() -> None:
     # at the end of a run what is before and what little is after
     left[700:720] -= 3.0
     np.testing.assert_allclose(beside(run, left, slice(985, 999))[980:], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("rows", "before", "after"),
+    [
+        ((700, 720), (670, 690), (730, 750)),  # as long as the stretch, ten samples of the filter away
+        ((515, 535), (500, 505), (545, 565)),  # what there is of the run
+        ((505, 525), (500, 501), (535, 555)),
+        ((500, 520), (500, 501), (530, 550)),
+        ((960, 980), (930, 950), (990, 1000)),
+        ((985, 998), (962, 975), (999, 1000)),
+        ((470, 490), (440, 460), (499, 500)),
+    ],
+)
+def test_the_line_goes_through_the_means_before_and_after(
+    rows: tuple[int, int], before: tuple[int, int], after: tuple[int, int]
+) -> None:
+    run = replace(samples((500, 500), joints=2), cutoff_hz=5.0)
+    left = np.random.default_rng(2).normal(size=(1000, 2))
+    t, (a, z) = run.motion.time, (slice(*before), slice(*after))
+    slope = (left[z].mean(axis=0) - left[a].mean(axis=0)) / (t[z].mean() - t[a].mean())
+    line = left[a].mean(axis=0) + slope * (t - t[a].mean())[:, None]
+    np.testing.assert_allclose(beside(run, left, slice(*rows)), left - line, atol=1e-9)

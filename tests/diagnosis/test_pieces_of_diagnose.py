@@ -266,7 +266,9 @@ def test_a_law_without_a_name_is_in_the_model_once_it_is_adopted() -> None:
     assert adopted.adopt() is adopted
     for nothing in (of(), of(unlisted=law(0.7, []))):
         assert nothing.adopt() is nothing
-    assert of().zeros.shape == (0, 0)
+    plain = of()
+    assert plain.zeros.shape == (0, 0)
+    assert (plain.reasons, plain.standing.joints, plain.standing.unknown) == ([], [], False)
     assert of(adopted=True).errors()["after"][2] == pytest.approx(2.0 * np.sqrt(5))
 
 

@@ -198,6 +198,24 @@ class TestIsolability:
         assert way._rival(stage, 20).shapes == (7.0,) and len(way._rival(stage).shapes) == 22
         assert [part.shapes for part in way._beside()] == [(7.0,)]
 
+    def test_what_is_left_on_several_motions_is_left_of_all_with_the_first_ones_shapes(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[Any] = []
+
+        def left(stages: Any, law: Any, rival: Any, beside: Any) -> tuple[float, float]:
+            asked.append((len(stages), rival.shapes))
+            return 0.25, 3.0
+
+        monkeypatch.setattr(confounded, "left", left)
+        rival: Any = SimpleNamespace(shapes=lambda context: [context])
+        law = Law(AddedEffect(rival, {}), 7.0)
+        stages: Any = [SimpleNamespace(context=1.0), SimpleNamespace(context=2.0)]
+        way = Rivalry(law, law, ())
+        assert way.left_on_all(stages) == way.left(stages[1]) == 0.25
+        assert asked == [(2, (7.0, 1.0)), (1, (7.0, 2.0))]
+        assert way.hardest(stages[0]).rival.shape == 3.0
+
     @staticmethod
     def of(name: str, joint: int | None = 1, shape: float | None = 5.0) -> Any:
         return SimpleNamespace(place=(name, joint, None), joint=joint, other_joint=None, shape=shape)

@@ -207,6 +207,22 @@ class TestLawThatIsNotListed:
             assert bool(law.terms) == is_law
         assert law.left.tolist() == after.held_out[mine].tolist() and len(law.errors) == 0
 
+    @pytest.mark.parametrize(("part", "is_law"), [(0.2, True), (0.42, False)])
+    def test_twenty_samples_count_for_one(self, part: float, is_law: bool) -> None:
+        """Each half has 250 samples, worth 12.5: of p functions a term must bring log 12.5 + 2 log p.
+
+        12.5 log(before/after) is that at a part of about 0.3 left; were the samples worth half as many, at 0.1.
+        """
+        evidence, after, noise = self.moving(1000)
+        motion, mine = evidence.samples.motion, after.stacked.joint == 1
+        p = len(unlisted._names(unlisted._library((True, True)), 1))
+        cost = np.log(12.5) + 2 * np.log(p)
+        assert 0.28 < np.exp(-cost / 12.5) < 0.36
+        told = np.sin(motion.q[::2, 0])
+        size = np.sqrt(part / (1 - part) * np.mean(told**2) / np.mean(noise**2))
+        after.held_out[mine] = told + size * noise
+        assert bool(unlisted._law(evidence, after, 1).terms) == is_law
+
     def test_at_most_four_functions_make_a_law(self) -> None:
         evidence, after, noise = self.moving()
         motion, mine = evidence.samples.motion, after.stacked.joint == 1

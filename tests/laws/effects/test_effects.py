@@ -323,6 +323,8 @@ def test_standard_errors_follow_from_the_covariance(name, context):
         ("joint_spring", {"stiffness": -1.0, "rest": 0.5}, False),
         ("joint_spring", {"stiffness": 1.0, "rest": -9.0}, False),
         ("gravity_tilt", {"roll": 0.2, "pitch": -0.2}, True),
+        ("gravity_tilt", {"roll": 0.59, "pitch": -0.59}, True),
+        ("gravity_tilt", {"roll": 0.6, "pitch": 0.0}, False),
         ("gravity_tilt", {"roll": 0.7, "pitch": 0.0}, False),
         ("gravity_tilt", {"roll": 0.0, "pitch": -0.7}, False),
         ("coulomb_friction", {"level": -0.3}, True),  # friction may have fallen since the model was made
@@ -335,6 +337,8 @@ def test_standard_errors_follow_from_the_covariance(name, context):
         ("torque_gain", {"gain": -1.0}, True),
         ("encoder_offset", {"offset": 1.0}, False),
         ("time_delay", {"seconds": 0.5}, False),
+        ("time_delay", {"seconds": -0.3}, False),
+        ("time_delay", {"seconds": -0.29}, True),
         ("transmission_coupling", COUPLING, True),
         ("transmission_coupling", {**COUPLING, "inertia": -0.1}, False),
     ],

@@ -340,3 +340,23 @@ def test_a_torque_that_is_not_linear_in_the_acceleration_has_no_inertia():
     model = model_of(three_axis(), effects=(("odd", 1, {"coefficient": 1.0}),))
     with pytest.raises(ModelError, match="not linear in the acceleration"):
         Dynamics(model)
+
+
+def test_one_sample_is_a_motion_of_its_own():
+    seen = []
+
+    class Seen(Cubic):
+        def column(self, motion, joint):
+            seen.append(motion)
+            return super().column(motion, joint)
+
+    law = Seen(2).pointwise(three_axis(), {"coefficient": 0.5}, None)
+    q, v, vdot = np.arange(9.0).reshape(3, 3)
+    assert law(q, v, vdot).tolist() == [0.0, 0.5 * v[1] ** 3, 0.0]
+    (motion,) = seen
+    assert motion.time.shape == (1,) and motion.starts.tolist() == [0]
+    assert [x.tolist() for x in (motion.q, motion.v, motion.vdot)] == [
+        [q.tolist()],
+        [v.tolist()],
+        [vdot.tolist()],
+    ]
