@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armloop.diagnosis.diagnose import Diagnosis, _null, diagnose
+from armloop.diagnosis.diagnose import Diagnosis, diagnose
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.util.errors import InputError
+from armloop.util.finite import finite
 
 module: Any = importlib.import_module("armloop.diagnosis.diagnose")
 ROWS = np.ones((4, 3), dtype=bool)
@@ -251,7 +252,7 @@ def test_errors_are_root_mean_squares_of_held_out_rows_in_the_torques_unit() -> 
         errors["noise_floor"] == [0.5, 1.0, 2.0] and errors["held_out"] is True and "reversals" not in errors
     )
     turned: Any = SimpleNamespace(before=np.array([1.0, np.nan, 3.0]), after=np.array([0.5, np.nan, 1.0]))
-    assert _null(of(reversals=turned).errors()["reversals"]) == {
+    assert finite(of(reversals=turned).errors()["reversals"]) == {
         "before": [1.0, None, 3.0],
         "after": [0.5, None, 1.0],
     }
