@@ -16,7 +16,7 @@ from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.features.lagrangian import candidates
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.scoring import score
-from armloop.laws.effects import Estimate, effect
+from armloop.laws.effects import EFFECTS, Effect, Estimate, Value, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import Component, Lagrangian, RigidBody, SparseTerms
@@ -31,8 +31,8 @@ STRIBECK = (
 )
 
 
-#: Every listed effect with parameters that matter.
-EFFECT_PARAMETERS = {
+#: Effects whose numbers are stated here, and what they are said to be in their tests; of others it follows from their law.
+STATED: dict[str, dict[str, Value]] = {
     "payload": {"mass": 0.4, "com": [0.1, 0.02, 0.03]},
     "viscous_friction": {"coefficient": 0.3},
     "coulomb_friction": {"level": 0.2},
@@ -55,6 +55,20 @@ EFFECT_PARAMETERS = {
     "encoder_offset": {"offset": 0.05},
     "time_delay": {"seconds": 0.7},
 }
+
+
+def _some(kind: type[Effect]) -> dict[str, Value]:
+    """Parameters of an effect that has none stated here, within the bounds that it states itself."""
+    size = {"chosen": 7.0, "continuous": 0.7}
+    return {
+        p.name: [0.1, 0.02, 0.03] if p.size == 3 else size.get(p.shape, 0.3)
+        for p in kind.parameters
+        if p.default is None
+    }
+
+
+#: Every listed effect with parameters that matter.
+EFFECT_PARAMETERS = {name: STATED.get(name) or _some(kind) for name, kind in EFFECTS.items()}
 
 
 def random_motion(n: int, samples: int, seed: int = 0) -> Motion:

@@ -61,8 +61,8 @@ ELEMENTS = [Stop(1, 0.5, 0.01), Stop(1, 0.2, 0.3), Stop(3, 0.4, 0.05)]
 
 
 def effect_torque(name):
-    joint = None if name in WHOLE else 2
-    other = 3 if name == "transmission_coupling" else None
+    joint = 2 if EFFECTS[name].joint_wise else None
+    other = 3 if EFFECTS[name].pair_wise else None
     inertial = model_of(ARM).inertial_parameters() if name == "gravity_tilt" else None
     return EffectTorque(
         ARM, name, joint, PARAMETERS[name], other_joint=other, inertial=inertial, smoothing=0.2

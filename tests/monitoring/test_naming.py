@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from operation import healthy_model
 
+from armloop.laws.effects.listed import EFFECTS
 from armloop.monitoring.catalogue import Column, stays_nonlinear, watched
 from armloop.monitoring.naming import Normal, name_change
-from armloop.monitoring.warmth import without_warmth
+from armloop.monitoring.warmth import warms, without_warmth
 
 
 def test_only_a_body_needs_all_of_its_columns() -> None:
@@ -55,3 +56,11 @@ def test_what_warmth_makes_of_friction_is_taken_out_of_the_sums() -> None:
         assert energy == pytest.approx(found @ gram @ found, rel=1e-3)
     same = without_warmth(columns, healthy, 0 * warmth[:12], later, warmth[12:])
     assert same is later
+
+
+def test_every_friction_follows_the_warmth_and_what_it_leaks_into() -> None:
+    """A joint's drag by direction gets less with the warmth as its viscous friction does; a load does not."""
+    leaks = {"rotor_inertia", "torque_gain", "residual_energy"}
+    followed = {name for name in [*EFFECTS, "residual_energy", "of_nobody"] if warms(name)}
+    assert followed == leaks | {name for name, kind in EFFECTS.items() if kind.rubs}
+    assert "viscous_asymmetry" in followed and "payload" not in followed

@@ -79,9 +79,9 @@ def formula(model: ReconstructedModel) -> Formula:
     late = graph.constant(_LATE)
     torque, _ = torques(plain, late)
     slid, elements = _without_memory(plain)
-    if not elements and not any(a.effect.name == "friction_drift" for a in plain.effects):
+    fades = any(a.effect.of_time for a in plain.effects)
+    if not elements and not fades:
         return Formula(torque, torque, [], False, left_out)
-    fades = any(a.effect.name == "friction_drift" for a in plain.effects)
     remembered, load = torques(slid, graph.input("t") if fades else late)
     for k, (joint, width, level, by_load) in enumerate(elements):
         stops.append(Stop(joint, width))

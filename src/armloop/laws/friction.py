@@ -28,6 +28,8 @@ from armloop.util.functions import NUMPY, Functions
 
 #: A joint that is no faster than this when a run begins, rad/s or m/s, begins at rest.
 _AT_REST = 0.005
+#: A state of which it is asked whether an element changes with the time: position, velocity, direction.
+_SOMEWHERE = (np.float64(0.3), np.float64(0.7), np.float64(1.0))
 
 
 class Direction(NamedTuple):
@@ -80,6 +82,13 @@ class Element:
     by_load: bool = False
     part: str = "friction"
     called: tuple[str, ...] = ()
+
+    @property
+    def of_time(self) -> bool:
+        """Whether it changes with the time since the start."""
+        with np.errstate(all="ignore"):
+            early, late = (self.value(Sliding(*_SOMEWHERE, t), 0.9, NUMPY) for t in (0.5, 1.5))
+        return not np.array_equal(early, late, equal_nan=True)
 
 
 class Acting(NamedTuple):

@@ -8,31 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.laws.effects import REGISTRY
 from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal, ridge
-from armloop.monitoring.units import Stream, Units
+from armloop.monitoring.units import ENERGY, Stream, Units
 from armloop.util.arrays import Array
 
-#: Effects whose size follows a joint's temperature.
-FRICTION = frozenset(
-    {
-        "viscous_friction",
-        "coulomb_friction",
-        "stribeck_friction",
-        "load_dependent_friction",
-        "quadratic_drag",
-        "friction_asymmetry",
-        "rotor_inertia",
-        "torque_gain",
-        "residual_energy",
-    }
-)
+#: What a change of friction leaks into.
+_LEAKS = frozenset({"rotor_inertia", "torque_gain", ENERGY})
 #: Time constants of warming up that are tried, s.
 _TIMES = np.array([300.0, 600.0, 1200.0, 2400.0, 4800.0])
 #: Fewest healthy units to learn from, and the part of their variance that must be explained on units left out.
 _FEWEST, _WORTH = 8, 0.3
 #: Of what warmth makes of the columns together only the strong directions are taken, see `armloop.monitoring.naming`.
 _RIDGE = 1e-3
+
+
+def warms(name: str) -> bool:
+    """Whether streams and columns of this name follow a joint's temperature: any friction, and what it leaks into."""
+    kind = REGISTRY.find(name)
+    return name in _LEAKS or (kind is not None and kind.rubs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +65,7 @@ def adjust(units: Units, values: Array, listed: list[Stream], healthy: int) -> A
         return Adjusted(out, None, learned, warmth)
     worths = np.zeros(units.rows.shape[1])
     for s, stream in enumerate(listed):
-        if stream.name not in FRICTION or stream.joint is None:
+        if not warms(stream.name) or stream.joint is None:
             continue
         if known == "temperature":
             candidates = [units.temperature[:, stream.joint - 1]]
@@ -111,7 +106,7 @@ def without_warmth(
         [
             k
             for k, column in enumerate(columns)
-            if column.name in FRICTION and column.joint is not None and warm[:, column.joint - 1].any()
+            if warms(column.name) and column.joint is not None and warm[:, column.joint - 1].any()
         ],
         dtype=np.intp,
     )

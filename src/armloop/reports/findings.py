@@ -123,6 +123,6 @@ def _why_not(added: AddedEffect) -> str:
         return "a sensor's fault is no torque that the arm needs"
     if added.effect.event:
         return "what pushed the arm was an event of this run"
-    if added.effect.name == "friction_drift":
+    if added.effect.of_time:
         return "friction that fades is gone once the joint is warm"
     return f"{effect_label(added.effect)} asks for none along this motion"

@@ -20,7 +20,7 @@ from armloop.monitoring.naming import Named, Normal, later_part, name_change
 from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.trend import course
 from armloop.monitoring.units import Stream, scores, streams
-from armloop.monitoring.warmth import FRICTION, Adjusted, adjust, without_warmth
+from armloop.monitoring.warmth import Adjusted, adjust, warms, without_warmth
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
@@ -381,7 +381,7 @@ def _warm_up(adjusted: Adjusted, named: Sequence[Named]) -> list[dict[str, Any]]
     """Warm-up, where nothing tells how warm the arm was and what was named is friction."""
     if adjusted.known is not None:
         return []
-    joints = sorted({one.place[1] for one in named if one.place[0] in FRICTION and one.place[1] is not None})
+    joints = sorted({one.place[1] for one in named if warms(one.place[0]) and one.place[1] is not None})
     return [{"effect": "warm_up", "joint": joint, "why": _WARM_UP} for joint in joints]
 
 

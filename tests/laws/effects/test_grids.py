@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from effect_arm import an_arm
+from exact_parts import STATED
 
 from armloop.data.motion import Motion
 from armloop.laws.effects import EFFECTS, Context, Estimate, effect, hypotheses
@@ -25,15 +26,13 @@ FREE = {
 
 
 def test_what_a_law_costs_and_what_it_is_made_of() -> None:
-    assert {name: kind.complexity for name, kind in EFFECTS.items()} == {
-        name: FREE.get(name, 1) for name in EFFECTS
-    }
+    assert {name: EFFECTS[name].complexity for name in STATED} == {name: FREE.get(name, 1) for name in STATED}
 
     def those(attribute: str) -> set[str]:
-        return {name for name, kind in EFFECTS.items() if getattr(kind, attribute)}
+        return {name for name in STATED if getattr(EFFECTS[name], attribute)}
 
     assert those("event") == {"external_contact", "external_torque"}
-    assert those("searched") == set(EFFECTS) - those("event")
+    assert those("searched") == set(STATED) - those("event")
     assert those("load") == {"payload", "joint_spring", "gravity_tilt"}
     assert those("memory") == {*those("event"), "presliding_hysteresis", "friction_drift"}
     assert those("needs_inertial") == {"gravity_tilt"}
@@ -167,7 +166,7 @@ def test_the_unit_of_a_law_found_is_that_of_its_torque_by_its_function(
 
 
 #: A drift is over for a controller, and what grows with the load is the model's to say.
-RUBBING = {n for n, kind in EFFECTS.items() if kind.rubs} - {"friction_drift", "load_dependent_friction"}
+RUBBING = {n for n, kind in EFFECTS.items() if kind.rubs and not (kind.of_time or kind.needs_model)}
 
 
 @pytest.mark.parametrize("name", sorted(RUBBING))

@@ -15,6 +15,7 @@ from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
 from armloop.dynamics import Dynamics, effect_law
 from armloop.experiment.excitation import FourierReference
+from armloop.export.formula import formula
 from armloop.laws.effects import (
     INERTIA,
     REGISTRY,
@@ -107,6 +108,25 @@ def test_an_installed_effect_is_loaded_when_it_is_asked_for(tmp_path, monkeypatc
     assert set(REGISTRY.own()) == {"own_drag"}
     with pytest.raises(InputError, match="'own_drag' is taken by effect 'own_drag' of package own_package_a"):
         register(type("Drag", (Cubic,), {"name": "own_drag"}))
+
+
+class Thinning(Law):
+    name = "thinning_oil"
+    parameters = (
+        Parameter("coefficient", "TAU*s/POS", positive=True),
+        Parameter("time_constant", "s", above=0.0, shape="continuous"),
+    )
+    law = "c exp(-t/T) v"
+    elements = (Element(lambda x, p, f: f.exp(-(x.t / p)) * x.v, "exp(-t/{p:g})*v{j}"),)
+
+
+def test_that_a_law_depends_on_the_time_follows_from_its_elements():
+    """So that no list of such laws by name stands elsewhere: the formulas that are exported take the time."""
+    register(Thinning)
+    assert Thinning.of_time and Thinning.memory and not Seal.of_time and not Seal.memory
+    model = model_of(three_axis(), effects=(("thinning_oil", 2, {"coefficient": 0.3, "time_constant": 5.0}),))
+    found = formula(model)
+    assert found.fades and found.has_memory and found.torque[1] is not found.remembered[1]
 
 
 def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypatch):

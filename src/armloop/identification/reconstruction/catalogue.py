@@ -38,7 +38,7 @@ _AS_GOOD = 0.9
 #: Part of a law's column beside all that the model can say, below which it says nothing new.
 _NEW = 2e-3
 #: What comes and goes: the arm as it was trained carries what it carries.
-_OF_A_RUN = ("payload", "friction_drift")
+_OF_A_RUN = ("payload",)
 _MOST = 6
 
 

@@ -23,7 +23,6 @@ class FrictionDrift(Law):
     )
     law = "f exp(-t/T) sign(v)"
     elements = ("fading_sign",)
-    memory = True
 
     def shapes(self, context: Context) -> Sequence[float]:
         length = float(np.max(context.motion.elapsed()))

@@ -62,6 +62,8 @@ class Law(Effect):
         cls.needs_model = cls.needs_model or any(element.by_load for element in parts)
         cls.rubs = cls.scope == "joint" and cls.role == "mechanical" and bool(parts)
         cls.rubs = cls.rubs and all(element.part == "friction" for element in parts)
+        cls.of_time = any(element.of_time for element in parts)
+        cls.memory = cls.memory or cls.of_time or any(element.way == "memory" for element in parts)
 
     @classmethod
     def _parts(cls) -> list[Element]:
