@@ -302,6 +302,46 @@ class TestLikeMotion:
         samples = SimpleNamespace(motion=given, period=float(given.time[1] - given.time[0]))
         return SimpleNamespace(samples=samples, context=SimpleNamespace(predicted=predicted))
 
+    @staticmethod
+    def one_by_one(motion: Motion, value: np.ndarray, load: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """The same of one joint, each instant by itself."""
+
+        def spread(x: np.ndarray) -> np.ndarray:
+            off = x - np.median(x)
+            return off / np.quantile(np.abs(off), 0.9)
+
+        N, time = motion.samples, motion.time
+        run = np.searchsorted(motion.starts, np.arange(N), side="right")
+        at = np.column_stack([spread(motion.q[:, 0]), 1.5 * spread(motion.v[:, 0]), spread(load), 3.0 * rest])
+        new = np.zeros(N)
+        for i in range(N):
+            far, visits, like = np.linalg.norm(at - at[i], axis=1), set(), []
+            for k in np.argsort(far)[:300]:
+                visit = run[k], np.floor((time[k] - time[0]) / 0.5)
+                later = run[k] != run[i] or abs(time[k] - time[i]) > 1.0
+                if later and far[k] <= 1.0 and visit not in visits and len(like) < 15:
+                    visits.add(visit)
+                    like.append(value[k])
+            among = np.array([0.0] * 5 + like)
+            middle = np.median(among)
+            new[i] = (value[i] - middle) / np.hypot(1.0, 1.4826 * np.median(np.abs(among - middle)))
+        return new
+
+    def test_like_motion_is_sought_a_second_away_and_counts_once_in_half_a_second(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(novelty, "averaged", lambda samples, values: values)
+        rng = np.random.default_rng(4)
+        N = 500
+        q, v, load, value = rng.normal(size=(4, N))
+        time = 0.21 + 0.0437 * np.arange(N) + np.where(np.arange(N) < 300, 0.0, 7.0)
+        given = Motion(time, q[:, None], v[:, None], np.zeros((N, 1)), np.array([0, 300]))
+        rest = rng.random(N) < 0.2
+        evidence = self.evidence(given, load[:, None])
+        rows, new = novelty.novelty(evidence, value[:, None], rest[:, None])
+        assert rows.tolist() == list(range(N))
+        np.testing.assert_allclose(new[:, 0], self.one_by_one(given, value, load, rest), atol=1e-9)
+
     def test_what_like_motion_shows_too_is_no_news_and_what_it_does_not_is_so_many_deviations(self) -> None:
         N = 2000
         given = circling(N, 100)

@@ -52,7 +52,7 @@ class TestIntervalOfAPush:
 
     def found(self, burst: tuple[int, int], reach: float = 0.05, **of: Any) -> tuple[int, int]:
         given = motion(of.get("lengths", (200,)))
-        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given, reach=reach))
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given, reach=reach, period=0.01))
         residual = np.zeros((given.samples, 1))
         residual[slice(*of.get("true", (50, 100)))] = 2.0
         kind: Any = self.KIND
@@ -61,9 +61,9 @@ class TestIntervalOfAPush:
 
     def test_it_is_where_the_push_explains_most_in_and_around_the_burst(self) -> None:
         assert self.found((40, 110)) == self.found((60, 80)) == self.found((55, 130)) == (50, 100)
-        # no further than 0.3 s away: 31 samples at 20 per 0.19 s, 33 at 10 per 0.09 s
-        assert self.found((90, 110), true=(40, 150)) == (58, 142)
-        assert self.found((90, 100), true=(40, 150)) == (57, 133)
+        # no further than 0.3 s away
+        assert self.found((90, 110), true=(40, 150)) == (60, 140)
+        assert self.found((90, 100), true=(40, 150)) == (60, 130)
         # nor beyond its run
         assert self.found((90, 98), true=(40, 150), lengths=(100, 100))[1] == 100
         assert self.found((102, 110), true=(40, 150), lengths=(100, 100))[0] == 100

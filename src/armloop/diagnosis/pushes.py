@@ -170,10 +170,10 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     """
     motion = evidence.samples.motion
     run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
-    length = float(motion.time[burst.stop - 1] - motion.time[burst.start])
-    rate = (burst.stop - burst.start) / max(length, 1e-9)
+    period = evidence.samples.period
     # The filter has smeared an event's edges.
-    inner, margin = round(min(evidence.samples.reach, 0.2 * length) * rate), round(PAUSE * rate)
+    inner = round(min(evidence.samples.reach / period, 0.2 * (burst.stop - burst.start)))
+    margin = round(PAUSE / period)
     middle = slice(burst.start + inner, burst.stop - inner)
     if middle.stop - middle.start < 4:
         return burst
