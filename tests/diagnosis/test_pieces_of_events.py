@@ -117,6 +117,11 @@ class TestBurstsOfTheResidual:
         level[38:43] = 16.0
         assert self.found(level) == ([(38, 42)], [])
         assert self.found(level, 17.0) == self.found(level, 16.0) == ([], [])
+        # wherever the peak is, and not beyond what exceeds the threshold
+        for peak in (30, 50):
+            level = steps(100, (30, 50, 6.0), (peak, peak, 20.0))
+            assert self.found(level) == ([], [(peak, peak)])
+        assert self.found(steps(100, (29, 51, 4.9), (30, 50, 6.0))) == ([(30, 50)], [])
 
     @pytest.mark.parametrize(
         ("first", "last", "event"),
@@ -145,6 +150,10 @@ class TestBurstsOfTheResidual:
         assert level[17] == level[23] == pytest.approx(0.0, abs=1e-7)
         assert level[59] < 1e-7 < level[60]
         assert outliers._level(motion([1, 1]), np.array([[2.0], [3.0]])).tolist() == [2.0, 3.0]
+        # samples farther apart than that are by themselves; of a short run's five, those beyond its ends mirror it
+        assert outliers._level(motion([3], 0.5), np.array([[0.0], [3.0], [1.0]])).tolist() == [0.0, 3.0, 1.0]
+        short = outliers._level(motion([2], 0.03), np.array([[0.0], [5.0]]))
+        np.testing.assert_allclose(short, [np.sqrt(15), np.sqrt(10)])
 
     def evidence(self, given: Motion) -> Any:
         samples = SimpleNamespace(motion=given, moving=np.zeros(given.q.shape, dtype=bool))
@@ -171,6 +180,36 @@ class TestBurstsOfTheResidual:
         monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.zeros((400, 1)))
         for height, seen in ((2.5, 0), (3.5, 1)):
             assert len(outliers.outlying(evidence, 6.0 + steps(400, (150, 200, height))[:, None])) == seen
+
+    @pytest.mark.parametrize(
+        ("moving", "speed", "held"),
+        [(True, 1.0, False), (True, -0.01, False), (True, -0.0099, True), (False, 1.0, True)],
+    )
+    def test_friction_holds_a_joint_that_does_not_move_or_creeps(
+        self, moving: bool, speed: float, held: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.full((400, 1), 1.0))
+        evidence = self.evidence(motion([400], 0.02))
+        evidence.samples.moving[:], evidence.samples.motion.v[:] = moving, speed
+        # 4.2 baselines, or 2.2 above what friction holds
+        found = outliers.outlying(evidence, steps(400, (150, 200, 2.1))[:, None])
+        assert len(found) == (not held)
+
+    @pytest.mark.parametrize(("height", "seen"), [(6.0, 0), (8.8, 1)])
+    def test_the_yardstick_is_the_most_that_is_left_elsewhere(
+        self, height: float, seen: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.zeros((400, 1)))
+        baselines = steps(400, (80, 130, 5.0), (200, 250, height), (320, 399, 3.5))
+        found = outliers.outlying(self.evidence(motion([400], 0.02)), 0.5 * baselines[:, None])
+        assert len(found) == seen
+        assert all(abs(burst.start - 200) <= 4 for burst in found)
+
+    def test_where_nothing_is_left_nothing_is_the_yardstick(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.zeros((400, 1)))
+        evidence = self.evidence(motion([400], 0.02))
+        evidence.scale = np.array([0.2])
+        assert len(outliers.outlying(evidence, steps(400, (150, 200, 1.4))[:, None])) == 1
 
     def test_what_stands_out_from_the_first_sample_on_is_no_yardstick_for_the_rest(
         self, monkeypatch: pytest.MonkeyPatch
