@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -64,8 +65,9 @@ def test_an_event_is_seen_to_begin_and_to_end_in_its_run(start: float, end: floa
     given = motion((100,))
     rows = np.zeros(100, dtype=bool)
     rows[50:60] = True
-    contact: Any = SimpleNamespace(added=event(start, end), rows=rows)
-    assert contacts._seen_whole(given, contact) == whole
+    for later in (0.0, 7.0):
+        contact: Any = SimpleNamespace(added=event(start + later, end + later), rows=rows)
+        assert contacts._seen_whole(replace(given, time=given.time + later), contact) == whole
 
 
 @pytest.mark.parametrize(
@@ -100,14 +102,19 @@ class TestFinding:
         by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
         following = iter(by_joint)
         monkeypatch.setattr(contacts, "innovations", lambda evidence, residual: (innovation, None))
-        monkeypatch.setattr(contacts, "novelty", lambda *_: (np.arange(100), np.zeros((100, 2))))
+        monkeypatch.setattr(contacts, "novelty", lambda *_: (np.arange(100), np.ones((100, 2))))
         monkeypatch.setattr(contacts, "known_contacts", lambda evidence: np.arange(100) < of.get("known", 0))
         monkeypatch.setattr(contacts, "_bursts", lambda *_: next(following))
         monkeypatch.setattr(
             contacts, "_comes_back", lambda evidence, rows, level, b: b.rows.start in of.get("back", ())
         )
         monkeypatch.setattr(contacts, "_sticks", lambda evidence, b: b.rows.start in of.get("sticks", ()))
-        monkeypatch.setattr(contacts, "_standing_out", lambda motion, rows, level, bursts: bursts)
+
+        def standing_out(motion: Any, rows: Any, level: Any, bursts: Any) -> Any:
+            self.level = level.sum(axis=0).tolist()
+            return bursts
+
+        monkeypatch.setattr(contacts, "_standing_out", standing_out)
         monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
         monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
         monkeypatch.setattr(contacts, "push", push)
@@ -164,11 +171,16 @@ class TestFinding:
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, back=[60])] == [20, 34, 80]
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned, sticks=[80])] == [20, 34, 60]
 
+    def test_one_of_several_that_stand_out_is_near_enough(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        bursts, scanned = [(20, 30, 0), (70, 75, 0)], [(32, 36, 1), (50, 54, 1)]
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, beside=scanned)] == [20, 70, 50]
+
     def test_what_is_known_or_lies_far_outside_of_the_trained_range_is_not_scanned(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         self.pushed(monkeypatch, known=30, far=[1])
         assert self.judged == [70, 0]
+        assert self.level == [70.0, 0.0]
 
     def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         # of 9.9 s: 3.9 s and 4.0 s
@@ -181,6 +193,8 @@ class TestFinding:
         found = self.pushed(monkeypatch, judged=False)
         assert found == [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
         assert self.pushed(monkeypatch, judged=False, known=11) == found[1:]
+        # one joint that can be judged is enough for the rest
+        assert self.pushed(monkeypatch, (40, 50, 0), judged=[True, False]) == [(40, 50, [0], [70, 100])]
 
 
 class TestSamePassage:

@@ -2,13 +2,17 @@
 
 import runpy
 
+import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from armloop.drake.control.controllers import LISTED
+from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenarios import load_plan, load_plant, load_tracking, plant_names
+from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.experiment.excitation import fourier_reference, write_reference
+from armloop.schemas.scenarios import PlanData, PlantData
 from armloop.util.errors import ScenarioError
 from armloop.util.resources import scenario_path
 
@@ -218,3 +222,12 @@ def test_the_diagram_to_copy_follows_its_reference_better_with_a_model(capsys):
         for line in capsys.readouterr().out.splitlines()
     )
     assert all(with_model < 0.1 * without for with_model, without in zip(fed, alone, strict=True))
+
+
+def test_what_a_file_leaves_out_is_as_in_python():
+    assert CollectionPlan(**msgspec.structs.asdict(PlanData())) == CollectionPlan()
+    given, instruments = PlantData(), Instruments()
+    for name in ("encoder_counts", "prismatic_lead", "torque_noise"):
+        assert getattr(given, name) == getattr(instruments, name)
+    arm = load_plant("three_axis")
+    assert given.time_step == PlantConfig(arm.config.friction, arm.config.ranges).time_step
