@@ -5,9 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armloop.data.filters import filter_reach
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
-from armloop.data.signals import Conditioning, derivative, preprocess, smooth, uniform_period
+from armloop.data.signals import (
+    Conditioning,
+    ShortRunError,
+    derivative,
+    preprocess,
+    smooth,
+    uniform_period,
+)
 from armloop.util.errors import LogError
 
 TEN_HZ = Conditioning(cutoff_hz=10.0)
@@ -52,6 +60,13 @@ def test_velocity_does_not_lag_the_derivative_of_the_position_under_noise():
     for j in range(2):
         lag = -np.polyfit(acceleration[:, j], motion.v[:, j] - rate[:, j], 1)[0]
         assert abs(lag) < 2e-4  # s
+
+
+def test_how_far_the_filter_reaches_is_asked_of_the_filter(monkeypatch):
+    assert Conditioning(10.0).smear / 10.0 == Conditioning(10.0).reach == filter_reach(10.0)
+    monkeypatch.setattr("armloop.data.filters.SMEAR", 0.8)
+    with pytest.raises(ShortRunError, match=r"at least 0\.48 s"):
+        preprocess([sines(np.arange(0, 0.2, 0.004), (1.0,))], TEN_HZ)
 
 
 def test_what_is_slow_passes_and_what_is_fast_does_not():

@@ -9,12 +9,16 @@ import pytest
 import yaml
 
 from armloop.cli import build_parser
+from armloop.drake.control.controllers import LISTED as CONTROLLERS
+from armloop.laws.effects import EFFECTS
 from armloop.util.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "reports" not in path.parts)
 TUTORIALS = sorted((DOCS / "tutorials").glob("*.py"))
+#: YAML in `scenarios/` that is no tracking scenario.
+BESIDE = ("plants", "collection")
 
 
 def site() -> dict:
@@ -66,3 +70,16 @@ def test_what_the_guide_names_is_there():
     assert len(named) > 12
     for path in named:
         assert (ROOT / path).exists(), path
+
+
+def test_the_page_of_effects_has_each_by_its_name_and_its_law():
+    text = (DOCS / "effects.md").read_text(encoding="utf-8")
+    assert not [name for name in EFFECTS if f"`{name}`" not in text]
+    laws = [f"::: {kind.__module__}.{kind.__name__}\n" for kind in EFFECTS.values()]
+    assert not [law for law in laws if law not in text]
+
+
+def test_the_page_of_scenarios_has_every_controller_and_every_file():
+    text = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    files = {path.stem for path in (ROOT / "scenarios").glob("*.yaml")} - {*BESIDE}
+    assert not [name for name in (*CONTROLLERS, *sorted(files)) if f"`{name}`" not in text]

@@ -15,14 +15,16 @@ from armloop.util.arrays import Array
 
 #: Independent values per period of the corner: more samples carry no more information.
 INDEPENDENT = 4
+#: Periods of the corner to either side over which a step is smeared.
+SMEAR = 0.5
 
 
 def filter_reach(cutoff_hz: float) -> float:
-    """Seconds to either side over which a low-pass of this corner smears a step: half a period of it; 0 without one.
+    """Seconds to either side over which a low-pass of this corner smears a step; 0 without one.
 
     It is the correlation time of what has passed the filter, too.
     """
-    return 0.5 / cutoff_hz if cutoff_hz > 0 else 0.0
+    return SMEAR / cutoff_hz if cutoff_hz > 0 else 0.0
 
 
 @dataclass(frozen=True)

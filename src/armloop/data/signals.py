@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.filters import INDEPENDENT, LowPass, at_least, filter_reach
+from armloop.data.filters import INDEPENDENT, SMEAR, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
+#: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
+_SHORTEST = 6
 #: Hz; a filter of a lower corner would need hours of a log.
 LOWEST_CORNER = 1e-3
 
@@ -29,8 +31,8 @@ class Conditioning:
     """How a log is prepared; kept in the model file, so that later logs are prepared alike.
 
     Attributes:
-        cutoff_hz: corner of the zero-phase Butterworth low-pass (order 4, run both ways); 0 leaves the
-            samples as they are (for inverse-dynamics samples that are no time series).
+        cutoff_hz: corner of the :class:`armloop.data.filters.LowPass`; 0 leaves the samples as they are (for
+            inverse-dynamics samples that are no time series).
         oversampling: samples kept per period of the corner frequency; where a direction reverses, friction
             steps, and on a coarse grid the step would lie up to half a sample off.
         dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
@@ -44,7 +46,7 @@ class Conditioning:
     cutoff_hz: float = 10.0
     oversampling: float = 25.0
     dead_zone: float = 4.0
-    smear: float = 0.5
+    smear: float = SMEAR
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -112,7 +114,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
         raise ShortRunError(
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
-            f"{how.cutoff_hz:g} Hz a run must last at least {3 / how.cutoff_hz:.3g} s"
+            f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
         )
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -211,7 +213,7 @@ def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:
         return None, slice(0)
     period = uniform_period(time)
     trim = at_least(how.reach / period)
-    if len(time) < 6 * trim:
+    if len(time) < _SHORTEST * trim:
         return None, slice(0)
     # A whole ratio must not fall to the next by rounding: 500 Hz at 25 samples per period of 10 Hz is every second.
     stride = max(1, int(1 / (how.oversampling * how.cutoff_hz * period) + 1e-6))
