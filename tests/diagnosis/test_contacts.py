@@ -71,6 +71,25 @@ def test_an_event_is_seen_to_begin_and_to_end_in_its_run(start: float, end: floa
 
 
 @pytest.mark.parametrize(
+    ("events", "kept"),
+    [
+        ([(10, 20, 0.5), (10, 20, 0.8)], [1]),  # the same twice: the larger share
+        ([(0, 20, 0.9), (15, 25, 0.5)], [0, 1]),  # half of the shorter is not most of it
+        ([(0, 20, 0.9), (14, 24, 0.5)], [0]),
+        ([(60, 80, 0.9), (10, 20, 0.8), (14, 24, 0.7), (30, 40, 0.1)], [1, 3, 0]),  # in order of time
+    ],
+)
+def test_of_events_that_are_one_for_most_of_the_shorter_the_larger_is_listed(
+    events: list[tuple[int, int, float]], kept: list[int]
+) -> None:
+    found: Any = [
+        SimpleNamespace(added=event(0.1 * first - 0.05, 0.1 * end - 0.05), share=share)
+        for first, end, share in events
+    ]
+    assert [found.index(one) for one in contacts._distinct(motion((100,)), found)] == kept
+
+
+@pytest.mark.parametrize(
     ("joints", "own", "other", "sticks"),
     [({0}, 5, 6, True), ({0}, 6, 6, False), ({0}, 5, 5, False), ({0, 1}, 5, 6, False), ({1}, 5, 6, False)],
 )

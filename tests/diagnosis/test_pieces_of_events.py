@@ -268,6 +268,18 @@ class TestJoints:
         level[33, 0] = 8.0
         assert contacts._standing_out(given, rows, level, [burst]) == []
 
+    def test_an_events_peak_is_within_it(self) -> None:
+        given, rows = motion([100], 0.11), np.arange(100)
+        burst, other = (Burst(slice(a, a + 11), frozenset({0})) for a in (20, 60))
+        for peak, stands in ((20, True), (30, True), (19, False), (31, False), (65, False)):
+            level = steps(100, (20, 30, 1.4), (peak, peak, 9.0))[:, None]
+            kept = contacts._standing_out(given, rows, level, [burst, other])
+            assert (burst in kept, other in kept) == (stands, peak == 65)
+        # one of its joints is enough
+        both = Burst(slice(20, 31), frozenset({0, 1}))
+        level = np.column_stack([steps(100, (20, 30, 1.6)), steps(100, (20, 30, 1.4))])
+        assert contacts._standing_out(motion([100], 0.11, 2), rows, level, [both]) == [both]
+
     def test_what_comes_back_with_the_posture_at_most_passages_is_no_event(self) -> None:
         N = 400
         given = circling(N, 100)
