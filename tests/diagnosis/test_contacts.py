@@ -217,21 +217,21 @@ class TestFinding:
 
 
 class TestSamePassage:
-    """Two joints of ranges 2 and 4 rad, and rad/s; a burst of joint 2 in samples 30 and 31, with its peak in the latter."""
+    """Two joints of ranges 2 and 4 rad, 6 and 12 rad/s; a burst of joint 2 in samples 30 to 32, its peak in the middle."""
 
     def comes_back(
         self, at: int, q: tuple[float, float] = (0, 0), v: tuple[float, float] = (0, 0), high: float = 9.0
     ) -> bool:
         given = motion((60,))
-        given.q[:], given.v[:] = (1.0, 2.0), (1.0, 2.0)
-        given.q[0], given.v[0] = (-1.0, -2.0), (-1.0, -2.0)
-        given.q[30:32], given.v[30:32] = 0.3, 0.4
-        given.q[at], given.v[at] = np.add(0.3, q), np.add(0.4, v)
+        given.q[:], given.v[:] = (1.0, 2.0), (3.0, 6.0)
+        given.q[0], given.v[0] = (-1.0, -2.0), (-3.0, -6.0)
+        given.q[30:33], given.v[30:33] = 0.3, 1.2
+        given.q[at], given.v[at] = np.add(0.3, q), 3 * np.add(0.4, v)
         level = np.zeros((60, 2))
-        level[30:32, 1] = 8.0, 10.0
+        level[30:33, 1] = 8.0, 10.0, 8.0
         level[:, 0], level[at, 0], level[at, 1] = 99.0, 0.0, high
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
-        return contacts._comes_back(evidence, np.arange(60), level, Burst(slice(30, 32), frozenset({1})))
+        return contacts._comes_back(evidence, np.arange(60), level, Burst(slice(30, 33), frozenset({1})))
 
     def test_it_is_within_a_twentieth_of_half_of_all_joints_ranges(self) -> None:
         assert self.comes_back(10)
@@ -245,4 +245,17 @@ class TestSamePassage:
         assert self.comes_back(10, high=5.01) and not self.comes_back(10, high=4.99)
 
     def test_what_is_as_near_as_the_burst_is_long_is_the_burst(self) -> None:
-        assert [self.comes_back(at) for at in (27, 28, 29, 32, 33)] == [True, False, False, False, True]
+        assert [self.comes_back(at) for at in (26, 27, 29, 34, 35)] == [True, False, False, False, True]
+
+    @pytest.mark.parametrize(("highest", "back"), [(5.1, True), (4.9, False)])
+    def test_a_peak_and_a_passage_are_as_high_as_their_highest(self, highest: float, back: bool) -> None:
+        given = motion((60,))
+        given.q[:], given.v[:] = 1.0, 1.0
+        given.q[0], given.v[0] = -1.0, -1.0
+        given.q[[10, 11, 30, 31]], given.v[[10, 11, 30, 31]] = 0.3, 0.4
+        level = np.zeros((60, 2))
+        level[30:32] = [[3.0, 3.0], [4.0, 10.0]]
+        level[10:12] = [[1.0, 0.0], [highest, 1.0]]
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
+        burst = Burst(slice(30, 32), frozenset({0, 1}))
+        assert contacts._comes_back(evidence, np.arange(60), level, burst) == back
