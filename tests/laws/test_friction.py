@@ -4,8 +4,20 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
-from armloop.laws.friction import FRICTION_LAWS, Direction, FrictionLaw, FrictionTerm, _entry
+from armloop.laws.friction import (
+    FRICTION_LAWS,
+    KINDS,
+    Acting,
+    Direction,
+    Element,
+    FrictionLaw,
+    FrictionTerm,
+    Sliding,
+    _entry,
+    torque_along,
+)
 from armloop.util.errors import ModelError
+from armloop.util.functions import MATH, NUMPY
 
 FS, FC, FV, VS = 1.4, 0.9, 2.2, 0.12
 
@@ -150,3 +162,55 @@ def test_a_law_survives_its_dictionary_and_keeps_joints_apart():
 def test_terms_that_are_none_are_refused(data):
     with pytest.raises(ModelError, match="friction"):
         FrictionLaw.from_dict(data)
+
+
+#: Every kind at v = -0.7 and 0.7 rad/s with the parameter 0.5, 2 s after the start; the step that finds it, how its
+#: direction turns, and whether it grows with the load.
+FALL = np.exp(-1.96)
+AT = {
+    "smooth_sign": (-1.0, 1.0, 1, "fading", False),
+    "viscous": (-0.7, 0.7, 2, "sharp", False),
+    "offset": (1.0, 1.0, 1, "sharp", False),
+    "stribeck_peak": (-FALL, FALL, 2, "sharp", False),
+    "root": (-np.sqrt(0.7), np.sqrt(0.7), 2, "sharp", False),
+    "quadratic": (-0.49, 0.49, 2, "sharp", False),
+    "cubic": (-0.343, 0.343, 2, "sharp", False),
+    "viscous_forward": (0.0, 0.7, 2, "sharp", False),
+    "viscous_backward": (-0.7, 0.0, 2, "sharp", False),
+    "load_smooth_sign": (-1.0, 1.0, 1, "fading", True),
+    "hysteresis": (-1.0, 1.0, 1, "memory", False),
+    "load_hysteresis": (-1.0, 1.0, 1, "memory", True),
+    "sign": (-1.0, 1.0, 1, "sharp", False),
+    "load_sign": (-1.0, 1.0, 1, "sharp", True),
+    "both_ways": (1.0, 1.0, 1, "sharp", False),
+    "fading_sign": (-np.exp(-4.0), np.exp(-4.0), 1, "sharp", False),
+    "stribeck": (FALL - 1.0, 1.0 - FALL, 2, "sharp", False),
+}
+
+
+@pytest.mark.parametrize("functions", [MATH, NUMPY])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_at_a_state(kind, functions):
+    element = KINDS[kind]
+    back, forth = (element.value(Sliding(0.3, w * 0.7, w, 2.0), 0.5, functions) for w in (-1.0, 1.0))
+    assert (back, forth) == (pytest.approx(AT[kind][0], rel=1e-9), pytest.approx(AT[kind][1], rel=1e-9))
+    assert (element.step, element.way, element.by_load) == AT[kind][2:]
+    assert element.part == "friction" and element.of_time == (kind == "fading_sign")
+
+
+def test_what_an_element_is_unless_it_is_said():
+    element = Element(lambda x, p, f: x.v, "v{j}")
+    assert (element.step, element.way, element.by_load, element.part) == (3, "sharp", False, "friction")
+    assert FrictionTerm("viscous").acting == Acting(1.0, KINDS["viscous"], 0.0)
+    assert FrictionTerm("smooth_sign", 2.0, 0.1).acting == Acting(2.0, KINDS["smooth_sign"], 0.1)
+    assert Acting(3.0, element).parameter == 0.0
+
+
+def test_elements_add_up_with_what_fades_in_sharp_or_not():
+    kinds = (("viscous", 2.0, 0.0), ("sign", 3.0, 0.0), ("load_sign", 4.0, 0.0), ("smooth_sign", 5.0, 0.5))
+    terms = [Acting(c, KINDS[kind], p) for kind, c, p in kinds]
+    x = Sliding(0.3, -0.7, -1.0)
+    rest = 2.0 * -0.7 - 3.0 - 4.0 * 2.5
+    assert torque_along(terms, x, -2.5, MATH) == pytest.approx(rest - 5.0)
+    assert torque_along(terms, x, -2.5, MATH, False) == pytest.approx(rest + 5.0 * np.tanh(-1.4))
+    assert torque_along([], x, 1.0, MATH) == 0.0
