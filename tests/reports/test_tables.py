@@ -5,9 +5,11 @@ import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from armloop.diagnosis import Diagnosis, close
+from armloop.drake.experiments.metrics import Metrics
 from armloop.laws.effects import effect
 from armloop.model import AddedEffect
 from armloop.reports.diagnosis_tables import diagnosis_table
@@ -20,6 +22,7 @@ from armloop.reports.tables import (
     steps_table,
     table,
 )
+from armloop.reports.tracking_tables import metrics_table
 
 
 def test_columns_are_aligned() -> None:
@@ -90,3 +93,26 @@ def test_printing_a_table_loads_nothing_large() -> None:
     program = "import armloop.reports.tables, sys; print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert not {"matplotlib", "jinja2", "sklearn", "pydrake"} & set(answer.stdout.split())
+
+
+def test_headers_stand_on_several_lines_where_a_terminal_would_break_the_rows() -> None:
+    heads = ["joint", "predictable, not explained", "RMS torque [N·m, N]", "a name too long"]
+    wide = str(make_table(heads, [["1", "0.1 %", "2.84", "x" * 30]]))
+    assert max(map(len, wide.splitlines())) <= 80
+    # on one line where there is room, and a unit is never broken
+    narrow = str(make_table(heads[:2], [["1", "0.1 %"]]))
+    assert narrow.splitlines()[1].split("  ") == heads[:2]
+    assert wide.split().count("predictable,") == 1 and "[N·m, N]" in wide
+    # what stands in the cells is never broken
+    assert "x" * 90 in str(make_table(["a", "b c"], [["x" * 90, "1"]]))
+
+
+def test_how_the_joints_followed_fits_a_terminal() -> None:
+    m = Metrics(*(np.array([value, value]) for value in (2.84, 0.123, 0.686, 2.44, 0.125)))
+    result = SimpleNamespace(
+        unit=("deg", "mm"), rms=np.array([1.35, 0.0464]), largest=np.array([2.52, 0.0552]), metrics=m
+    )
+    measured = SimpleNamespace(**{**vars(result), "metrics": None})  # no metrics of a simulation
+    text = str(metrics_table({"pid": result, "computed_torque": result, "pid_step3": measured}))
+    assert max(map(len, text.splitlines())) <= 80
+    assert "  joint 2 [mm]" in text and "12.5" in text  # a share in percent, as the header says

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,9 +30,16 @@ if TYPE_CHECKING:  # what makes the results need not be loaded to print them
     from armloop.robot.arm import Arm
 
 
+#: Columns of a terminal that has been given no more.
+TERMINAL = 80
+
+
 @dataclass(frozen=True)
 class Table:
-    """Cells that are already text. ``str(table)`` aligns them: the first column left, the others right."""
+    """Cells that are already text. ``str(table)`` aligns them: the first column left, the others right.
+
+    Headers of several words stand on several lines where a terminal would break the rows otherwise.
+    """
 
     headers: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -39,8 +47,11 @@ class Table:
     left: tuple[int, ...] = (0,)
 
     def __str__(self) -> str:
-        lines = [self.headers, *self.rows]
-        widths = [max(len(line[k]) for line in lines) for k in range(len(self.headers))]
+        cells = [max((len(row[k]) for row in self.rows), default=0) for k in range(len(self.headers))]
+        heads = self._heads(cells)
+        widths = [max(width, *map(len, head)) for width, head in zip(cells, heads, strict=True)]
+        tallest = max(map(len, heads))
+        above = zip(*([""] * (tallest - len(head)) + head for head in heads), strict=True)
 
         def aligned(line: Sequence[str]) -> str:
             cells = [
@@ -51,7 +62,34 @@ class Table:
 
         rule = "─" * (sum(widths) + 2 * (len(widths) - 1))
         top = [self.title] if self.title else []
-        return "\n".join([*top, rule, aligned(self.headers), rule, *map(aligned, self.rows), rule])
+        return "\n".join([*top, rule, *map(aligned, above), rule, *map(aligned, self.rows), rule])
+
+    def _heads(self, cells: Sequence[int]) -> list[list[str]]:
+        """Lines of every header: one each, or from the widest on as many as the terminal asks for."""
+        heads = [[header] for header in self.headers]
+
+        def width(k: int) -> int:
+            return max(cells[k], *map(len, heads[k]))
+
+        while sum(width(k) + 2 for k in range(len(heads))) - 2 > TERMINAL:
+            wide = [k for k in range(len(heads)) if width(k) > cells[k] and _narrower(heads[k])]
+            if not wide:
+                break
+            k = max(wide, key=width)
+            heads[k] = _narrower(heads[k])
+        return heads
+
+
+def _narrower(head: Sequence[str]) -> list[str]:
+    """A header on narrower lines; nothing where its longest word is as wide as it is."""
+    width = max(map(len, head))
+    text = re.sub(
+        r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), " ".join(head)
+    )  # a unit stays together
+    lines = textwrap.wrap(text, max(width - 1, 1), break_long_words=False, break_on_hyphens=False)
+    return (
+        [line.replace("\u00a0", " ") for line in lines] if max(map(len, lines), default=width) < width else []
+    )
 
 
 def table(headers: Sequence[object], rows: Sequence[Sequence[object]], title: str | None = None) -> str:

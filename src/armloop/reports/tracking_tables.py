@@ -44,17 +44,19 @@ def spread_table(result: WearResult, title: str | None = "Tracking error η over
 def metrics_table(
     results: Mapping[str, TrackingResult], title: str | None = "How the joints followed"
 ) -> Table:
-    """RMS and largest error, RMS torque, share clipped, time in stick, settling after reversals per controller and joint."""
+    """RMS and largest error, RMS torque, share clipped, time in stick, settling after reversals, of joints by controller."""
     rows: list[list[object]] = []
     for name, result in results.items():
         m = result.metrics
+        rows.append([controller(name), *[""] * 7])
         for j, unit in enumerate(result.unit):
-            row: list[object] = [controller(name), j + 1, unit, result.rms[j], result.largest[j]]
+            row: list[object] = [f"  joint {j + 1} [{unit}]", result.rms[j], result.largest[j]]
             row += (
                 [None] * 5
                 if m is None
-                else [x[j] for x in (m.effort, 100 * m.clipped, m.stick, m.settling, m.unsettled)]
+                else [x[j] for x in (m.effort, 100 * m.clipped, m.stick, m.settling, 100 * m.unsettled)]
             )
             rows.append(row)
-    headers = ["RMS", "max", "effort [N·m, N]", "clipped [%]", "stick [s]", "settling [s]", "unsettled"]
-    return make_table(["controller", "joint", "unit", *headers], rows, title)
+    errors = ["RMS error", "largest error", "RMS torque [N·m, N]", "clipped [%]"]
+    after = ["sticking [s]", "settling [s]", "not settled [%]"]
+    return make_table(["controller", *errors, *after], rows, title)
