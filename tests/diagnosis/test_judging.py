@@ -46,7 +46,7 @@ def test_a_law_that_bites_in_one_block_of_many_is_no_chance() -> None:
     before, after = rng.normal(size=(2, len(block)))
     before[block == 7] *= 9.0
     worse, better = left(before, block).score, left(after, block).score
-    spread = lead_of(worse.block_errors, better.block_errors, worse.block_rows)
+    spread = lead_of(worse.errors[0], better.errors[0], worse.counts[0])
     assert spread < SIGNIFICANCE < lead(worse, better)
 
 

@@ -15,18 +15,11 @@ from armloop.diagnosis.score import Score
 from armloop.laws.effects import effect
 
 
-def score(*energy: float, rows: tuple[int, ...] = (), **of: Any) -> Score:
-    n = len(energy)
-    counts = np.array(rows or [100] * n)
-    blocks = np.array(of.get("blocks", energy), dtype=float)
-    return Score(
-        of.get("complexity", 1),
-        np.array(energy),
-        counts,
-        np.array(of.get("seen", counts)),
-        blocks,
-        np.ones(len(blocks)),
-    )
+def score(*energy: float, rows: tuple[int, ...] = (), blocks: int = 1, complexity: int = 1) -> Score:
+    """Of joints with so much energy and so many rows, as much of both in every block."""
+    errors = np.outer(energy, np.ones(blocks)) / blocks
+    counts = np.outer(rows or [100] * len(energy), np.ones(blocks, dtype=int)) // blocks
+    return Score(complexity, errors, counts)
 
 
 class TestJudgement:
@@ -39,7 +32,7 @@ class TestJudgement:
         assert found == pytest.approx(2.0)
 
     def test_a_likelihood_ratio_as_standard_errors(self) -> None:
-        worse, better = (score(e, 8.0, rows=(10, 0), seen=[4, 3]) for e in (30.0, 10.0))
+        worse, better = (score(e, 8.0, rows=(12, 0), blocks=4) for e in (36.0, 12.0))
         assert judgement._likelier(worse, better) == pytest.approx(np.sqrt(4 * np.log(2)))
         assert judgement._likelier(better, worse) == pytest.approx(-np.sqrt(4 * np.log(2)))
 
@@ -48,6 +41,25 @@ class TestJudgement:
         current, trial = score(50.0, 6.0, rows=(10, 0)), score(20.0, 4.0, rows=(10, 0))
         np.testing.assert_allclose(judgement.enough(evidence, current), [20.0, 4.0])
         assert judgement.times_enough(evidence, current, trial) == pytest.approx(1.5 + 0.5)
+
+    def test_of_a_single_block_nothing_is_known_of_chance(self) -> None:
+        assert judgement._standard_errors(np.array([3.0])) == 0.0
+
+    def test_what_is_better_on_one_joint_is_no_excuse_for_another(self) -> None:
+        """Twenty blocks of five rows; the second joint's differ by chance, the first one's all by as much."""
+        chance = np.where(np.arange(20) % 2, 60.0, 5.0)
+
+        def fit(first: float, second: Any) -> Score:
+            return Score(1, np.array([np.full(20, first), second]), np.full((2, 20), 5))
+
+        current, best = fit(99.0, np.full(20, 99.0)), fit(5.0, chance)
+        # 42 on the first joint is more than two fifths of its hundred rows
+        assert judgement.lead(fit(7.1, chance[::-1]), best) <= judgement.CHANCE
+        assert judgement.is_behind(current, fit(7.1, chance[::-1]), best)
+        assert not judgement.is_behind(current, fit(6.9, chance[::-1]), best)
+        # on the second, as large a difference is one block's
+        once = chance + 45.0 * (np.arange(20) == 3)
+        assert not judgement.is_behind(current, fit(5.0, once), best)
 
     @pytest.mark.parametrize(
         ("lead", "trial", "behind"),
@@ -86,7 +98,11 @@ class TestJudgement:
         assert found.complexity == 5 and found.error == 30.0
         assert found.energy.tolist() == [5.0, 0.0, 25.0] and found.rows.tolist() == [2, 0, 2]
         assert found.seen.tolist() == [2, 0, 1]
-        assert found.block_errors.tolist() == [1.0, 29.0] and found.block_rows.tolist() == [1.0, 3.0]
+        assert found.errors.tolist() == [[1.0, 4.0], [0.0, 0.0], [0.0, 25.0]]
+        assert found.counts.tolist() == [[1, 1], [0, 0], [0, 2]]
+        # a joint alone, in the blocks in which it has rows
+        alone = found.of_joint(2)
+        assert (alone.complexity, alone.errors.tolist(), alone.counts.tolist()) == (5, [[25.0]], [[2]])
 
 
 class Named(str):

@@ -167,8 +167,8 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
 
 def test_only_what_was_held_out_judges() -> None:
     fit = left([1.0, 2.0, 3.0, 4.0], [0, 0, 1, 4], [0, 1, 1, 0], complexity=3)
-    assert fit.block_errors.tolist() == [5.0, 9.0, 16.0]
-    assert fit.block_rows.tolist() == [2.0, 1.0, 1.0]
+    assert fit.errors.tolist() == [[1.0, 0.0, 16.0], [4.0, 9.0, 0.0]]
+    assert fit.counts.tolist() == [[1, 0, 1], [1, 1, 0]]
     assert (fit.complexity, fit.error) == (3, 30.0)
     assert fit.rows.tolist() == [2, 2] and fit.energy.tolist() == [17.0, 13.0]
     # joint 1 shows in two of its blocks, joint 2 in two of its own

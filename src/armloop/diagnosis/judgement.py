@@ -58,7 +58,7 @@ def simplest_of_equals(current: Score, trials: Sequence[Score]) -> int:
     """Which of the trials that are as good as the best has the fewest parameters.
 
     As good is one that removes most of what the best removes and is behind it by no more than chance over
-    blocks, or, on every joint, by no more than the model's own shortcomings there.
+    blocks, and on no joint surely, or, on every joint, by no more than the model's own shortcomings there.
     """
     best = max(range(len(trials)), key=lambda k: gain(current, trials[k]))
     equals = [k for k, trial in enumerate(trials) if k == best or not is_behind(current, trial, trials[best])]
@@ -66,15 +66,22 @@ def simplest_of_equals(current: Score, trials: Sequence[Score]) -> int:
 
 
 def is_behind(current: Score, trial: Score, best: Score) -> bool:
-    """Whether a trial does worse than the best by more than chance and the model's own shortcomings."""
+    """Whether a trial does worse than the best by more than chance and the model's own shortcomings.
+
+    What it does better on one joint is no excuse for what it surely leaves on another.
+    """
     soaked = np.maximum(ALIKE * trial.rows, NEARLY * (current.energy - best.energy))
-    alike = lead(trial, best) <= CHANCE or bool((trial.energy - best.energy <= soaked).all())
-    return not alike or gain(current, trial) < MOST * gain(current, best)
+    worse = np.flatnonzero(trial.energy - best.energy > soaked).tolist()
+    chance = lead(trial, best) <= CHANCE and all(
+        lead(trial.of_joint(j), best.of_joint(j)) <= SIGNIFICANCE for j in worse
+    )
+    return not (chance or not worse) or gain(current, trial) < MOST * gain(current, best)
 
 
 def lead(worse: Score, better: Score) -> float:
     """By how many standard errors, over blocks, one fit leaves more held-out error than another."""
-    return max(lead_of(worse.block_errors, better.block_errors, worse.block_rows), _likelier(worse, better))
+    blocks = (x.sum(axis=0) for x in (worse.errors, better.errors, worse.counts))
+    return max(lead_of(*blocks), _likelier(worse, better))
 
 
 def lead_of(worse: Array, better: Array, rows: Array) -> float:
@@ -100,5 +107,8 @@ def _likelier(worse: Score, better: Score) -> float:
 
 
 def _standard_errors(differences: Array) -> float:
+    """Sum in its standard errors over blocks; of a single block nothing is known of chance."""
+    if len(differences) < 2:
+        return 0.0
     spread = float(np.sqrt(len(differences)) * differences.std(ddof=1))
     return float(differences.sum()) / max(spread, 1e-12)

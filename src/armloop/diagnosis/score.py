@@ -16,38 +16,45 @@ class Score:
 
     Attributes:
         complexity: free parameters of all effects.
-        energy: (n,) held-out squared error, weighted, of each joint.
-        rows: (n,) rows of each joint.
-        seen: (n,) blocks in which a joint has rows.
-        block_errors: (B,) held-out squared error of each block.
-        block_rows: (B,) rows of each block.
+        errors: (n, B) held-out squared error, weighted, of each joint in each block.
+        counts: (n, B) rows of each joint in each block.
     """
 
     complexity: int
-    energy: Array
-    rows: NDArray[np.intp]
-    seen: NDArray[np.intp]
-    block_errors: Array
-    block_rows: Array
+    errors: Array
+    counts: NDArray[np.intp]
 
     @staticmethod
     def of(
         complexity: int, held_out: Array, joint: NDArray[np.intp], block: NDArray[np.intp], n: int
     ) -> Score:
         """Sums of what is left (R,) of rows of ``n`` joints."""
-        squares = held_out**2
         blocks, index = np.unique(block, return_inverse=True)
-        cells = np.bincount(joint * len(blocks) + index, minlength=n * len(blocks)).reshape(n, -1)
-        return Score(
-            complexity,
-            np.asarray(np.bincount(joint, weights=squares, minlength=n)),
-            cells.sum(axis=1),
-            (cells > 0).sum(axis=1),
-            np.asarray(np.bincount(index, weights=squares, minlength=len(blocks)), dtype=float),
-            cells.sum(axis=0).astype(float),
-        )
+        cell, cells = joint * len(blocks) + index, n * len(blocks)
+        errors = np.bincount(cell, weights=held_out**2, minlength=cells).astype(float)
+        return Score(complexity, errors.reshape(n, -1), np.bincount(cell, minlength=cells).reshape(n, -1))
+
+    def of_joint(self, j: int) -> Score:
+        """The score of one joint (0-based) in the blocks in which it has rows."""
+        seen = self.counts[j] > 0
+        return Score(self.complexity, self.errors[j : j + 1, seen], self.counts[j : j + 1, seen])
+
+    @property
+    def energy(self) -> Array:
+        """(n,) held-out squared error, weighted, of each joint."""
+        return np.asarray(self.errors.sum(axis=1))
+
+    @property
+    def rows(self) -> NDArray[np.intp]:
+        """(n,) rows of each joint."""
+        return np.asarray(self.counts.sum(axis=1))
+
+    @property
+    def seen(self) -> NDArray[np.intp]:
+        """(n,) blocks in which a joint has rows."""
+        return np.asarray((self.counts > 0).sum(axis=1))
 
     @property
     def error(self) -> float:
         """Held-out squared error, weighted."""
-        return float(self.energy.sum())
+        return float(self.errors.sum())
