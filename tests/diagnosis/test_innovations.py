@@ -64,7 +64,10 @@ def at_speeds(v: list[float], starts: tuple[int, ...] = (0,), **of: Any) -> Any:
     motion = Motion(time, 0 * given, given, 0 * given, np.array(starts))
     samples = SimpleNamespace(motion=motion, cutoff_hz=0.0, period=0.04, reach=of.get("reach", 0.0))
     model = SimpleNamespace(
-        history=of.get("history", {}), friction=of.get("friction"), predict=of.get("predict")
+        history=of.get("history", {}),
+        friction=of.get("friction"),
+        predict=of.get("predict"),
+        baseline=of.get("baseline", {}),
     )
     context = SimpleNamespace(load=of.get("load"), predicted=of.get("predicted"))
     rows = np.ones(given.shape, dtype=bool)
@@ -87,7 +90,8 @@ class TestInnovations:
         monkeypatch: pytest.MonkeyPatch, v: list[float], residual: list[float], rest: list[bool], **of: Any
     ) -> list[float]:
         friction = SimpleNamespace(torque=lambda motion, load: np.array(of["held"])[:, None])
-        evidence = at_speeds(v, friction=friction, history=of.get("history", {}), unknown=of.get("unknown"))
+        given = {key: of[key] for key in ("history", "unknown", "baseline") if key in of}
+        evidence = at_speeds(v, friction=friction, **given)
         evidence.rows[:, 0] = of.get("rows", True)
         monkeypatch.setattr(innovations, "dry_level", lambda evidence: np.ones((len(v), 1)))
         monkeypatch.setattr(innovations, "at_rest", lambda samples: np.array(rest)[:, None])
@@ -123,6 +127,30 @@ class TestInnovations:
             rows=[False] * 2,
         )
         np.testing.assert_allclose(found, [1.5, 1.1])
+
+    def test_what_is_known_of_a_creeping_joint_is_what_the_training_logs_left(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def near(left: float | None, extra: float = 0.0) -> float:
+            # all of the run's sliding samples show so much more friction
+            (value,) = self.found(
+                monkeypatch,
+                [0.1],
+                [3.0],
+                [False],
+                held=[0.0],
+                history={"range": [[9.0], [2.0], [9.0], [9.0]]},
+                rows=[extra > 0],
+                baseline={"creeping": [left]},
+            )
+            return 3 - 2 * value
+
+        # three times that, and no more than four fifths of the dry friction
+        assert near(0.1) == pytest.approx(0.3 * np.exp(-1)) and near(0.0) == 0.0
+        assert near(0.3) == near(None) == pytest.approx(0.8 * np.exp(-1))
+        # friction that has risen by 3 N·m may stand for it: of 4 there are four fifths
+        assert near(0.0, 3.0) == pytest.approx(3.0 * np.exp(-1))
+        assert near(0.1, 3.0) == near(None, 3.0) == pytest.approx(3.2 * np.exp(-1))
 
     def test_at_rest_friction_holds_a_fifth_more_with_the_models_own_or_without(
         self, monkeypatch: pytest.MonkeyPatch

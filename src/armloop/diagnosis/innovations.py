@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, uniform_filter1d
 
+from armloop.data.creep import CREEPING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
@@ -25,8 +26,9 @@ from armloop.util.errors import ModelError
 WINDOW = 0.2
 #: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
 CREEP = 0.01
-#: Dry friction of a joint that creeps is known but for this part; it creeps below this part of its trained speed …
-_UNSURE, _SLOW = 0.8, 0.05
+#: Dry friction of a joint that creeps is known but for so many times what the model leaves there on its training logs, at
+#: most, and where nobody knows that, but for this part …
+_MARGIN, _UNSURE = 3.0, 0.8
 #: … and at rest it can hold this many times its sliding level.
 _STICTION = 1.2
 #: Torque and motion of one sample may be apart by this part of a sample period.
@@ -49,12 +51,15 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
         else 0.0
         for j in range(motion.joints)
     ]
-    dry = dry_level(evidence) + np.abs(sliding_more)
+    more = np.abs(sliding_more)
+    dry = dry_level(evidence) + more
     ranges = model.history.get("range")
-    slow = _SLOW * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
-    creeping = _UNSURE * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
+    slow = CREEPING * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
+    left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
+    creeping = np.minimum(_MARGIN * np.array(left) + more, _UNSURE * dry)
+    creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
-    unsure = np.maximum(smooth(samples, dry * np.where(rest, 1.0, creeping)), 0.0)
+    unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)
     # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
     bare = residual + smooth(samples, model.friction.torque(motion, load=evidence.context.load))
     size = np.abs(residual) - unsure

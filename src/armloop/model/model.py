@@ -105,9 +105,9 @@ class ReconstructedModel:
         recorded: how the training logs recorded the torque: ``{"unit": "N*m" | "A", "drive_gains": …}``.
         baseline: what the model leaves on data of its own training runs that were not fitted; where those are
             too short for that, at least what it leaves on all of them:
-            ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, ``reversals``,
-            the RMSE where a joint turns round, and ``joints``, the parts of the torque that are explained,
-            predictable but not explained, and noise.
+            ``rmse``, ``rms``, ``nrmse`` per joint, ``worst``, the RMSE that one block in ten exceeds, ``reversals``
+            and ``creeping``, the RMSE where a joint turns round and where it creeps, and ``joints``, the parts of the torque
+            that are explained, predictable but not explained, and noise.
         effects: laws of the catalogue that a reconstruction found beside the components, and what a diagnosis added.
         history: method, library, steps: how the model came about.
         uncertainty: standard errors of the coefficients (see :func:`armloop.identification.uncertainty.standard_errors`);

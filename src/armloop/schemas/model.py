@@ -143,6 +143,7 @@ class BaselineData(Struct):
     nrmse: PerJointOrNull | None = None
     worst: PerJointOrNull | None = None
     reversals: PerJointOrNull | None = None
+    creeping: PerJointOrNull | None = None
     samples: Count | None = None
 
 
@@ -268,7 +269,7 @@ def _agree(model: ModelData) -> None:
         ("recorded.drive_gains", model.recorded.drive_gains),
         *(
             (f"baseline.{key}", getattr(model.baseline, key))
-            for key in ("rmse", "rms", "nrmse", "worst", "reversals")
+            for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping")
         ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
         *zeros,

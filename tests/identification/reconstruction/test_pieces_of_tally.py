@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ LEFT, TAU = RNG.normal(size=(2, N, 2))
 MOVING = RNG.random((N, 2)) < 0.6
 BLOCKS = 3 + np.arange(N) // 4
 CONDITION = np.arange(N) // 10
+#: A model that does not tell its range.
+NOBODY: Any = SimpleNamespace(history={})
 
 
 def chunk(cutoff_hz: float, held_out: Any = None) -> Chunk:
@@ -32,7 +35,7 @@ def chunk(cutoff_hz: float, held_out: Any = None) -> Chunk:
 @pytest.mark.parametrize("sorted_", [True, False])
 def test_squares_by_condition_and_by_block(part: Any, sorted_: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
-    model: Any = None
+    model = NOBODY
     sorter: Any = (lambda motion: CONDITION) if sorted_ else None
     found = Tally.of(chunk(1.0), model, sorter, part)
     # blocks 5 and 10; every other block that is held out chooses the library
@@ -55,34 +58,40 @@ def test_squares_by_condition_and_by_block(part: Any, sorted_: bool, monkeypatch
     assert Tally.of(chunk(0.0), model, sorter, part).blocks.shape == (0, 2, 2)
 
 
-def test_squares_where_a_joint_turns_round(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_squares_where_a_joint_turns_round_and_where_it_creeps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
-    model: Any = None
     turns = np.zeros((N, 2), dtype=bool)
-    turns[[8, 9, 29], [0, 0, 1]] = turns[20, 0] = True
-    monkeypatch.setattr(tally, "turning", lambda motion, moving: turns)
-    near = turns.copy()
-    near[[7, 10], 0] = True
+    turns[[8, 9, 29, 20], [0, 0, 1, 0]] = True
+    near, slow = turns.copy(), np.zeros((N, 2), dtype=bool)
+    near[[7, 10], 0] = slow[9:11, 1] = slow[30, 0] = slow[20, 1] = True
     asked: list[Any] = []
 
     def around(samples: Any, turned: Any, counted: Any) -> Any:
-        asked.append((turned is turns, counted))
+        assert turned is turns and (counted == (MOVING | turns)).all()
         return near & counted
 
+    def creeping(samples: Any, speeds: Any) -> Any:
+        asked.append(speeds.tolist())
+        return slow
+
+    monkeypatch.setattr(tally, "turning", lambda motion, moving: turns)
     monkeypatch.setattr(tally, "at_reversals", around)
+    monkeypatch.setattr(tally, "creeping", creeping)
+    model: Any = SimpleNamespace(history={"range": [[9.0, 9.0], [2.0, 3.0], [8.0, 8.0]]})
     found = Tally.of(chunk(1.0), model, None)
     held = (BLOCKS % 5 == 0)[:, None]
-    assert asked[0][0] and (asked[0][1] == ((MOVING | turns) & held)).all()
-    there = near & (MOVING | turns) & held
-    assert there.sum() > 2
-    np.testing.assert_allclose(found.reversals, [(LEFT**2 * there).sum(axis=0), there.sum(axis=0)])
-    # samples that are no time series turn nowhere
-    assert not Tally.of(chunk(0.0), model, None).reversals.any()
+    for key, mask in (("reversals", near & (MOVING | turns) & held), ("creeping", slow & held)):
+        assert mask.sum() >= 2
+        np.testing.assert_allclose(found.places[key], [(LEFT**2 * mask).sum(axis=0), mask.sum(axis=0)])
+    # samples that are no time series turn and creep nowhere, and no joint creeps of whose speed nothing is known
+    assert not any(sums.any() for sums in Tally.of(chunk(0.0), model, None).places.values())
+    Tally.of(chunk(1.0), NOBODY, None)
+    assert asked == [[2.0, 3.0], [0.0, 0.0]]
 
 
 def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
-    model: Any = None
+    model = NOBODY
     whole = Tally.of(chunk(1.0), model, None)
     pieces = Tally.of(chunk(1.0), model, None, seconds=2.0)
     assert len(whole.blocks) == 2 and len(pieces.blocks) > 2
@@ -97,7 +106,7 @@ def test_blocks_told_apart_in_pieces_of_their_own(monkeypatch: pytest.MonkeyPatc
 
 def test_samples_within_a_margin_of_what_was_fitted_do_not_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tally, "residual", lambda model, samples: LEFT)
-    model: Any = None
+    model = NOBODY
     # of a block's four samples the two in its middle are two seconds from the others
     assert Tally.of(chunk(1.0), model, None, margin=1.0).samples == 4
 
@@ -107,4 +116,4 @@ def test_relative_to_the_torque_where_a_joint_has_any() -> None:
     sums = np.zeros((2, 3, 2))
     sums[1] = [[40.0, 60.0], [80.0, 0.0], [20.0, 20.0]]
     # a joint without torque has no relative error: the other one's alone
-    assert Tally({0: sums}, blocks, 20, np.zeros((2, 2))).relative_blocks().tolist() == [0.5]
+    assert Tally({0: sums}, blocks, 20, {}).relative_blocks().tolist() == [0.5]

@@ -14,8 +14,11 @@ def tally(counts: list[list[int]], errors: list[list[float]]) -> Tally:
     blocks = np.stack([c * e, c], axis=1)
     moving = np.array([(c * e).sum(axis=0), 4.0 * c.sum(axis=0), c.sum(axis=0)])
     rest = np.array([[9.0] * c.shape[1], [36.0] * c.shape[1], [1.0] * c.shape[1]])
-    turned = np.array([25.0 * c.sum(axis=0), c.sum(axis=0)])
-    return Tally({0: np.array([rest, moving])}, blocks, int(c.sum()) + 1, turned)
+    places = {
+        "reversals": np.array([25.0 * c.sum(axis=0), c.sum(axis=0)]),
+        "creeping": np.array([9.0 * c[0], c[0]]),
+    }
+    return Tally({0: np.array([rest, moving])}, blocks, int(c.sum()) + 1, places)
 
 
 def test_rest_and_motion_are_scored_apart_and_together() -> None:
@@ -29,24 +32,25 @@ def test_rest_and_motion_are_scored_apart_and_together() -> None:
 
 def test_tallies_add_over_chunks_and_conditions() -> None:
     one, two = tally([[30]], [[1.0]]), tally([[10]], [[5.0]])
-    both = one + Tally({0: two.sums[0], 3: 2 * two.sums[0]}, two.blocks, two.samples, two.reversals)
+    both = one + Tally({0: two.sums[0], 3: 2 * two.sums[0]}, two.blocks, two.samples, two.places)
     np.testing.assert_array_equal(both.sums[0], one.sums[0] + two.sums[0])
     np.testing.assert_array_equal(both.sums[3], 2 * two.sums[0])
     assert both.samples == 31 + 11 and both.blocks.shape == (2, 2, 1)
-    assert both.reversals.tolist() == [[1000.0], [40.0]] and both.at_reversals() == [5.0]
+    assert both.places["reversals"].tolist() == [[1000.0], [40.0]]
+    assert both.yardsticks() == {"worst": [None], "reversals": [5.0], "creeping": [3.0]}
     # neither of what was added has changed
     assert one.sums[0][1, 2, 0] == 30.0 and list(one.sums) == [0]
 
 
 def test_the_baseline_is_that_of_the_worst_condition() -> None:
     one, two = tally([[30, 0]], [[1.0, 0.0]]), tally([[10, 0]], [[5.0, 0.0]])
-    found = (one + Tally({1: two.sums[0]}, two.blocks, two.samples, two.reversals)).baseline()
+    found = (one + Tally({1: two.sums[0]}, two.blocks, two.samples, two.places)).baseline()
     assert found["rmse"] == [pytest.approx(np.sqrt(5.0)), None]
     assert found["rms"] == [pytest.approx(2.0), None]
     assert found["nrmse"] == [pytest.approx(np.sqrt(5.0) / 2), None]
     assert found["samples"] == 42 and found["worst"] == [None, None]
     # a joint that never turns round is known by nothing there
-    assert found["reversals"] == [5.0, None]
+    assert found["reversals"] == [5.0, None] and found["creeping"] == [3.0, None]
 
 
 def test_one_block_in_ten_exceeds_the_worst_of_those_with_samples_enough() -> None:
@@ -70,6 +74,8 @@ def test_a_baseline_is_no_better_than_what_is_left_of_all_data() -> None:
     assert found["rmse"] == pytest.approx([2.0, 2.0, 3.0])  # joint 3 moves in no held-out block
     assert found["nrmse"] == pytest.approx([1.0, 1.0, 1.5]) and found["rms"] == pytest.approx([2.0, 2.0, 2.0])
     assert found["worst"] == pytest.approx([2.0, 1.0, 3.0]) and found["samples"] == held["samples"]
+    # of joint 3 nothing is known there but from all data
+    assert found["reversals"] == [5.0, 5.0, 5.0] and found["creeping"] == [3.0, 3.0, 3.0]
     assert at_least(whole.baseline(), tally([[30, 20, 0]], [[1.0, 0.25, 0.0]]))["worst"] == pytest.approx(
         [2.0, 1.0, 3.0]
     )

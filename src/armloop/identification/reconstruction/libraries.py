@@ -96,14 +96,13 @@ class Attempt:
         return self.data.sum(partial(Tally.of, model=model, sorter=sorter, part=part, margin=self.margin))
 
     def yardsticks(self, sorter: Sorter | None, seconds: float) -> dict[str, list[float | None]]:
-        """RMSE per joint that one piece of ``seconds`` in ten exceeds, and where it turns round, on all held-out blocks.
+        """RMSE per joint on held-out blocks: that one piece of ``seconds`` in ten exceeds, at turns, and where it creeps.
 
         Yardsticks of a later run, not errors of this model: also blocks that chose a library show what it leaves, and
         half of them would miss the rarer motion.
         """
         tally = partial(Tally.of, model=self.model(), sorter=sorter, part="all", seconds=seconds)
-        whole = self.data.sum(tally)
-        return {"worst": whole.worst(), "reversals": whole.at_reversals()}
+        return self.data.sum(tally).yardsticks()
 
     def model(self) -> ReconstructedModel:
         """What was fitted without the held-out blocks: a model that has seen those that judge must choose nothing."""

@@ -8,17 +8,21 @@ from typing import Any, Literal
 import numpy as np
 
 from armloop.data.blocks import block_numbers
+from armloop.data.creep import creeping
+from armloop.data.motion import Samples
 from armloop.data.reversals import at_reversals, turning
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.scoring import Score, residual
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
 Part = Literal["all", "selection", "test"]
 SELECTION: Part = "selection"
 
+#: Where errors are summed apart.
+PLACES = ("reversals", "creeping")
 #: Moving samples that make a block's error one.
 _FEWEST = 20
 
@@ -33,21 +37,23 @@ class Tally:
         blocks: (B, 2, n) of every block: the squared errors of moving samples, and their number; empty where
             samples are no time series.
         samples: number of held-out samples.
-        reversals: (2, n) of samples where a joint turns round (:mod:`armloop.data.reversals`): the squared errors, and
-            their number; zeros where samples are no time series.
+        places: (2, n) of samples where a joint turns round (``reversals``, :mod:`armloop.data.reversals`), and where it
+            creeps (``creeping``, :mod:`armloop.data.creep`): the squared errors, and their number; zeros where samples are
+            no time series.
     """
 
     sums: dict[int, Array]
     blocks: Array
     samples: int
-    reversals: Array
+    places: dict[str, Array]
 
     def __add__(self, other: Tally) -> Tally:
         sums = dict(self.sums)
         for label, values in other.sums.items():
             sums[label] = sums[label] + values if label in sums else values
         blocks = np.concatenate([self.blocks, other.blocks])
-        return Tally(sums, blocks, self.samples + other.samples, self.reversals + other.reversals)
+        places = {key: own + other.places[key] for key, own in self.places.items()}
+        return Tally(sums, blocks, self.samples + other.samples, places)
 
     @staticmethod
     def of(
@@ -80,7 +86,7 @@ class Tally:
             ]
             sums[int(label)] = np.array(parts)
         n = squares.shape[1]
-        blocks, reversals = np.zeros((0, 2, n)), np.zeros((2, n))
+        blocks, places = np.zeros((0, 2, n)), dict.fromkeys(PLACES, np.zeros((2, n)))
         if samples.cutoff_hz > 0 and held.any():
             pieces = (
                 chunk.blocks if seconds is None else block_numbers(samples.motion, seconds, samples.spans)
@@ -89,10 +95,10 @@ class Tally:
             index = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
             blocks = np.zeros((int(index.max()) + 1, 2, n))
             np.add.at(blocks, index, np.stack([squares * moving, moving.astype(float)], axis=1))
-            turns = turning(samples.motion, samples.moving)
-            there = at_reversals(samples, turns, (samples.moving | turns) & held[:, None])
-            reversals = np.array([(every * there).sum(axis=0), there.sum(axis=0)])
-        return Tally(sums, blocks, int(held.sum()), reversals)
+            for key, there in _places(samples, model).items():
+                counted = there & held[:, None]
+                places[key] = np.array([(every * counted).sum(axis=0), counted.sum(axis=0)])
+        return Tally(sums, blocks, int(held.sum()), places)
 
     @staticmethod
     def fitted(chunk: Chunk, model: ReconstructedModel, sorter: Sorter | None, seconds: float) -> Tally:
@@ -117,18 +123,20 @@ class Tally:
             max((x for x in joint if x is not None), default=None)
             for joint in zip(*per_condition, strict=True)
         ]
-        worst = self.worst()
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        turned = self.at_reversals()
         return {
-            **{"rmse": rmse, "nrmse": nrmse, "rms": rms, "worst": worst, "reversals": turned},
+            **{"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks()},
             "samples": self.samples,
         }
 
-    def at_reversals(self) -> list[float | None]:
-        """RMSE per joint where it turns round."""
-        return [_root(e, c) for e, c in zip(*self.reversals, strict=True)]
+    def yardsticks(self) -> dict[str, list[float | None]]:
+        """RMSE per joint that one block in ten exceeds (``worst``), and at the places that are apart."""
+        sums = self.places.items()
+        return {
+            "worst": self.worst(),
+            **{key: [_root(e, c) for e, c in zip(*x, strict=True)] for key, x in sums},
+        }
 
     def relative_blocks(self) -> Array:
         """(B,) mean square of each block's error relative to the torque, mean over the joints that move in it.
@@ -153,6 +161,14 @@ class Tally:
         return found
 
 
+def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:
+    """(N, n) samples where a joint turns round, and where it creeps."""
+    turns, ranges = turning(samples.motion, samples.moving), model.history.get("range")
+    speeds = np.zeros(samples.motion.joints) if ranges is None else np.asarray(ranges[1])
+    places = at_reversals(samples, turns, samples.moving | turns), creeping(samples, speeds)
+    return dict(zip(PLACES, places, strict=True))
+
+
 def _errors(sums: Array) -> dict[str, Any]:
     rmse = [_root(e, c) for e, c in zip(sums[0], sums[2], strict=True)]
     rms = [_root(t, c) for t, c in zip(sums[1], sums[2], strict=True)]
@@ -172,15 +188,15 @@ def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
     Of a log that is too short for held-out blocks that tell, few may miss the rarer motion.
 
     Args:
-        baseline: of held-out samples, with ``worst`` and ``reversals``.
+        baseline: of held-out samples, with ``worst`` and what stands beside it.
         fitted: of the model, over all samples.
     """
     pair = [baseline, fitted.baseline()]
-    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst", "reversals")}
+    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst", *PLACES)}
     for j in range(len(more["rmse"])):
         own = max(pair, key=lambda one: one["rmse"][j] or 0.0)
         for key in ("rmse", "rms", "nrmse"):
             more[key][j] = own[key][j]
-        for key in ("worst", "reversals"):
+        for key in ("worst", *PLACES):
             more[key][j] = max((one[key][j] for one in pair if one[key][j] is not None), default=None)
     return {**baseline, **more}
