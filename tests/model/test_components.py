@@ -27,5 +27,7 @@ def test_what_a_bound_holds_at_zero_is_not_printed() -> None:
     arm = load_arm("three_axis")
     body = RigidBody(np.zeros(33), ("mx2 + 0.4 m3", "J2"), np.array([0.0, 0.5]))
     assert body.terms(arm, 1) == [(3, 0.5, "Y2[J2]")]
-    assert body.legend() == ["J2: 0.5 = J2"]
+    units, *found = body.legend()
+    assert found == ["J2: 0.5 = J2"] and units.startswith("Yj[p] is the torque of joint j per unit")
+    assert not RigidBody(np.zeros(33), ("J2",), np.zeros(1)).legend()
     assert body.to_dict()["base_parameters"] == {"mx2 + 0.4 m3": 0.0, "J2": 0.5}

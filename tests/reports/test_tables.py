@@ -11,6 +11,7 @@ import pytest
 from armloop.diagnosis import Diagnosis, close
 from armloop.drake.experiments.metrics import Metrics
 from armloop.laws.effects import effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.reports.diagnosis_tables import diagnosis_table
 from armloop.reports.findings import nothing_to_supply
@@ -116,3 +117,19 @@ def test_how_the_joints_followed_fits_a_terminal() -> None:
     text = str(metrics_table({"pid": result, "computed_torque": result, "pid_step3": measured}))
     assert max(map(len, text.splitlines())) <= 80
     assert "  joint 2 [mm]" in text and "12.5" in text  # a share in percent, as the header says
+
+
+def test_of_the_joints_samples_a_step_has_the_least_and_the_most() -> None:
+    report = SimpleNamespace(step=1, orders=None, candidates=83, independent=33, terms=[34, 12], trials=())
+    text = str(
+        steps_table([SimpleNamespace(**vars(report), samples=counts) for counts in ([7, 3, 5], [4, 4])])
+    )
+    assert "3 to 7" in text and "4 to 4" not in text
+
+
+def test_what_memory_is_called_in_formulas_is_said_below_them(loop: SimpleNamespace) -> None:
+    model = loop.reconstruction.model
+    own = replace(model, friction=FrictionLaw(((FrictionTerm("hysteresis", 0.2, 0.01),),) * model.arm.n))
+    assert any(line.startswith("stop(q,w) is") for line in own.legend())
+    assert "stop(" in formulas(own) and max(map(len, formulas(own).splitlines())) <= 80
+    assert not any("stop" in line for line in model.legend())

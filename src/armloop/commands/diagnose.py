@@ -44,6 +44,7 @@ def run(options: Diagnose) -> None:
     planned = None if wanted is None else plan(str(options.next_run), result, wanted, progress(options))
     if planned is not None:
         answer["next_run"] = planned.to_dict()
+    progress(options)("drawing the report")
     page = diagnosis_report(result, model, [log.name for log in logs], compensation)
     write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")

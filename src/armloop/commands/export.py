@@ -58,6 +58,7 @@ def _tell(found: object, model: object, by_log: bool) -> None:
     from armloop.export import Exported
     from armloop.model import ReconstructedModel
     from armloop.reports.tables import table
+    from armloop.reports.words import unit
 
     assert isinstance(found, Exported) and isinstance(model, ReconstructedModel)
     states = "states of the log" if by_log else "random states within the training range"
@@ -66,10 +67,10 @@ def _tell(found: object, model: object, by_log: bool) -> None:
         in_amperes = model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None
         rows = []
         for j, joint in enumerate(model.arm.joints):
-            unit = "A" if in_amperes else joint.torque_unit
+            of = "A" if in_amperes else unit(joint.torque_unit)
             values = (found.rms[j], found.difference[j], found.unsaid[j])
-            rows.append([j + 1, joint.name, unit, *(f"{x:.3g}" for x in values)])
-        heads = ["joint", "name", "unit", "RMS of the model", "of what it can say", "of the whole model"]
+            rows.append([f"{j + 1}  {joint.name}", of, *(f"{x:.3g}" for x in values)])
+        heads = ["joint", "unit", "RMS of the model", "of what it can say", "of the whole model"]
         print(table(heads, rows))
     if found.missing:
         print("what it cannot say:")

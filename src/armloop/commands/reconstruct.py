@@ -133,6 +133,7 @@ def run(options: Reconstruct) -> None:
     if options.report:
         from armloop.reports.reconstruction_report import reconstruction_report
 
+        progress(options)("drawing the report")
         write_text(options.report, reconstruction_report(result, first_samples(logs)))
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})
@@ -151,7 +152,7 @@ def run(options: Reconstruct) -> None:
         for table in (coefficients_table(result.model), stribeck_table(result.model)):
             print(table, end="\n\n") if table else None
         print(NOTE, end="\n\n")
-    print(score_table(result.held_out, arm))
+    print(score_table(result.held_out, arm, "Prediction error on held-out blocks"), end="\n\n")
     print(parts_table(result.parts, arm))
     for note in result.notes:
         print(f"note: {note}")

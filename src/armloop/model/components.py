@@ -48,6 +48,12 @@ class Component(Protocol):
         ...
 
 
+_LEGEND = (
+    "Yj[p] is the torque of joint j per unit of a base parameter p. These are sums, in SI units, of the links' masses m,\n"
+    "  first moments mx, my, mz = mass times centre, inertias Ixx .. Iyz about the link's origin, and rotor inertias J:"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class SparseTerms:
     """Terms of the double feature set, or of its angle sums, found in one step.
@@ -174,11 +180,12 @@ class RigidBody:
 
     def legend(self) -> list[str]:
         """The base parameters in full: sums of link parameters (m, m c, inertia about the link's origin; SI)."""
-        return [
+        found = [
             f"{name.split(' ')[0]}: {value:.4g} = {name}"
             for name, value in zip(self.names, self.values, strict=True)
             if value
         ]
+        return [_LEGEND, *found] if found else []
 
     def to_dict(self) -> dict[str, Any]:
         return {

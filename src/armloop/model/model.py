@@ -36,6 +36,11 @@ SCHEMA = "armloop/model/2"
 #: Samples whose rigid-body torque is computed at a time: it takes many arrays of them, which are to stay in the cache.
 _ROWS = 4096
 
+_STOP = (
+    "stop(q,w) is friction with memory, from -1 to 1: the stretch since the last reversal, in parts of the w, rad or m,\n"
+    "  at which the joint slides"
+)
+
 
 @dataclass(frozen=True)
 class AddedEffect:
@@ -277,8 +282,9 @@ class ReconstructedModel:
         return lines
 
     def legend(self) -> list[str]:
-        """What symbols in the formulas stand for, one line each; empty where they speak for themselves."""
-        return [line for component in self.components for line in component.legend()]
+        """What symbols in the formulas stand for, an entry each; empty where they speak for themselves."""
+        remembers = any(term.element.way == "memory" for terms in self.friction.terms for term in terms)
+        return [line for component in self.components for line in component.legend()] + [_STOP] * remembers
 
     def save(self, path: str | Path) -> None:
         """Write the model file (JSON), whole or not at all."""

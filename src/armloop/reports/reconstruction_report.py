@@ -119,7 +119,8 @@ def reconstruction_sections(
     if samples is not None:
         pictures.append(Picture(torque_figure(model, samples), say["torque"]))
         pictures.append(Picture(friction_figure(model, samples), say["friction"]))
-    tables = [steps_table(reconstruction.reports), score_table(reconstruction.held_out, model.arm)]
+    judged = score_table(reconstruction.held_out, model.arm, "Prediction error on held-out blocks")
+    tables = [steps_table(reconstruction.reports), judged]
     if compared(reconstruction.libraries):
         tables.insert(0, libraries_table(reconstruction.libraries))
     if reconstruction.parts:

@@ -154,7 +154,7 @@ def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the
                 report.candidates,
                 report.independent,
                 " / ".join(map(str, report.terms)),
-                " / ".join(map(str, report.samples)),
+                _from_to(report.samples),
                 percent(min(chosen)) if chosen else MISSING,
             ]
         )
@@ -168,6 +168,12 @@ def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the
         "error choosing orders",
     ]
     return make_table(headers, rows, title)
+
+
+def _from_to(counts: Sequence[int]) -> str:
+    """The least and the most of what each joint has."""
+    least, most = min(counts, default=0), max(counts, default=0)
+    return str(most) if least == most else f"{least} to {most}"
 
 
 def compared(libraries: Sequence[Contender]) -> bool:
@@ -272,7 +278,7 @@ def seconds_table(seconds: Mapping[str, float], title: str | None = "Time taken"
     return make_table(["stage", "time"], [*rows, ["in all", f"{sum(seconds.values()):.1f} s"]], title)
 
 
-def formulas(model: ReconstructedModel, width: int = 110, most_terms: int | None = None) -> str:
+def formulas(model: ReconstructedModel, width: int = TERMINAL, most_terms: int | None = None) -> str:
     """The model's formulas, wrapped to a width; with ``most_terms`` long ones are cut and say so."""
     lines = []
     for formula in model.formulas():

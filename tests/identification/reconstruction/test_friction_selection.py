@@ -10,7 +10,12 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction.friction_selection import extensions, restricted
+from armloop.identification.reconstruction.friction_selection import (
+    Comparison,
+    _notes,
+    extensions,
+    restricted,
+)
 from armloop.identification.reconstruction.inner_folds import inner_folds
 from armloop.laws.friction import FRICTION_LAWS as LAWS
 from armloop.robot.kinematics import nominal_parameters, regressor
@@ -93,3 +98,12 @@ def test_the_ladder_reaches_down_to_the_slowest_motion() -> None:
     elements = extensions(arm, motion, np.array([0.01, 0.002, 0.01]))[0].elements
     sharpest = [min(term.parameter for term in own if term.parameter) for own in elements]
     assert sharpest[1] < 0.001 and all(len(own) == len(usual[0].elements[0]) + 1 for own in elements)
+
+
+def test_what_a_law_brought_is_said_to_the_digit_that_decided():
+    taken = Comparison("Stribeck", 0.00421, 0.00408, None, [0, 2])
+    refused = Comparison("offset", 0.004213, 0.004213, 0.004216, [])
+    assert _notes([taken, refused]) == [
+        "friction, Stribeck: joints 1, 3; held-out nRMSE 0.00421 → 0.00408",
+        "friction, offset: no joint; held-out nRMSE 0.004213, with it 0.004216",
+    ]

@@ -202,7 +202,7 @@ def select_friction(
         comparisons.append(state.take(level, extension.name, one_by_one=data.plenty))
     if data.plenty:
         comparisons.append(state.eliminate_backward())
-    notes = [] if state.prior_name is None else [f"short of other knowledge, {state.prior_name}"]
+    notes = [] if state.prior_name is None else [f"where the motion tells nothing: {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
@@ -305,8 +305,8 @@ def _notes(comparisons: list[Comparison]) -> list[str]:
     notes = []
     for one in comparisons:
         who = "joints " + ", ".join(str(joint + 1) for joint in one.joints) if one.joints else "no joint"
-        change = f"{one.before:.4f} → {one.after:.4f}"
+        change = f"{one.before:.4g} → {one.after:.4g}"
         if one.refused is not None:
-            change = f"{one.before:.4f}; it would be {one.refused:.4f}"
+            change = f"{one.before:.4g}, with it {one.refused:.4g}"
         notes.append(f"friction, {one.rung}: {who}; held-out nRMSE {change}")
     return notes

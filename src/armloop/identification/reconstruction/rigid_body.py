@@ -132,8 +132,8 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         counts = [len(body.terms(arm, j)) + friction[j] for j in range(arm.n)]
         found.reports.append(StepReport(step, None, size, base.count, counts, samples_per_joint))
     found.notes = [
-        "the steps share one set of parameters: they were regressed together and are told apart on prediction",
-        "the held-out blocks judged a model without them; the model itself was then regressed on all data",
+        "the three steps share one set of parameters, regressed together: a step is a part of that model",
+        "errors are of a model fitted without the held-out blocks; the one that is written was then fitted to all data",
         *unknown,
         *ladder.notes,
         *laws.notes(final.effects),
