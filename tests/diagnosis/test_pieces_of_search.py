@@ -201,7 +201,11 @@ class TestOneForSeveral:
         def trial(effect: Any) -> Any:
             asked.append(effect.name)
             error = errors.get(effect.name)
-            return None if error is None else SimpleNamespace(shapes=["first", "its"], score=score(error))
+            return (
+                None
+                if error is None
+                else SimpleNamespace(shapes=["first", "second", "its"], score=score(error))
+            )
 
         search: Any = object.__new__(searching._Search)
         search.evidence, search.progress = SimpleNamespace(model=SimpleNamespace(arm=None)), lambda text: None
