@@ -38,16 +38,16 @@ def test_a_fast_reversal_is_no_rest_and_a_standstill_is() -> None:
 
 def test_a_standstill_as_long_as_what_the_filter_smears_to_both_sides_is_a_rest_of_that_joint() -> None:
     """The filter reaches ten samples: of a standstill rests what is farther than that from where the joint moves."""
-    N = 100
+    N = 120
     v = np.ones((N, 2))
     moving = np.ones((N, 2), dtype=bool)
-    moving[30:60, 0] = moving[85:, 0] = False
-    motion = Motion(0.01 * np.arange(N), 0 * v, v, 0 * v, np.array([0, 40]))
+    moving[20:35, 0] = moving[50:80, 0] = moving[105:, 0] = False
+    motion = Motion(0.01 * np.arange(N), 0 * v, v, 0 * v, np.array([0, 20]))
     given = Samples(motion, 0 * v, moving, 0.01, 5.0)
     assert round(given.reach / given.period) == 10
     rest = np.zeros((N, 2), dtype=bool)
     # neither a run's beginning nor its end is a motion
-    rest[[*range(40, 50), *range(95, 100)], 0] = True
+    rest[[*range(20, 25), *range(60, 70), *range(115, 120)], 0] = True
     np.testing.assert_array_equal(at_rest(given), rest)
     # without a filter nothing is smeared, and slower than a creep a joint rests
     v[0], v[1], v[2] = CREEP, -0.99 * CREEP, 0.99 * CREEP

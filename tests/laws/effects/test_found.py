@@ -59,13 +59,13 @@ def test_everyone_who_is_asked_gives_one_torque() -> None:
 
 
 def test_it_fades_beyond_the_ends_of_its_range_wherever_that_lies() -> None:
-    """Found from 1 to 3 rad/s: full there, half a tenth of a rad/s beyond, nothing from two tenths on."""
-    low, high = np.array([0.0, 1.0, 0.0]), np.array([0.0, 3.0, 0.0])
+    """Found from 1 to 5 rad/s: full there, half of it 0.2 rad/s beyond, nothing from 0.4 rad/s on."""
+    low, high = np.array([0.0, 1.0, 0.0]), np.array([0.0, 5.0, 0.0])
     added = AddedEffect(FoundLaw(2), found_law(ARM, 2, {"v2": (0.5, 0.0)}, (0 * low, low), (0 * high, high)))
     law = added.pointwise(ARM, None)
     for v, part in (
-        *((1.0, 1.0), (2.0, 1.0), (3.0, 1.0), (3.1, 0.5), (3.2, 0.0), (9.0, 0.0)),
-        *((0.9, 0.5), (0.8, 0.0), (-2.0, 0.0)),
+        *((1.0, 1.0), (3.0, 1.0), (5.0, 1.0), (5.2, 0.5), (5.4, 0.0), (9.0, 0.0)),
+        *((0.8, 0.5), (0.6, 0.0), (-3.0, 0.0)),
     ):
         tau = law(np.zeros(3), np.array([0.0, v, 0.0]), np.zeros(3))
         assert_allclose(tau, [0.0, 0.5 * v * part, 0.0], atol=1e-12)
