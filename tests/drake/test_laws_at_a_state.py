@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 
 from armloop.drake import (
     AccelerationGains,
@@ -46,6 +47,19 @@ def test_pid() -> None:
     assert_allclose(controller.GetOutputPort("tau").Eval(context), expected)
     assert_allclose(controller.GetOutputPort("integral").Eval(context), [0.1, 0.2])
     assert_allclose(controller.EvalUniquePeriodicDiscreteUpdate(context).value(), [0.15, 0.25])
+    # differentiated, the encoder reads the same and changes with the position as an ideal one does
+    slopes = controller.ToAutoDiffXd()
+    inputs = {"q_ref": [1, 2], "v_ref": [0.5, 0.5], "tau_ff": [100, 200]}
+    context = fixed(slopes, **inputs)
+    slopes.GetInputPort("state").FixValue(context, InitializeAutoDiff([0.6, 1.5, 0.1, 0.2])[:, 0])
+    tau = slopes.GetOutputPort("tau").Eval(context)
+    assert_allclose(ExtractValue(tau)[:, 0], np.array(expected) - [5 * 0.1, 7 * 0.2])
+    assert_allclose(ExtractGradient(tau), [[-2, 0, -11, 0], [0, -3, 0, -13]])
+    # ideal ones by default
+    ideal = PidController(gains, 0.1)
+    tau = ideal.GetOutputPort("tau").Eval(fixed(ideal, **inputs, state=[0.6, 1.5, 0.1, 0.2]))
+    assert_allclose(tau, [2 * 0.4 + 11 * 0.4 + 100, 3 * 0.5 + 13 * 0.3 + 200])
+    assert ideal.ToSymbolicMaybe() is not None and controller.ToSymbolicMaybe() is None
     paper = PidGains.paper(2)
     assert (paper.kp.tolist(), paper.ki.tolist(), paper.kd.tolist()) == ([80] * 2, [8] * 2, [2] * 2)
 
