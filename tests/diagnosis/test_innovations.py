@@ -42,12 +42,13 @@ def test_a_standstill_as_long_as_what_the_filter_smears_to_both_sides_is_a_rest_
     v = np.ones((N, 2))
     moving = np.ones((N, 2), dtype=bool)
     moving[20:35, 0] = moving[50:80, 0] = moving[105:, 0] = False
+    moving[82:104, 1] = False
     motion = Motion(0.01 * np.arange(N), 0 * v, v, 0 * v, np.array([0, 20]))
     given = Samples(motion, 0 * v, moving, 0.01, 5.0)
     assert round(given.reach / given.period) == 10
     rest = np.zeros((N, 2), dtype=bool)
     # neither a run's beginning nor its end is a motion
-    rest[[*range(20, 25), *range(60, 70), *range(115, 120)], 0] = True
+    rest[[*range(20, 25), *range(60, 70), *range(115, 120)], 0] = rest[92:94, 1] = True
     np.testing.assert_array_equal(at_rest(given), rest)
     # without a filter nothing is smeared, and slower than a creep a joint rests
     v[0], v[1], v[2] = CREEP, -0.99 * CREEP, 0.99 * CREEP
