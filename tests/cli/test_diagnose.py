@@ -46,6 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     baseline = score(bare, preprocess([log(9)], bare.conditioning)).moving
     replace(bare, baseline=baseline).save(folder / "model.json")
     write_log(folder / "gain.csv", log(1, gain))
+    write_log(folder / "healthy.csv", log(1))
     write_log(folder / "drag.csv", log(1, drag))
     write_log(folder / "drag_again.csv", log(2, drag))
     write_log(folder / "short.csv", log(2, drag).select(slice(0, 25)))
@@ -70,6 +71,24 @@ def test_a_sensor_is_blamed_and_no_controller_supplies_its_fault(
     assert answer["feedforward_change"] == {"unit": ["N*m"] * 3, "rms": [0.0] * 3, "largest": [0.0] * 3}
     page = (tmp_path / "report.html").read_text()
     assert "the sensor is at fault, not the arm" in page
+
+
+def test_a_model_that_nothing_was_added_to_is_not_called_augmented(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, said in (("healthy", "model.json (as it was)"), ("drag", "model.json (augmented)")):
+        out = tmp_path / name
+        assert (
+            main(["diagnose", str(folder / "model.json"), str(folder / f"{name}.csv"), "--out", str(out)])
+            == 0
+        )
+        text = capsys.readouterr().out
+        assert said in text and text.index("drawing the report") < text.index("Verdict:")
+        effects = [
+            len(json.loads(path.read_text())["effects"])
+            for path in (folder / "model.json", out / "model.json")
+        ]
+        assert (effects[0] == effects[1]) == ("as it was" in said)
 
 
 def test_runs_held_out_are_scored_before_and_after(

@@ -109,14 +109,14 @@ def test_headers_stand_on_several_lines_where_a_terminal_would_break_the_rows() 
 
 
 def test_how_the_joints_followed_fits_a_terminal() -> None:
-    m = Metrics(*(np.array([value, value]) for value in (2.84, 0.123, 0.686, 2.44, 0.125)))
+    m = Metrics(*(np.array([value, value]) for value in (2.84, 0.123, 0.012, 2.44, 0.125)))
     result = SimpleNamespace(
-        unit=("deg", "mm"), rms=np.array([1.35, 0.0464]), largest=np.array([2.52, 0.0552]), metrics=m
+        unit=("deg", "mm"), rms=np.array([1.35, 0.000466]), largest=np.array([2.52, 0.000958]), metrics=m
     )
     measured = SimpleNamespace(**{**vars(result), "metrics": None})  # no metrics of a simulation
     text = str(metrics_table({"pid": result, "computed_torque": result, "pid_step3": measured}))
     assert max(map(len, text.splitlines())) <= 80
-    assert "  joint 2 [mm]" in text and "12.5" in text  # a share in percent, as the header says
+    assert "joint 2 [mm]" in text and "12.5" in text  # a share in percent, as the header says
 
 
 def test_of_the_joints_samples_a_step_has_the_least_and_the_most() -> None:

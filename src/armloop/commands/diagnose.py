@@ -57,4 +57,5 @@ def run(options: Diagnose) -> None:
     print(diagnosis_table(result, compensation))
     if planned is not None:
         print("\n" + planned.words())
-    print(f"\nwritten: {folder}/diagnosis.json, model.json (augmented), report.html")
+    what = "augmented" if len(result.model.effects) > len(model.effects) else "as it was"
+    print(f"\nwritten: {folder}/diagnosis.json, model.json ({what}), report.html")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armloop.reports.tables import Table, make_table, named_eta_table
-from armloop.reports.words import controller
+from armloop.reports.words import controller, number
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.tracking import TrackingResult
@@ -50,13 +50,19 @@ def metrics_table(
         m = result.metrics
         rows.append([controller(name), *[""] * 7])
         for j, unit in enumerate(result.unit):
-            row: list[object] = [f"  joint {j + 1} [{unit}]", result.rms[j], result.largest[j]]
+            row: list[object] = [f"joint {j + 1} [{unit}]", result.rms[j], result.largest[j]]
             row += (
                 [None] * 5
                 if m is None
-                else [x[j] for x in (m.effort, 100 * m.clipped, m.stick, m.settling, 100 * m.unsettled)]
+                else [
+                    m.effort[j],
+                    100 * m.clipped[j],
+                    number(m.stick[j], 2),
+                    number(m.settling[j], 2),
+                    100 * m.unsettled[j],
+                ]
             )
             rows.append(row)
     errors = ["RMS error", "largest error", "RMS torque [N·m, N]", "clipped [%]"]
-    after = ["sticking [s]", "settling [s]", "not settled [%]"]
+    after = ["stuck [s]", "settled after [s]", "not settled [%]"]
     return make_table(["controller", *errors, *after], rows, title)

@@ -105,7 +105,8 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
     if unknown or not data.controllers:
         given = ", ".join(unknown) or "empty"
         raise ScenarioError(
-            f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}"
+            f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}; "
+            "one of your own is known once its package is installed (entry points armloop.controllers)"
         )
     score = data.score or [0.0, reference.duration]
     least = _FEWEST_STEPS * period
