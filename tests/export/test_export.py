@@ -119,6 +119,22 @@ def test_what_cannot_be_said_is_listed_and_the_nearest_friction_is_written(tmp_p
     assert "Stribeck" not in "\n".join(plain.missing)
 
 
+def test_of_friction_that_fades_the_drake_program_has_a_clock(tmp_path):
+    """What it leaves of the whole model, which is a warm joint's, is said where it is, and only there."""
+    drift = ("friction_drift", 2, {"level": 0.4, "time_constant": 30.0})
+    for effects, left in (((drift,), 0.4), ((), 0.0)):
+        found = export(
+            model_of(ARMS["three_axis"], friction=PLAIN, effects=effects), "drake", tmp_path / f"{left}"
+        )
+        assert found.unsaid[1] == pytest.approx(left, abs=1e-3)
+        told = [
+            line
+            for line in found.missing
+            if line.startswith("friction_drift at joint 2: the program's clock")
+        ]
+        assert len(told) == len(effects)
+
+
 @pytest.mark.slow
 def test_the_drake_program_has_all_of_the_model(tmp_path):
     model = model_of(ARMS["three_axis"], friction=RICH, effects=(*EFFECTS, *SUBTLE))

@@ -102,7 +102,8 @@ def _as_c(model: ReconstructedModel, path: Path, motion: Motion) -> Exported:
     write_text(path, source)
     if found.has_memory:
         notes.append(
-            "armloop_torque_memory carries friction's memory along in a struct; armloop_torque has it fully slid"
+            "armloop_torque_memory carries friction's memory and clock along in a struct; armloop_torque has it fully "
+            "slid and warm"
         )
     return Exported("c", [path], consumer, rms_of(whole), difference, difference, missing, notes)
 
