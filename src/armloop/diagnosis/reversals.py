@@ -28,7 +28,7 @@ from armloop.diagnosis.search import Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
 
 #: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
@@ -174,7 +174,7 @@ class _View:
         mine = self.rows & (self.joint == j)
         before, after = current.held_out[mine] ** 2, trial.held_out[mine] ** 2
         gain = float(before.sum() - after.sum())
-        sums = [np.maximum(block_sums(x, self.block[mine]), 1e-300) for x in (before, after)]
+        sums = [np.maximum(block_sums(x, self.block[mine]), TINY) for x in (before, after)]
         noticed, always = (
             gain >= self.noticeable[j] * mine.sum(),
             MOSTLY * gain <= self.usual[j] * mine.sum(),
