@@ -94,7 +94,8 @@ class Section:
         """Rebuild from :meth:`to_dict`."""
         pictures = [Picture(*parts) for parts in data["pictures"]]
         tables = msgspec.convert(data["tables"], list[Table])
-        return Section(**{**data, "pictures": pictures, "tables": tables})
+        formulas = [tuple(pair) for pair in data["formulas"]]
+        return Section(**{**data, "pictures": pictures, "tables": tables, "formulas": formulas})
 
     @property
     def anchor(self) -> str:
