@@ -53,6 +53,8 @@ def test_what_does_not_turn_is_taken_to_first_order_where_it_resists() -> None:
     assert rubbing(acting("offset", 3.0), friction=None).smoothly(at(0.5), MATH) == (3.0, 0.0)
     one_way = rubbing(acting("viscous_forward", 2.0), friction=None)
     assert one_way.smooth and one_way.smoothly(at(0.5), MATH) == pytest.approx((1.0, 2.0))
+    other_way = rubbing(acting("viscous_backward", 2.0), friction=None)
+    assert other_way.smooth and other_way.smoothly(at(-0.5), MATH) == pytest.approx((-1.0, 2.0))
 
 
 def test_what_grows_with_the_load_is_apart() -> None:
