@@ -141,6 +141,53 @@ def test_a_block_is_judged_with_what_the_blocks_beside_it_showed_alone() -> None
     np.testing.assert_allclose(left**2, 1 + columns / (rows - columns - 1), rtol=0.25)
 
 
+def test_columns_of_any_unit_are_solved_and_what_nothing_determines_is_shared_or_none() -> None:
+    rng = np.random.default_rng(5)
+    X, y = rng.normal(size=(30, 3)) * [1e-6, 1.0, 1e6], rng.normal(size=30)
+    expected = np.linalg.lstsq(X, y)[0]
+    np.testing.assert_allclose(bandwidth.determined_solution(X, y), expected, rtol=1e-5)
+    twice = np.column_stack([X, X[:, 1], np.zeros(30)])
+    shared = [expected[0], expected[1] / 2, expected[2], expected[1] / 2, 0.0]
+    np.testing.assert_allclose(bandwidth.determined_solution(twice, y), shared, rtol=1e-5)
+
+
+def test_the_ridge_is_a_ten_millionth_of_a_column_s_squares() -> None:
+    rng = np.random.default_rng(6)
+    X, y = 3.0 * np.linalg.qr(rng.normal(size=(30, 3)))[0], rng.normal(size=30)
+    np.testing.assert_allclose(bandwidth.determined_solution(X, y), X.T @ y / 9 / (1 + 1e-7), rtol=1e-11)
+
+
+def test_joints_weigh_by_their_torques_first_then_by_what_is_left_of_blocks_left_out() -> None:
+    rng = np.random.default_rng(8)
+    N, columns = 60, rng.normal(size=(60, 2, 4))
+    tau = columns @ [1.0, -2.0, 3.0, -4.0] + rng.normal(size=(N, 2)) * [0.5, 5.0]
+    table = Table(columns, tau, np.arange(N) // 5, rng.random((N, 2)) > 0.2, standing(N, 2), 1)
+
+    def sizes(x: np.ndarray) -> Any:
+        return np.sqrt((x**2).sum(axis=0, where=table.moving) / table.moving.sum(axis=0))
+
+    left = tau
+    for _ in range(2):
+        size, before = sizes(left), left
+        left = np.zeros_like(before)
+        for judged in (table.blocks % 2 == 0, table.blocks % 2 == 1):
+            rows = table.moving & ~judged[:, None]
+            theta = np.linalg.lstsq((columns / size[:, None])[rows], (tau / size)[rows])[0]
+            left[judged] = (tau - columns @ theta)[judged]
+    np.testing.assert_allclose(bandwidth._held_out(table), sizes(left), rtol=1e-5)
+
+
+def test_every_third_instant_of_two_logs() -> None:
+    motion = replace(standing(10, 1), q=np.arange(10.0)[:, None], starts=np.array([0, 4]))
+    whole = Table(motion.q[:, :, None], motion.q, np.arange(10), motion.q > 2, motion, 2)
+    thin = whole.every(3)
+    taken = [0.0, 3.0, 6.0, 9.0]
+    assert thin.tau[:, 0].tolist() == thin.columns[:, 0, 0].tolist() == thin.motion.q[:, 0].tolist() == taken
+    assert thin.blocks.tolist() == taken and thin.moving[:, 0].tolist() == [False, True, True, True]
+    # of the first log 0 and 3, of the second 6 and 9
+    assert thin.motion.starts.tolist() == [0, 2] and thin.stride == 6
+
+
 class TestPieces:
     @pytest.fixture
     def compared(self, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:

@@ -170,6 +170,11 @@ class TestTurnedSigns:
         assert none.physical([0]) and not none.physical([0, 1]) and not none.driven([1])
         assert fit_of([0.1], [0.0], [-1.0]).driven([0]) and not fit_of([0.1], [0.1], [-1.0]).driven([0])
 
+    def test_several_are_driven_if_each_is(self) -> None:
+        assert fit_of([0.1] * 2, [-1.0, 0.0], [-1.0, -2.0]).driven([0, 1])
+        assert not fit_of([0.1] * 2, [-1.0, 0.1], [-1.0, -2.0]).driven([0, 1])
+        assert not fit_of([0.1] * 2, [-1.0, 0.0], [-1.0, 0.0]).driven([0, 1])
+
 
 class Scaled(Fits):
     """Fits that are given, with the factor that each half of the blocks says of each joint."""
@@ -250,7 +255,7 @@ class TestExchanges:
             assert Fits(order_21=fit_of(relative, power, GOOD)).better_exchanged(plain) == found
         # what is met exactly is met to a part in a billion
         exact = fit_of([0.0, 0.0], GOOD, GOOD)
-        assert torque_checks._gain(plain, exact, 0, 1) == pytest.approx(np.sqrt(0.9 * 0.4) / 1e-9)
+        assert plain.over(exact) == plain.over(exact, [0, 1]) == pytest.approx(np.sqrt(0.9 * 0.4) / 1e-9)
 
     def test_of_several_pairs_the_best(self) -> None:
         three = [1.0] * 3
@@ -317,6 +322,7 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     brakes, drives = 0.5 * np.abs(v[:, 0]).sum(), 0.2 * (v[:, 0] ** 2).sum()
     assert found.power[0] == pytest.approx((brakes - drives) / (brakes + drives), abs=0.03)
     assert found.power[1] == 0.0  # friction of less than a fiftieth of the torque says nothing
+    assert problem.fit(np.full(2, 10.0), np.arange(2)).power.tolist() == pytest.approx(found.power.tolist())
     turned = problem.fit(-np.ones(2), np.arange(2))
     np.testing.assert_allclose(turned.power, -found.power)
     np.testing.assert_allclose(turned.inertia, -found.inertia)
@@ -331,3 +337,73 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
         expected = np.linalg.norm(noise[rows, j]) / np.linalg.norm(tau[rows, j])
         assert half.relative[j] == pytest.approx(expected, rel=0.05)
     assert problem.fit(np.ones(2), np.arange(2), 1).relative.tolist() == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def small_problem() -> torque_checks._Problem:
+    """Two joints with two shared parameters and the friction of each; neither is explained but for noise."""
+    rng = np.random.default_rng(7)
+    N = 60
+    columns = np.zeros((N, 2, 8))
+    columns[:, :, :2] = rng.normal(size=(N, 2, 2)) * [1.0, 1e-3]
+    for j in range(2):
+        v = rng.normal(size=N)
+        columns[:, j, 2 + 3 * j : 5 + 3 * j] = np.column_stack([np.sign(v), v, np.ones(N)])
+    tau = columns @ np.arange(1.0, 9.0) + rng.normal(size=(N, 2)) * [0.5, 5.0]
+    table = Table(columns, tau, np.arange(N) // 5, rng.random((N, 2)) > 0.2, standing(N, 2), 1)
+    return torque_checks._Problem(table, np.ones((1, 2, 2, 2)), 2)
+
+
+@pytest.mark.parametrize("half", [None, 0, 1])
+def test_joints_weigh_by_their_torques_first_then_by_what_is_left(half: int | None) -> None:
+    problem = small_problem()
+    table, signs, order = problem.table, np.array([1.0, -2.0]), np.array([1, 0])
+    tau = table.tau[:, order] * signs
+    rows = table.moving & (half is None or (table.blocks % 2 == half)[:, None])
+    left = tau
+    for _ in range(2):
+        size = np.sqrt((left**2).sum(axis=0, where=rows) / rows.sum(axis=0))
+        weights = (1 / size * np.ones_like(tau))[rows]
+        theta = np.linalg.lstsq(table.columns[rows] * weights[:, None], tau[rows] * weights)[0]
+        left = tau - table.columns @ theta
+    error, torque = (np.sqrt((x**2).sum(axis=0, where=rows) / rows.sum(axis=0)) for x in (left, tau))
+    found = problem.fit(signs, order, half)
+    np.testing.assert_allclose(found.relative, error / torque, rtol=1e-5)
+    np.testing.assert_allclose(found.inertia, theta[:2].sum(), rtol=1e-5)
+    for j in range(2):
+        own = table.columns[rows[:, j], j, 2 + 3 * j : 4 + 3 * j]
+        parts = own * theta[2 + 3 * j : 4 + 3 * j] * own[:, 1:]
+        assert found.power[j] == pytest.approx(parts.sum() / np.abs(parts).sum(), rel=1e-5)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("half", [0, 1])
+def test_the_factor_of_a_torque_is_that_with_which_all_are_explained_best(joint: int, half: int) -> None:
+    problem = small_problem()
+    table = problem.table
+    rows = table.moving & (table.blocks % 2 == half)[:, None]
+    size = np.sqrt((table.tau**2).sum(axis=0, where=rows) / rows.sum(axis=0))
+    X = (table.columns / size[:, None])[rows]
+
+    def left(factor: float) -> float:
+        tau = table.tau / size * np.where(np.arange(2) == joint, factor, 1.0)
+        return float(np.linalg.lstsq(X, tau[rows])[1][0])
+
+    # a parabola, whose vertex three of its values tell
+    below, at, above = (left(factor) for factor in (0.0, 1.0, 2.0))
+    vertex = 1 - (above - below) / (2 * (above - 2 * at + below))
+    assert problem._factor(joint, half) == pytest.approx(vertex, rel=1e-4)
+
+
+@pytest.mark.parametrize(("counts", "enough"), [((200, 300), True), ((300, 199), False), ((199, 199), False)])
+def test_each_joint_has_two_hundred_instants(
+    counts: tuple[int, int], enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moving = np.arange(300)[:, None] < np.array(counts)
+    table = Table(
+        np.zeros((300, 2, 8)), np.zeros((300, 2)), np.zeros(300, np.intp), moving, standing(300, 2), 1
+    )
+    monkeypatch.setattr(torque_checks, "table_at", lambda *_: table)
+    problem = torque_checks._Problem.of([run(seconds=2.0)], three_axis(), 10.0)
+    assert (problem is not None) == enough
+    if problem is not None:
+        assert len(problem.table.tau) == 100 and len(problem.mass) == 67  # every third of 200 postures

@@ -26,7 +26,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.errors import LogError
 
 #: Corners tried, as parts of the highest.
@@ -39,6 +39,8 @@ _OF_RATE = 0.4
 _SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
 #: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
 _SLIDES, _FADES = 0.05, 0.01
+#: Ridge beside columns of unit length, and the least that a joint weighs by.
+_RIDGE, LEAST = 1e-7, 1e-12
 
 
 @dataclass(frozen=True)
@@ -112,9 +114,8 @@ def choose_bandwidth(
     errors = []
     for table in made:
         left = _held_out(replace(table, moving=rows, tau=made[0].tau))
-        size = [root_mean_square(made[0].tau[own, j]) for j, own in enumerate(rows.T)]
-        relative = [left[j] / max(float(size[j]), TINY) for j in np.flatnonzero(counted)]
-        errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, 1e-12))))))
+        relative = (left / np.maximum(made[0].sizes(made[0].tau, rows), TINY))[counted]
+        errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, LEAST))))))
     good = [corner for corner, error in zip(corners, errors, strict=True) if error <= _AS_GOOD * min(errors)]
     return Bandwidth(max(good), tuple(zip(corners, errors, strict=True)))
 
@@ -166,6 +167,17 @@ class Table:
     moving: NDArray[np.bool_]
     motion: Motion
     stride: int
+
+    def sizes(self, x: Array, rows: Mask) -> Array:
+        """(n,) root mean square of x (N, n) on each joint's rows (N, n)."""
+        return np.array([root_mean_square(x[own, j]) for j, own in enumerate(rows.T)])
+
+    def weighed(self, tau: Array, rows: Mask, size: Array) -> tuple[Array, Array, Index]:
+        """Columns and torques of each joint's rows by its size, joint after joint; and the joint of each."""
+        size = np.maximum(size, LEAST)
+        X = [self.columns[own, j] / size[j] for j, own in enumerate(rows.T)]
+        y = [tau[own, j] / size[j] for j, own in enumerate(rows.T)]
+        return np.concatenate(X), np.concatenate(y), np.repeat(np.arange(len(size)), rows.sum(axis=0))
 
     def every(self, step: int) -> Table:
         """Every so many instants."""
@@ -236,26 +248,23 @@ def table_at(
 
 def _held_out(table: Table) -> Array:
     """(n,) rms of what a regression on every other block leaves on the blocks between, both ways round."""
-    n = table.tau.shape[1]
-    scale = np.array([root_mean_square(table.tau[own, j]) for j, own in enumerate(table.moving.T)])
+    scale = table.sizes(table.tau, table.moving)
     for _ in range(2):  # joints weigh by their torques first, then by what is left of them
         left = np.zeros_like(table.tau)
         for parity in (0, 1):
-            fitted = (table.blocks % 2 != parity)[:, None] & table.moving
-            X = np.concatenate([table.columns[fitted[:, j], j] / max(scale[j], 1e-12) for j in range(n)])
-            y = np.concatenate([table.tau[fitted[:, j], j] / max(scale[j], 1e-12) for j in range(n)])
-            size = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
-            X = X / size
-            theta = np.linalg.solve(X.T @ X + 1e-7 * np.eye(X.shape[1]), X.T @ y) / size
             judged = table.blocks % 2 == parity
+            X, y, _ = table.weighed(table.tau, ~judged[:, None] & table.moving, scale)
+            theta = determined_solution(X, y)
             left[judged] = table.tau[judged] - table.columns[judged] @ theta
-        scale = np.array(
-            [
-                np.sqrt(np.mean(np.square(left[own, j]))) if own.any() else 1.0
-                for j, own in enumerate(table.moving.T)
-            ]
-        )
+        scale = table.sizes(left, table.moving)
     return scale
+
+
+def determined_solution(X: Array, y: Array) -> Array:
+    """Least squares with a ridge, of columns of unit length, that is felt by what nothing determines alone."""
+    lengths = np.maximum(np.linalg.norm(X, axis=0), TINY)
+    X = X / lengths
+    return np.asarray(np.linalg.solve(X.T @ X + _RIDGE * np.eye(X.shape[1]), X.T @ y) / lengths)
 
 
 def root_mean_square(x: Array) -> float:

@@ -22,7 +22,14 @@ from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
-from armloop.identification.reconstruction.bandwidth import Table, even_selection, root_mean_square, table_at
+from armloop.identification.reconstruction.bandwidth import (
+    LEAST,
+    Table,
+    determined_solution,
+    even_selection,
+    root_mean_square,
+    table_at,
+)
 from armloop.identification.reconstruction.rigid_body import mass_columns
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
@@ -34,12 +41,12 @@ _DRIVES, _FRICTION = 0.5, 0.02
 _BETTER, _GOOD = 2.0, 0.6
 #: A gain is far off from this factor on; in two halves of the data it must be the same but for this one.
 _FAR, _ALIKE = 3.0, 1.5
-#: Whole joints in exchange must lower the error of all joints by this factor.
-_BETTER_ALL = 1.5
 #: Mean relative error from which on whole joints are tried in exchange where the fit is unphysical; rows a joint must have.
 _POOR, _FEWEST = 0.12, 200
 #: Of the instants at which corners are compared, every so manieth is used.
 _EVERY = 3
+#: A relative error is at least this: what is met exactly is met to round-off.
+_EXACT = 1e-9
 #: Postures at which inertia is looked at.
 _POSTURES = 60
 
@@ -90,6 +97,12 @@ class _Fit:
     power: Array
     inertia: Array
 
+    def over(self, other: _Fit, joints: Sequence[int] | None = None) -> float:
+        """Relative errors of joints, all by default, over the other's, in the geometric mean."""
+        mine, others = (np.maximum(fit.relative, _EXACT) for fit in (self, other))
+        ratio = np.log(mine / others)
+        return float(np.exp(np.mean(ratio if joints is None else ratio[list(joints)])))
+
     def physical(self, joints: Sequence[int]) -> bool:
         """Whether these joints have friction that brakes and positive inertia."""
         own = list(joints)
@@ -125,18 +138,12 @@ class _Problem:
         table, n, r = self.table, len(signs), self.shared
         tau = signs * table.tau[:, order]
         rows = table.moving if half is None else table.moving & (table.blocks % 2 == half)[:, None]
-        scale = np.array([root_mean_square(tau[own, j]) for j, own in enumerate(rows.T)])
-        size, theta = np.maximum(scale, 1e-12), np.zeros(table.columns.shape[2])
-        error = np.zeros(n)
-        for _ in range(2):
-            X = np.concatenate([table.columns[rows[:, j], j] / size[j] for j in range(n)])
-            y = np.concatenate([tau[rows[:, j], j] / size[j] for j in range(n)])
-            lengths = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
-            X = X / lengths
-            theta = np.linalg.solve(X.T @ X + 1e-7 * np.eye(X.shape[1]), X.T @ y) / lengths
-            left = tau - np.einsum("njp,p->nj", table.columns, theta)
-            error = np.array([root_mean_square(left[own, j]) for j, own in enumerate(rows.T)])
-            size = np.maximum(error, 1e-6 * np.maximum(scale, 1e-12))
+        scale = table.sizes(tau, rows)
+        size = scale
+        for _ in range(2):  # joints weigh by their torques first, then by what is left of them
+            X, y, _ = table.weighed(tau, rows, size)
+            theta = determined_solution(X, y)
+            size = error = table.sizes(tau - table.columns @ theta, rows)
         power = np.zeros(n)
         for j, own in enumerate(rows.T):
             columns = table.columns[own, j, r + 3 * j : r + 3 * j + 2]
@@ -145,7 +152,7 @@ class _Problem:
             if root_mean_square(parts.sum(axis=1)) > _FRICTION * scale[j]:
                 power[j] = float((parts.sum(axis=1) * v).sum() / np.abs(parts * v[:, None]).sum())
         inertia = np.einsum("pjjr,r->j", self.mass, theta[:r]) / len(self.mass)
-        return _Fit(error / np.maximum(scale, 1e-12), power, inertia)
+        return _Fit(error / np.maximum(scale, LEAST), power, inertia)
 
     def turned(self, plain: _Fit) -> list[int]:
         """Joints whose sign is turned: alone, or all those whose friction drives."""
@@ -160,12 +167,11 @@ class _Problem:
             signs[group] = -1.0
             order = np.arange(n)
             other = self.fit(signs, order)
-            gain = float(np.mean(np.log(np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9))))
-            if not other.physical(range(n)) or gain < -0.01:
+            gain = plain.over(other)
+            if not other.physical(range(n)) or gain < 0.99:
                 continue
-            own = np.log(np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9))[group]
             plainly = (
-                len(group) == 1 and float(own.min()) > np.log(_BETTER) and other.relative[group].max() < _GOOD
+                len(group) == 1 and plain.over(other, group) > _BETTER and other.relative[group].max() < _GOOD
             )
             halves = (self.fit(np.ones(n), order, half) for half in (0, 1))
             if other.power[group].max() > _DRIVES and (plainly or all(one.driven(group) for one in halves)):
@@ -179,7 +185,7 @@ class _Problem:
             order = np.arange(len(plain.power))
             order[[i, j]] = order[[j, i]]
             other = self.fit(np.ones(len(order)), order)
-            gain = _gain(plain, other, i, j)
+            gain = plain.over(other, [i, j])
             if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < _GOOD:
                 found.append((gain, (i, j)))
         return [max(found)[1]] if found else []
@@ -197,33 +203,18 @@ class _Problem:
             factors = np.ones(n)
             factors[j] = factor
             other = self.fit(factors, np.arange(n))
-            ratio = np.maximum(plain.relative, 1e-9) / np.maximum(other.relative, 1e-9)
-            if ratio[j] > _BETTER and other.physical(range(n)) and other.relative[j] < _GOOD:
-                found.append((float(np.exp(np.mean(np.log(ratio)))), (j, factor)))
+            if plain.over(other, [j]) > _BETTER and other.physical(range(n)) and other.relative[j] < _GOOD:
+                found.append((plain.over(other), (j, factor)))
         return [max(found)[1]] if found and max(found)[0] > 1 else []
 
     def _factor(self, joint: int, half: int) -> float:
         """The factor of a joint's torque that is regressed together with all parameters, on every other block."""
         table = self.table
         rows = table.moving & (table.blocks % 2 == half)[:, None]
-        X, y, unknown = [], [], []
-        for j, own in enumerate(rows.T):
-            size = max(float(root_mean_square(table.tau[own, j])), 1e-12)
-            tau = table.tau[own, j] / size
-            X.append(table.columns[own, j] / size)
-            y.append(np.zeros_like(tau) if j == joint else tau)
-            unknown.append(-tau if j == joint else np.zeros_like(tau))
-        A = np.column_stack([np.concatenate(X), np.concatenate(unknown)])
-        lengths = np.maximum(np.linalg.norm(A, axis=0), 1e-12)
-        A = A / lengths
-        found = np.linalg.solve(A.T @ A + 1e-7 * np.eye(A.shape[1]), A.T @ np.concatenate(y)) / lengths
+        X, y, joints = table.weighed(table.tau, rows, table.sizes(table.tau, rows))
+        own = y * (joints == joint)
+        found = determined_solution(np.column_stack([X, -own]), y - own)
         return float(found[-1])
-
-
-def _gain(plain: _Fit, other: _Fit, i: int, j: int) -> float:
-    """How many times smaller the other's relative error of two joints is, in the geometric mean."""
-    ratio = np.maximum(plain.relative[[i, j]], 1e-9) / np.maximum(other.relative[[i, j]], 1e-9)
-    return float(np.exp(np.mean(np.log(ratio))))
 
 
 def _whole_joints(logs: list[MotionLog], arm: Arm, cutoff_hz: float, plain: _Fit, i: int, j: int) -> bool:
@@ -240,9 +231,4 @@ def _whole_joints(logs: list[MotionLog], arm: Arm, cutoff_hz: float, plain: _Fit
     if problem is None:
         return False
     other = problem.fit(np.ones(arm.n), np.arange(arm.n))
-    ratio = np.maximum(plain.relative, 1e-9)[order] / np.maximum(other.relative, 1e-9)
-    return bool(
-        np.exp(np.mean(np.log(ratio))) > _BETTER
-        and other.physical(range(arm.n))
-        and other.relative.max() < _GOOD
-    )
+    return plain.over(other) > _BETTER and other.physical(range(arm.n)) and bool(other.relative.max() < _GOOD)
