@@ -9,12 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from armloop.cli import main
 from armloop.drake.experiments.pickup import run_pickup
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.tracking import run_tracking, track_in_view
+from armloop.drake.plant.plant import add_links
+from armloop.drake.view import scene
 from armloop.drake.view.live import LiveView
+from armloop.robot.arm import load_arm
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +74,46 @@ def test_what_is_shown_moves_as_without(brief):
     for name in alone:
         assert np.array_equal(shown[name].q, alone[name].q)
         assert_allclose(shown[name].eta, alone[name].eta, rtol=1e-12)
+
+
+def test_each_arm_stands_where_its_system_says_and_its_ghost_on_the_reference():
+    """Two arms of three joints, whose six positions and twelve states are all different."""
+    arm = load_arm("three_axis")
+    view, builder = LiveView(arm, 0.0), DiagramBuilder()
+    numbers = np.arange(1, 19) / 10
+    shown = {}
+    for k, name in enumerate(("pid", "mine")):
+        inner = DiagramBuilder()
+        for port, values in (
+            ("state", numbers[9 * k : 9 * k + 6]),
+            ("q_ref", numbers[9 * k + 6 : 9 * k + 9]),
+        ):
+            inner.ExportOutput(inner.AddSystem(ConstantVectorSource(values)).get_output_port(), port)
+        shown[name] = builder.AddNamedSystem(name, inner.Build())
+    view.add_to(builder, shown)
+    diagram = builder.Build()
+    (scene_graph,) = (s for s in diagram.GetSystems() if isinstance(s, SceneGraph))
+    context = scene_graph.GetMyContextFromRoot(diagram.CreateDefaultContext())
+    query = scene_graph.get_query_output_port().Eval(context)
+    plant = MultibodyPlant(0.0)
+    add_links(plant, arm)
+    plant.Finalize()
+    own = plant.CreateDefaultContext()
+    for k, name in enumerate(("pid", "mine")):
+        for label, q in (
+            (name, numbers[9 * k : 9 * k + 3]),
+            (f"{name}_reference", numbers[9 * k + 6 : 9 * k + 9]),
+        ):
+            plant.SetPositions(own, q)
+            instance = view._plant.GetModelInstanceByName(label)
+            last = view._plant.GetBodyByName("link_3", instance)
+            frame = view._plant.GetBodyFrameIdOrThrow(last.index())
+            expected = plant.EvalBodyPoseInWorld(own, plant.GetBodyByName("link_3"))
+            X = query.GetPoseInWorld(frame)
+            side = X.translation() - expected.translation()
+            assert_allclose(X.rotation().matrix(), expected.rotation().matrix(), atol=1e-12)
+            assert_allclose(side[[0, 2]], 0.0, atol=1e-12)
+            assert side[1] == pytest.approx((0.5 - k) * 1.2 * scene._reach(arm))
 
 
 def test_it_keeps_to_its_rate(brief):
