@@ -27,6 +27,7 @@ def program(offset: np.ndarray, **of: Any) -> Program:
         "level": none,
         "reserve": np.ones_like(offset),
         "last": none,
+        "near": 0.0,
     }
     return Program(H, offset, **(given | of))
 

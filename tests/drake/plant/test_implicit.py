@@ -59,7 +59,8 @@ def test_a_law_of_a_shared_motor_and_its_three_pieces():
     assert [exact.piece(w) for w in (0.0, 0.124, 0.125, 0.2, 0.375, 0.376)] == [1, 1, 0, 0, 0, -1]
     dry = ClampedLaw.dry(Direction(2, 1, 0.5), 3.0)
     assert dry == ClampedLaw(2, 0.0, 1e8, 3.0, 1, 0.5)
-    assert ClampedLaw(0, 0.0, 1.0, 1.0).ratio == 0.0
+    # one joint's own law shares its motor with none, as the joint's own direction does
+    assert ClampedLaw.dry(Direction(2), 3.0) == ClampedLaw(2, 0.0, 1e8, 3.0)
 
 
 def test_a_shared_motor_acts_on_both_joints():

@@ -89,8 +89,8 @@ class AdaptiveFeedforward(LeafSystem):
         n = self._n = model.arm.n
         effort = np.array([joint.effort for joint in model.arm.joints])
         limits = 0.5 * effort if bound is None else levels_of(bound, n, "bound")
-        if not (ramp > 0 and trial > _LOOK and (limits > 0).all()):
-            raise InputError(f"ramp {ramp} s, trial {trial} s and bound {limits} must be above 0")
+        if not (trial > _LOOK and (limits > 0).all()):
+            raise InputError(f"trial {trial} s must be above {_LOOK} s and bound {limits} above 0")
         self._model, self._ramp, self._trial, self._bound = model, ramp, trial, limits
         # by identity, for parameters cannot be hashed; the effects are kept so that no other takes their place
         self._laws: dict[int, tuple[Effects, list[Pointwise]]] = {}

@@ -58,7 +58,7 @@ class Program:
     level: Array
     reserve: Array
     last: Array
-    near: float = 0.0
+    near: float
 
     def solve(self) -> Answer | None:
         """Return the answer, None when no deviation keeps the limits."""

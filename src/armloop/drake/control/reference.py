@@ -20,7 +20,6 @@ from pydrake.systems.primitives import Demultiplexer
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.given import require_joints, require_predicts, require_reference, require_step
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import vector
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
@@ -150,8 +149,7 @@ def _ReferenceTable_(T: type) -> Any:
             row = min(int(seconds / self._period + 0.5), len(self._rows) - 1)
             if not self._filled[row // _CHUNK]:
                 self._fill(row // _CHUNK)
-            values = self._rows[row]
-            output.SetFromVector(values if T is float else vector(T, values.tolist()))
+            output.SetFromVector(self._rows[row])
 
         def _fill(self, chunk: int) -> None:
             part = slice(chunk * _CHUNK, (chunk + 1) * _CHUNK)

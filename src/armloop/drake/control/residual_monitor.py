@@ -48,7 +48,7 @@ class ResidualMonitor(LeafSystem):
         require("a number above 0", period=period, block=block, learn=learn)
         super().__init__()
         count, blocks = round(block / period), round(learn / block)
-        if not (period > 0 and count >= 10 and blocks >= 4):
+        if not (count >= 10 and blocks >= 4):
             raise InputError(
                 f"period {period} s, block {block} s, learn {learn} s: a block needs ten samples, learning four blocks"
             )

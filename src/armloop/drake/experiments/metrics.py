@@ -66,6 +66,7 @@ def reversals(v_ref: Array) -> NDArray[np.intp]:
 def _settling(outside: NDArray[np.bool_], v_ref: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return per reversal the steps until the error stays inside, and whether it never did before the next."""
     starts = reversals(v_ref)
-    last = np.maximum.reduceat(np.where(outside, np.arange(len(outside)), -1), starts)
+    # 0 stands for none: no reversal is as early
+    last = np.maximum.reduceat(outside * np.arange(len(outside)), starts)
     ends = np.append(starts[1:], len(outside))
     return np.maximum(last + 1 - starts, 0), last == ends - 1

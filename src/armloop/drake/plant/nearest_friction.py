@@ -43,7 +43,8 @@ def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
 def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
     """Speeds (K, n) and the mean friction at them, (K, n)."""
     n = model.arm.n
-    top = np.array(model.history.get("range", [[1.0] * n] * 3), dtype=float)[1]
+    ranges = model.history.get("range")
+    top = np.array(ranges[1], dtype=float) if ranges else np.ones(n)
     speeds = np.geomspace(1e-3, 1.0, _SPEEDS)[:, None] * np.maximum(top, 1e-2)
     lower, upper = training_range(model)
     q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, n))
@@ -60,12 +61,9 @@ def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
 
 
 def _fitted(v: Array, friction: Array) -> JointFriction:
-    best: tuple[float, float, Array] | None = None
-    for part in _VELOCITIES:
-        v_s = part * v.max()
-        x, left = nnls(np.column_stack([stribeck_fall(v, v_s), np.ones_like(v), v]), friction)
-        if best is None or left < best[0]:
-            best = float(left), float(v_s), x
-    assert best is not None
-    _, v_s, (excess, coulomb, viscous) = best
-    return JointFriction(float(excess + coulomb), float(coulomb), v_s, float(viscous))
+    tried = [
+        (v_s, *nnls(np.column_stack([stribeck_fall(v, v_s), np.ones_like(v), v]), friction))
+        for v_s in _VELOCITIES * v.max()
+    ]
+    v_s, (excess, coulomb, viscous), _ = min(tried, key=lambda each: each[2])
+    return JointFriction(float(excess + coulomb), float(coulomb), float(v_s), float(viscous))
