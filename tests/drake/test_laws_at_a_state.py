@@ -111,6 +111,11 @@ def test_computed_torque() -> None:
     context.SetContinuousState([0.2])
     assert_allclose(continuous.get_output_port().Eval(context), expected)
     assert_allclose(continuous.EvalTimeDerivatives(context).CopyToVector(), [0.3])
+    # one joint of two is enough to integrate
+    one = AccelerationGains(np.array([4.0, 4.0]), np.array([2.0, 2.0]), np.array([0.0, 3.0]))
+    assert ComputedTorque(Linear(), one, period=0.1).CreateDefaultContext().num_total_states() == 2
+    (none,) = AccelerationGains(4.0, 2.0).ki  # type: ignore[arg-type, misc]
+    assert none == 0.0
 
 
 def test_sliding_friction_resists() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -170,5 +171,9 @@ def test_the_parts_of_a_collection() -> None:
     assert not np.allclose(one, two)
     again = collection._parts(ARM, config, plan, 7)[2].references[1].evaluate([1.0])[0]
     assert np.array_equal(again, two)
+    # it creeps through each pose, or stands there
+    assert_allclose(np.abs(static.references[0].evaluate([0.2])[1]), np.deg2rad(0.1))
+    dwelling = collection._parts(ARM, config, replace(plan, dwell=True), 7)[0].references[0]
+    assert not dwelling.evaluate([0.2])[1].any()
     crew = collection._Crew(ARM, config, 500.0, [static, constant, varying])
     assert crew.duration((2, 1)) == 20.0 and crew.duration((0, 0)) == static.references[0].duration

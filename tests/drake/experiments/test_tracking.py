@@ -10,7 +10,7 @@ from exact_parts import scara_terms
 from numpy.testing import assert_allclose
 from pydrake.systems.framework import DiagramBuilder
 
-from armloop.drake.control.controllers import LISTED
+from armloop.drake.control.controllers import LISTED, Pid, controller_named
 from armloop.drake.experiments import tracking
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.tracking import add_controlled_arm, controllers_for, run_tracking, track
@@ -46,6 +46,27 @@ def test_exact_model_gives_the_designs_figures(scenario, exact):
     assert_allclose(results["pid_step1"].eta, [0.63, 0.37, 0.70], rtol=0.1)
     assert np.all(results["pid_step3"].eta < 0.005)
     assert results["pid"].scored == slice(20_000, 40_000)
+
+
+def test_a_controller_that_follows_another_motion_is_judged_by_the_scenarios(scenario, monkeypatch):
+    reference = dataclasses.replace(scenario.reference, duration=0.05)
+    brief = dataclasses.replace(scenario, reference=reference, score=(0.0, 0.05))
+
+    class Beside(Pid):
+        name = "beside"
+
+        def reference(self, scenario, model):
+            place = np.array([0.1, -0.2, 0.3])
+            return dataclasses.replace(scenario.reference, offset=scenario.reference.offset + place)
+
+    monkeypatch.setattr(tracking, "controller_named", lambda name: Beside())
+    found = track(brief, "beside", {})
+    assert_allclose(found.q_ref, reference.evaluate(found.time)[0], atol=1e-12)
+    # it starts on what it follows and hardly moves
+    assert_allclose(found.q[0] - found.q_ref[0], [0.1, -0.2, 0.3], atol=1e-12)
+    assert_allclose(found.eta, np.rad2deg([0.1, 0.2, 0.3]), rtol=0.1)
+    monkeypatch.setattr(tracking, "controller_named", controller_named)
+    assert_allclose(track(brief, "pid", {}).q_ref, found.q_ref, atol=1e-12)
 
 
 def test_order_of_controllers_on_a_short_run(short, exact):

@@ -1,20 +1,23 @@
 """A change in the loop is noticed, named and supplied; a healthy run stays untouched; what does not help is given back."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from operation import healthy_model
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, MatrixGain, RandomSource
 
 from armloop.drake import AdaptiveFeedforward, ResidualMonitor
 from armloop.drake.experiments import watched_run
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.watched_run import run_watched
+from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
@@ -168,3 +171,78 @@ def test_the_monitor_is_given_torques_with_the_noise_of_the_instruments(
         np.testing.assert_array_equal(supplied, np.eye(3) if adapt else np.zeros((3, 3)))
     # a new number every tenth step: the motion's own corner lies far below that
     assert sources[0] == (RandomDistribution.kGaussian, 3, 10 * config.time_step)
+
+
+class Named(LeafSystem):
+    """A monitor that raises an alarm at 0.2 s and names friction at 0.25 s, whatever it is shown; it keeps that."""
+
+    def __init__(self, model, learn: float) -> None:
+        super().__init__()
+        self.learn = learn
+        for name, size in (("tau", 3), ("state", 6), ("vdot", 3)):
+            self.DeclareVectorInputPort(name, size)
+        self.DeclareAbstractOutputPort("named", lambda: Value(Known()), self._named)
+        self.shown: list[tuple[np.ndarray, ...]] = []
+        self.DeclarePeriodicPublishEvent(0.01, 0.0, self._look)
+
+    def _look(self, context) -> None:
+        seen = (self.GetInputPort(name).Eval(context).copy() for name in ("tau", "state", "vdot"))
+        self.shown.append(tuple(seen))
+
+    def known(self, time: float) -> Known:
+        drag = AddedEffect(effect("viscous_friction", 2), {"coefficient": Estimate(3.0, 0.1, "N*m*s/rad")})
+        return Known(1, (drag,), 0.1) if time >= 0.25 - 1e-9 else Known()
+
+    def _named(self, context, output) -> None:
+        output.set_value(self.known(context.get_time()))
+
+    def watch(self, root):
+        time = root.get_time()
+        return SimpleNamespace(alarmed=int(time >= 0.2 - 1e-9), known=self.known(time))
+
+
+def test_a_run_is_scored_before_during_and_after_its_change(
+    scenario, model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monitors: list[Named] = []
+
+    def monitor(model, learn: float) -> Named:
+        monitors.append(Named(model, learn))
+        return monitors[-1]
+
+    monkeypatch.setattr(watched_run, "ResidualMonitor", monitor)
+    config = dataclasses.replace(scenario.plant.config, instruments=Instruments(torque_noise=0.0))
+    reference = dataclasses.replace(scenario.reference, duration=1.7)
+    # without an integrator, of whose torque what it learned would be taken off
+    gains = dataclasses.replace(scenario.gains, ki=np.zeros(3))
+    plant = dataclasses.replace(scenario.plant, config=config)
+    brief = dataclasses.replace(scenario, plant=plant, reference=reference, gains=gains)
+    change = UndeclaredEffect("viscous_friction", 2, {"coefficient": 3.0})
+    found = run_watched(brief, model, [change], 0.1, learn=7.0)
+    assert monitors[0].learn == 7.0
+    assert (found.alarmed_at, found.named_at) == (pytest.approx(0.2), pytest.approx(0.25))
+    assert found.known.revision == 1 and found.given_back == 0
+    # what was named is taken at the next look, 0.05 s later at most, and fully supplied a second after that
+    assert found.during is not None
+    rows = [found.before.scored, found.during.scored, found.after.scored]
+    assert rows == [slice(0, 100), slice(100, 1300), slice(900, 1700)]
+    # with an exact model the arm keeps to its reference until it changes
+    assert np.all(found.before.eta < 0.01) and found.during.eta[1] > 3 * found.before.eta[1]
+    v_ref = reference.evaluate(found.before.time)[1]
+    part = np.clip((found.before.time - 0.25) / 1.0, 0.0, 1.0)
+    full = part == 1.0
+    assert_allclose(found.supplied[full, 1], 3.0 * v_ref[full, 1], rtol=1e-6)
+    assert not found.supplied[part == 0.0].any() and not found.supplied[:, [0, 2]].any()
+    # the monitor sees the state, its derivative over a step, and what the drives really give
+    tau, state, vdot = (np.array(x) for x in zip(*monitors[0].shown, strict=True))
+    rows = np.arange(0, 1701, 10)
+    assert_allclose(state[:, :3], found.before.q[rows], atol=1e-12)
+    assert_allclose(tau, found.before.tau[rows], atol=1e-12)
+    k = 50
+    assert_allclose(vdot[k], reference.evaluate([0.01 * k])[2][0], atol=0.2)
+    # nothing changes, and nothing that is named is supplied
+    plain = run_watched(brief, model, [], 0.1, adapt=False)
+    assert monitors[1].learn == 20.0
+    # the step that begins at the moment of the change is the first that has it
+    assert int(np.argmax((found.after.q != plain.after.q).any(axis=1))) == 101
+    assert not plain.supplied.any() and np.all(plain.during.eta < 0.02)

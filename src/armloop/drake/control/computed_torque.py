@@ -46,7 +46,7 @@ class AccelerationGains:
 
     def __post_init__(self) -> None:
         if self.ki is None:
-            object.__setattr__(self, "ki", np.zeros(len(self.kp) if np.ndim(self.kp) else 1))
+            object.__setattr__(self, "ki", np.zeros(np.size(self.kp)))
         check_gains(self, "kp", "kd", "ki")
 
     @staticmethod

@@ -62,11 +62,11 @@ class Controller:
 
         Raises `ValueError` when there is none for it.
         """
-        for name in (self.name, *self.models):
-            if self.models and name in models:
-                return models[name]
         if not self.models:
             return None
+        for name in (self.name, *self.models):
+            if name in models:
+                return models[name]
         given = ", ".join(models) or "none"
         raise ValueError(f"there is no model for the controller {self.name}; the models given are: {given}")
 

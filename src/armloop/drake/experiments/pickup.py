@@ -98,13 +98,9 @@ class _Run:
         self._simulator = Simulator(builder.Build())
         if view is not None:
             view.pace(self._simulator)
-        self._started = False
         self.context = self._simulator.get_mutable_context()
 
     def advance(self, until: float) -> None:
-        if not self._started:
-            self._simulator.Initialize()
-            self._started = True
         # real time goes on from here, however long the diagnosis took
         self._simulator.ResetStatistics()
         self._simulator.AdvanceTo(until)

@@ -28,8 +28,8 @@ from armloop.util.arrays import Array
 class WatchedRun:
     """What came of a run.
 
-    before, during, after : tracking up to the change, from it until what was named is fully supplied, and over the last
-        period of the reference; `during` is None when nothing was supplied
+    before, during, after : tracking up to the change, from it until what was named is fully supplied, and over the second
+        half of what follows the change; `during` is None when nothing was supplied
     known : what was named last; named_at : s, NaN if nothing was; alarmed_at : s, NaN if there was no alarm
     supplied : (N, n) torque that was added to the feedforward; given_back : how often it was taken out again
     """
