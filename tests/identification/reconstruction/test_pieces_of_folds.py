@@ -16,13 +16,12 @@ from armloop.identification.reconstruction import (
     physical,
     ripple,
     stepwise,
-    torque_checks,
 )
 from armloop.identification.reconstruction.block_length import Blocks
 from armloop.identification.reconstruction.inner_folds import InnerFolds
 from armloop.identification.reconstruction.physical import Body, physical_cuts, physics_notes
 from armloop.identification.reconstruction.step import PARTS, Candidates, StepPlan, candidates_of
-from armloop.identification.reconstruction.torque_checks import _Fit, _Problem
+from armloop.identification.reconstruction.torque_checks import Fit, Problem
 from armloop.laws.friction import FrictionTerm
 
 
@@ -191,8 +190,8 @@ class TestRipple:
         assert ripple._line(one, orders, 3) is None
 
 
-def fitted(relative: list[float], power: list[float], inertia: list[float]) -> _Fit:
-    return _Fit(np.array(relative), np.array(power), np.array(inertia))
+def fitted(relative: list[float], power: list[float], inertia: list[float]) -> Fit:
+    return Fit(np.array(relative), np.array(power), np.array(inertia))
 
 
 class TestTorqueChecks:
@@ -204,13 +203,8 @@ class TestTorqueChecks:
         assert not edge.physical([0]) and not edge.driven([0])
         assert fitted([0.1], [0.0], [-1.0]).driven([0])
 
-    def test_the_gain_of_an_exchange_is_a_geometric_mean(self) -> None:
-        plain, other = fitted([0.8, 0.5, 0.9], [0] * 3, [1] * 3), fitted([0.1, 0.5, 0.1], [0] * 3, [1] * 3)
-        assert torque_checks._gain(plain, other, 0, 1) == pytest.approx(np.sqrt(8))
-        assert torque_checks._gain(plain, other, 0, 2) == pytest.approx(np.sqrt(72))
-
     def problem(self, answers: Any) -> Any:
-        problem = object.__new__(_Problem)
+        problem = object.__new__(Problem)
         object.__setattr__(problem, "fit", answers)
         return problem
 
@@ -218,7 +212,7 @@ class TestTorqueChecks:
         plain = fitted([0.9, 0.9, 0.9], [1] * 3, [1] * 3)
 
         def found(*after: float, power: float = 1.0) -> list[tuple[int, int]]:
-            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> _Fit:
+            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> Fit:
                 key = tuple(order.tolist())
                 error = dict(zip([(1, 0, 2), (2, 1, 0), (0, 2, 1)], after, strict=True))[key]
                 return fitted([error] * 3, [power] * 3, [1] * 3)
@@ -238,9 +232,9 @@ class TestTorqueChecks:
             power: float = 1.0,
             halves: tuple[float, float] = (-1.0, -1.0),
             error: float = 0.5,
-            plain: _Fit = driven,
+            plain: Fit = driven,
         ) -> list[int]:
-            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> _Fit:
+            def fit(signs: np.ndarray, order: np.ndarray, half: int | None = None) -> Fit:
                 if half is not None:
                     return fitted([0.5] * 2, [1.0, halves[half]], [1.0, halves[half]])
                 if signs.tolist() == [1.0, -1.0]:

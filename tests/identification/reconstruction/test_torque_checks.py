@@ -3,15 +3,13 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, standing, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
-from armloop.identification.reconstruction import reconstruct, torque_checks
+from armloop.identification.reconstruction import plain_fits, reconstruct, torque_checks
 from armloop.identification.reconstruction.bandwidth import Table
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.robot.arm import load_arm
@@ -105,13 +103,13 @@ def test_measured_arms_are_not_accused_and_their_faults_are_found(measured: Path
                 check_torques([exchanged(log, j - 1, j, "tau")], arm, 8.0)
 
 
-class Fits(torque_checks._Problem):
+class Fits(torque_checks.Problem):
     """Fits that are given: by the joints whose sign is turned, by their order, and by the half of the blocks."""
 
-    def __init__(self, **fits: torque_checks._Fit) -> None:
+    def __init__(self, **fits: torque_checks.Fit) -> None:
         object.__setattr__(self, "fits", fits)
 
-    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks._Fit:
+    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks.Fit:
         turned = "".join(str(j + 1) for j in np.flatnonzero(signs < 0))
         name = f"half_{half}" if half is not None else f"turned_{turned}"
         if (order != np.arange(len(order))).any():
@@ -119,8 +117,8 @@ class Fits(torque_checks._Problem):
         return self.fits.get(name, fit_of([0.5, 0.5], [-1.0, -1.0], [-1.0, -1.0]))  # type: ignore[attr-defined]
 
 
-def fit_of(relative: list[float], power: list[float], inertia: list[float]) -> torque_checks._Fit:
-    return torque_checks._Fit(np.array(relative), np.array(power), np.array(inertia))
+def fit_of(relative: list[float], power: list[float], inertia: list[float]) -> torque_checks.Fit:
+    return torque_checks.Fit(np.array(relative), np.array(power), np.array(inertia))
 
 
 GOOD = [1.0, 1.0]
@@ -179,11 +177,11 @@ class TestTurnedSigns:
 class Scaled(Fits):
     """Fits that are given, with the factor that each half of the blocks says of each joint."""
 
-    def __init__(self, factors: list[tuple[float, float]], **fits: torque_checks._Fit) -> None:
+    def __init__(self, factors: list[tuple[float, float]], **fits: torque_checks.Fit) -> None:
         super().__init__(**fits)
         object.__setattr__(self, "factors", factors)
 
-    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks._Fit:
+    def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks.Fit:
         (changed,) = np.flatnonzero(signs != 1)
         return self.fits[f"scaled_{changed + 1}"]  # type: ignore[attr-defined, no-any-return]
 
@@ -236,7 +234,7 @@ class TestGains:
     def test_each_half_has_a_factor_of_its_own(self) -> None:
         """A gain that changes from block to block, to and fro: two factors, which contradict each other."""
         log = run(1)
-        problem = torque_checks._Problem.of([log], three_axis(), 10.0)
+        problem = torque_checks.Problem.of([log], three_axis(), 10.0)
         assert problem is not None
         for half, factor in enumerate((2.0, 5.0)):
             problem.table.tau[problem.table.blocks % 2 == half, 1] *= factor
@@ -267,34 +265,6 @@ class TestExchanges:
         )
         assert fits.better_exchanged(plain) == [(1, 2)]
 
-    @pytest.mark.parametrize(
-        ("relative", "inertia", "exchanged"),
-        [
-            ([0.39, 0.2], 1.0, True),
-            ([0.45, 0.2], 1.0, False),
-            ([0.61, 0.1], 1.0, False),
-            ([0.39, 0.2], -1.0, False),
-        ],
-    )
-    def test_whole_joints_are_if_all_torques_are_explained_twice_as_well(
-        self, relative: list[float], inertia: float, exchanged: bool, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        asked: list[MotionLog] = []
-
-        def of(logs: list[MotionLog], arm: object, cutoff_hz: float) -> Fits:
-            asked.extend(logs)
-            return Fits(turned_=fit_of(relative, GOOD, [1.0, inertia]))
-
-        monkeypatch.setattr(torque_checks._Problem, "of", staticmethod(of))
-        q = np.arange(6.0).reshape(3, 2)
-        log = unchecked_log(time=np.arange(3.0), q=q, v=q + 10, tau=q + 20, name="run")
-        arm: Any = SimpleNamespace(n=2)
-        plain = fit_of([0.5, 0.7], GOOD, [-1.0, 1.0])
-        # errors of 0.7 and 0.5, exchanged, in the geometric mean more than twice as much
-        assert torque_checks._whole_joints([log], arm, 10.0, plain, 0, 1) == exchanged
-        assert (asked[0].q == q[:, ::-1]).all() and (asked[0].v == q[:, ::-1] + 10).all()
-        assert (asked[0].tau == q[:, ::-1] + 20).all()
-
 
 def test_errors_friction_and_inertia_of_a_fit() -> None:
     """Two joints, one base parameter that is an inertia of both, and the friction of each."""
@@ -313,7 +283,7 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     table = Table(columns, tau, np.arange(N) // 10, moving, standing(N, 2), 1)
     mass = np.zeros((3, 2, 2, 1))
     mass[:, 0, 0, 0], mass[:, 1, 1, 0] = [1.0, 2.0, 3.0], 5.0
-    problem = torque_checks._Problem(table, mass, 1)
+    problem = torque_checks.Problem(table, mass, 1)
     found = problem.fit(np.ones(2), np.arange(2))
     sizes = [np.sqrt(np.mean(tau[rows, j] ** 2)) for j, rows in enumerate(moving.T)]
     np.testing.assert_allclose(found.relative, 0.1 / np.array(sizes), rtol=0.08)
@@ -339,7 +309,7 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     assert problem.fit(np.ones(2), np.arange(2), 1).relative.tolist() == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
-def small_problem() -> torque_checks._Problem:
+def small_problem() -> torque_checks.Problem:
     """Two joints with two shared parameters and the friction of each; neither is explained but for noise."""
     rng = np.random.default_rng(7)
     N = 60
@@ -350,7 +320,7 @@ def small_problem() -> torque_checks._Problem:
         columns[:, j, 2 + 3 * j : 5 + 3 * j] = np.column_stack([np.sign(v), v, np.ones(N)])
     tau = columns @ np.arange(1.0, 9.0) + rng.normal(size=(N, 2)) * [0.5, 5.0]
     table = Table(columns, tau, np.arange(N) // 5, rng.random((N, 2)) > 0.2, standing(N, 2), 1)
-    return torque_checks._Problem(table, np.ones((1, 2, 2, 2)), 2)
+    return torque_checks.Problem(table, np.ones((1, 2, 2, 2)), 2)
 
 
 @pytest.mark.parametrize("half", [None, 0, 1])
@@ -402,8 +372,8 @@ def test_each_joint_has_two_hundred_instants(
     table = Table(
         np.zeros((300, 2, 8)), np.zeros((300, 2)), np.zeros(300, np.intp), moving, standing(300, 2), 1
     )
-    monkeypatch.setattr(torque_checks, "table_at", lambda *_: table)
-    problem = torque_checks._Problem.of([run(seconds=2.0)], three_axis(), 10.0)
+    monkeypatch.setattr(plain_fits, "table_at", lambda *_: table)
+    problem = torque_checks.Problem.of([run(seconds=2.0)], three_axis(), 10.0)
     assert (problem is not None) == enough
     if problem is not None:
         assert len(problem.table.tau) == 100 and len(problem.mass) == 67  # every third of 200 postures
