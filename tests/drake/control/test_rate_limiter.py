@@ -40,6 +40,27 @@ def test_in_a_loop_the_arm_starts_with_the_torque_that_holds_it():
     assert change.max() == pytest.approx(0.02) and np.all(change <= 0.02 + 1e-12)
 
 
+class Pulls:
+    """A model that asks for more than two of the drives have."""
+
+    def feedforward(self, q, v, vdot, step):
+        return np.array([1e3, -1e3, 1.0])
+
+
+def test_drives_were_held_at_the_start_by_what_they_can_give_of_what_is_asked():
+    builder = DiagramBuilder()
+    arm = add_arm_with_controller(
+        builder, "three_axis", PidGains.paper(3), paper_reference(), Pulls(), torque_rate=[20.0] * 3
+    )
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    arm.start_on_reference(context)
+    tau = arm.drives.GetOutputPort("tau").Eval(arm.drives.GetMyContextFromRoot(context))
+    effort = [joint.effort for joint in arm.plant.arm.joints]
+    # half a count of an encoder, 6e-6 rad, is 5e-4 N*m of the paper's gains
+    assert_allclose(tau, [effort[0], -effort[1], 1.0], atol=1e-3)
+
+
 def test_what_does_not_fit_is_told():
     RateLimiter([0.5], [0.5], 0.01)
     with pytest.raises(ValueError, match="effort is for 2 joints, rate for 1"):

@@ -97,6 +97,15 @@ def test_friction_of_an_identified_model_is_linearised_by_its_derivative():
     assert_allclose(G, truth[2], atol=1e-4)
 
 
+def test_friction_of_a_sliding_joint_is_linearised_at_a_tenth_of_a_metre_per_second():
+    arm = load_arm("scara")
+    model = model_of(arm, friction=(FrictionTerm("viscous", 0.5), FrictionTerm("cubic", 2.0)))
+    _, F, _ = model_posture(model, [0.1, 0.3, 0.05, -0.5])
+    speed = np.where(arm.revolute, 1.0, 0.1)
+    assert (speed == 0.1).sum() == 1
+    assert_allclose(F, np.diag(0.5 + 2.0 * 3 * speed**2), atol=1e-9)
+
+
 def test_the_papers_gains_are_comfortable():
     arm = load_arm("three_axis")
     friction = [JointFriction(viscous=v) for v in (2.65, 1.82, 3.14)]

@@ -3,6 +3,7 @@
 import dataclasses
 import logging
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,3 +52,22 @@ def test_an_arm_with_meshes_is_drawn_as_sticks(tmp_path):
     arm = dataclasses.replace(arm, urdf=urdf)
     write_replay(tmp_path / "replay.html", arm, {"pid": result("pid", 3)})
     assert (tmp_path / "replay.html").is_file()
+
+
+class Rows:
+    """Positions of which it is asked which rows are shown."""
+
+    def __init__(self):
+        self.asked = []
+
+    def __getitem__(self, row):
+        self.asked.append(row)
+        return np.zeros(3)
+
+
+@pytest.mark.parametrize(("of", "every"), [({}, 1024 / 25), ({"frames_per_second": 32.0}, 32)])
+def test_as_many_frames_a_second_as_asked_for_from_the_first_sample_to_the_last(of, every, tmp_path):
+    """25 a second by default; of 1024 samples a second, whose times are exact, each frame shows the next one."""
+    run = SimpleNamespace(time=2.0 + np.arange(401) / 1024, q=Rows(), q_ref=Rows())
+    write_replay(tmp_path / "replay.html", load_arm("three_axis"), {"pid": run}, **of)
+    assert run.q.asked == run.q_ref.asked == np.ceil(np.arange(0, 400, every)).tolist()
