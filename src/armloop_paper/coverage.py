@@ -116,7 +116,7 @@ def _one(
 ) -> _Run:
     samples = preprocess(design.logs(disturbance, seed), truth.conditioning)
     fitted = _fitted(samples, len(design.motions[0].starts), len(design.motions[1].starts), jointly)
-    _, parts = solve_given_terms(truth, samples, fitted)
+    _, parts = solve_given_terms(truth, samples, fitted, 3)
     true_values = {_key(u): u.value for problem in problems(truth) for u in problem.unknowns}
     kinds, error, block, independent, half = [], [], [], [], []
     for part in parts:

@@ -335,6 +335,13 @@ def test_what_is_regressed_at_a_corner() -> None:
     np.testing.assert_array_equal(twice.blocks, np.concatenate([blocks, blocks + blocks[-1] + 1]))
 
 
+@pytest.mark.parametrize(("samples", "stride"), [(6000, 2), (5990, 1)])
+def test_nine_thousand_rows_are_enough(samples: int, stride: int) -> None:
+    log, arm = run(seconds=samples / 100), three_axis()
+    table = bandwidth.table_at([log], arm, BaseParameters.of_arm(arm, rotors=True), TEN_HZ, 5.0, [5.0])
+    assert log.samples == samples and table is not None and table.stride == stride
+
+
 def test_many_samples_are_thinned_to_the_same_instants_at_every_corner(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from armloop.data.motion import Motion
 from armloop.identification.reconstruction import physical
@@ -13,6 +14,7 @@ from armloop.identification.reconstruction.physical import (
 )
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.laws.friction import FrictionTerm
+from armloop.regression.constrained import TooCostly
 from armloop.util.errors import ExcitationError
 
 
@@ -133,13 +135,13 @@ def test_what_is_contradicted_by_more_than_chance_is_kept_at_the_motions_posture
     solution = Solution(theta, np.eye(2), theta, np.ones(1))
     asked: list[int] = []
 
-    def kept(insist: bool = False, memory: float = 1.0, **cost: float) -> str:
-        """So much more squared error over the limits and at the motion's postures, with two conditions."""
+    def kept(insist: bool = False, memory: float = 1.0, binding: int = 2, **cost: float) -> str:
+        """So much more squared error over the limits and at the motion's postures, with so many conditions."""
 
         def moved(_: object, body: object, laws: object, q: np.ndarray, rng: object, most: float) -> object:
             where = "trained" if rng is None else "limits"
             asked.append(len(q))
-            return theta + np.array([np.sqrt(cost[where]), 0.0]), 2, None
+            return theta + np.array([np.sqrt(cost[where]), 0.0]), binding, None
 
         monkeypatch.setattr(physical, "_kept_positive", moved)
         return physical_solution(solution, arm_of_one([0.0] * 7), [[]], insist, memory).where
@@ -148,6 +150,11 @@ def test_what_is_contradicted_by_more_than_chance_is_kept_at_the_motions_posture
     assert kept(limits=13.7, trained=0.0) == "limits" and asked == [247]
     assert kept(limits=13.9, trained=13.7) == "trained" and asked[1:] == [247, 7]
     assert kept(limits=13.9, trained=13.9) == "free"
+    free = physical_solution(solution, arm_of_one([0.0]), [[]])
+    assert free.theta is theta and free.binding == 0
+    # 10.8 with one, and where none is left in the end
+    for binding in (0, 1):
+        assert kept(binding=binding, limits=10.9, trained=10.7) == "trained"
     assert kept(insist=True, limits=99.0, trained=99.0) == "limits"
     # what is said again by samples that are correlated counts once
     assert kept(memory=10.0, limits=137.0, trained=0.0) == "limits"
@@ -169,3 +176,42 @@ def test_postures_that_are_alike_are_one(monkeypatch: pytest.MonkeyPatch) -> Non
     assert physical._violated(
         arm_of_one([0.0]), np.ones(2), np.zeros((1, 2)), np.random.default_rng(0)
     ).shape == (0, 1)
+
+
+def test_the_rows_that_bind_are_those_met_with_equality_of_unit_length() -> None:
+    theta = np.array([2.0, 2.0, 5.0])
+    solution = Solution(theta, np.eye(3), theta, np.ones(1))
+    # of two addends of four each the sum is less, and more, than a ten-thousandth
+    known = np.array([[2.0, -2.0 + 3.6e-4, 0.0], [2.0, -2.0 - 4.4e-4, 0.0]])
+    kept, rows = physical._within(solution, lambda _: np.zeros((0, 3)), known, np.inf)
+    assert kept.tolist() == theta.tolist()
+    np.testing.assert_allclose(rows, known[:1] / np.linalg.norm(known[0]))
+    # what is violated is met, and what was known to bind still does
+    violated = np.array([0.0, 2.0, -1.0])
+    kept, rows = physical._within(
+        solution, lambda x: violated[None] if violated @ x < -1e-9 else np.zeros((0, 3)), known[:1], np.inf
+    )
+    np.testing.assert_allclose([kept @ violated, kept @ known[0]], 0.0, atol=1e-8)
+    assert len(rows) == 2
+    np.testing.assert_allclose(np.linalg.norm(rows, axis=1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("positive", "conditions"), [((False, False), 2), ((True, False), 3), ((True, True), 4)]
+)
+def test_a_search_ends_at_what_no_number_of_conditions_costs_by_chance(
+    positive: tuple[bool, ...], conditions: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float] = []
+
+    def costly(*arguments: object) -> None:
+        asked.append(float(str(arguments[-1])))
+        raise TooCostly
+
+    monkeypatch.setattr(physical, "_kept_positive", costly)
+    theta = np.array([1.0, 2.0])
+    solution = Solution(theta, np.eye(2), theta, np.ones(1), repeats=2.0)
+    assert physical_solution(solution, arm_of_one([0.0], positive), [[]]).where == "free"
+    assert asked == pytest.approx([2 * chi2.ppf(0.999, conditions)] * 2)
+    physical_solution(solution, arm_of_one([0.0], positive), [[]], insist=True)
+    assert asked[2:] == [np.inf, np.inf]

@@ -106,7 +106,7 @@ class Fitting:
         used = np.asarray(usable.any(axis=1))
         fold, inside = inner_folds(samples, used, self._options)
         numbers = block_numbers(samples.motion, _BLOCK_SECONDS)
-        block = np.unique(fold * (numbers.max() + 1) + numbers, return_inverse=True)[1]
+        block = np.unique(np.column_stack([fold, numbers]), axis=0, return_inverse=True)[1].ravel()
         sample, joint = (x.astype(np.intp) for x in np.nonzero(chunk.independent[:, None] & usable))
         every = max(1, len(sample) // _ROWS)
         sample, joint = sample[::every], joint[::every]

@@ -28,7 +28,7 @@ _WORTHWHILE = 1e-3
 
 
 def solve_given_terms(
-    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int = 3
+    model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted], iterations: int
 ) -> tuple[ReconstructedModel, list[Errors]]:
     """Least squares, step by step, over a model's own terms; Gauss-Newton for v_s.
 
