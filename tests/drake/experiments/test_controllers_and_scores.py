@@ -9,12 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from exact_parts import model_of
 from numpy.testing import assert_allclose
+from pydrake.systems.framework import DiagramBuilder
 
-from armloop.drake.control import controllers
+from armloop.drake.control import bounded_feedforward, controllers
+from armloop.drake.control.bounded_feedforward import BoundedReference
 from armloop.drake.control.controllers import controller_named
 from armloop.drake.experiments import collection, scenario_references, tracking
-from armloop.experiment.excitation import MotionRanges
+from armloop.drake.experiments.scenarios import load_tracking
+from armloop.experiment.excitation import MotionRanges, TableReference
 from armloop.robot.arm import load_arm
 from armloop.schemas.scenarios import ReferenceData
 from armloop.util.errors import ScenarioError
@@ -88,6 +92,50 @@ class TestControllers:
         assert_allclose(controllers._as_stiff(scenario, None).kp, [400.0, 400.0])
         scenario.bandwidth = 3.0
         assert_allclose(controllers._as_stiff(scenario, model).kp, [9.0, 9.0])
+
+    @pytest.mark.parametrize("rate", [None, np.array([30.0, 20.0, 10.0])])
+    def test_what_keeps_limits_plans_with_its_share_of_them(
+        self, rate: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[Any] = []
+        monkeypatch.setattr(bounded_feedforward, "bounded_reference", lambda *of: asked.append(of))
+        scenario: Any = SimpleNamespace(
+            plant=SimpleNamespace(arm=ARM), reference="reference", used=0.8, rate=rate
+        )
+        model = model_of(ARM)
+        controller_named("bounded").reference(scenario, model)
+        ((reference, given, effort, limit),) = asked
+        assert reference == "reference" and given is model
+        assert_allclose(effort, [0.8 * joint.effort for joint in ARM.joints])
+        assert limit is None if rate is None else limit.tolist() == [24.0, 16.0, 8.0]
+        other: Any = object()
+        with pytest.raises(ValueError, match="bounded needs a reconstructed model"):
+            controller_named("bounded").reference(scenario, other)
+
+    def test_torques_that_a_motion_was_planned_with_are_what_is_fed_forward(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        scenario = load_tracking("three_axis_tracking")
+        ends = np.array([0.0, scenario.reference.duration])
+        still = np.zeros((2, 3))
+        torques = np.array([[1.0, 2.0, 3.0], [5.0, 2.0, -1.0]])
+        deviation = TableReference(ends, still, still, still)
+
+        class Planned(controllers.Pid):
+            name = "planned"
+
+            def reference(self, scenario: Any, model: Any) -> Any:
+                return BoundedReference(scenario.reference, deviation, torques)
+
+        monkeypatch.setattr(tracking, "controller_named", lambda name: Planned())
+        builder = DiagramBuilder()
+        source = tracking.add_controlled_arm(builder, scenario, "planned", {}).reference
+        builder.Build()
+        context = source.CreateDefaultContext()
+        for part in (0.0, 0.25, 1.0):
+            context.SetTime(part * ends[1])
+            fed = source.GetOutputPort("tau_ff").Eval(context)
+            assert_allclose(fed, torques[0] + part * (torques[1] - torques[0]), atol=1e-12)
 
 
 def test_a_run_is_scored_over_its_interval_in_degrees_and_millimetres() -> None:

@@ -19,7 +19,7 @@ from armloop.drake.experiments.pickup import run_pickup
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.experiments.tracking import run_tracking, track_in_view
 from armloop.drake.plant.plant import add_links
-from armloop.drake.view import scene
+from armloop.drake.view import live, scene
 from armloop.drake.view.live import LiveView
 from armloop.robot.arm import load_arm
 
@@ -65,6 +65,34 @@ def test_the_server_listens_on_the_loopback_address_only(brief, caplog):
     with urllib.request.urlopen(view.address, timeout=10) as page:
         assert b"<script" in page.read()
     assert not view.wait(5.0)  # nobody looks, and at rate 0 nobody is waited for
+
+
+class Clock:
+    """Time that goes on when somebody sleeps, and a page that somebody opens at a moment."""
+
+    def __init__(self, opened):
+        self.now, self.opened = 100.0, 100.0 + opened
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+    def GetNumActiveConnections(self):
+        return int(self.now >= self.opened)
+
+
+@pytest.mark.parametrize(
+    ("rate", "opened", "seen", "after"),
+    [(1.0, 0.0, True, 0.0), (1.0, 0.45, True, 0.5), (0.5, 1.05, False, 1.0), (0.0, 0.5, False, 0.0)],
+)
+def test_a_browser_is_waited_for_as_long_as_is_said(brief, rate, opened, seen, after, monkeypatch):
+    view, clock = LiveView(brief.plant.arm, rate), Clock(opened)
+    monkeypatch.setattr(view, "_meshcat", clock)
+    monkeypatch.setattr(live, "time", clock)
+    assert view.wait(0.95) == seen
+    assert clock.now - 100.0 == pytest.approx(after)
 
 
 def test_what_is_shown_moves_as_without(brief):
