@@ -164,6 +164,7 @@ def test_a_reference_from_a_file(tmp_path):
             "kp has 2 numbers; it must have one number or one per joint, 3",
         ),
         ("plant: three_axis\nki: [-1]\n", "must not be negative"),
+        ("plant: three_axis\nki: [8, -1, 8]\n", "must not be negative"),
         ("plant: three_axis\nki: [.nan]\n", "must be a finite number"),
         ("plant: three_axis\nscore: [30, 50]\n", "score is .* in 0 to 40 s"),
         ("plant: three_axis\ncontrollers: [lqr]\n", "controllers: lqr; there are: pid"),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from exact_parts import model_of
 from numpy.testing import assert_allclose
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from armloop.drake.control.pid import PidGains
@@ -127,6 +128,20 @@ def test_a_loop_with_the_others_closed():
         closed = np.linalg.inv(np.eye(2) + L[0][np.ix_(rest, rest)])
         expected = L[0, i, i] - L[0][i, rest] @ closed @ L[0][rest, i]
         assert_allclose(cut_loop(L, i), [expected])
+
+
+def test_an_arm_under_held_torques_is_the_exponential_of_its_equations():
+    """x' = A x + B u, u' = 0 over a period (Van Loan 1978), of joints that all act on each other."""
+    rng = np.random.default_rng(3)
+    roots = rng.normal(size=(3, 3, 3))
+    M, F, G = (root @ root.T + np.eye(3) for root in roots)
+    h, none = 0.2, np.zeros((3, 3))
+    inverse = np.linalg.inv(M)
+    whole = np.block([[none, np.eye(3), none], [-inverse @ G, -inverse @ F, inverse], [none, none, none]])
+    expected = expm(h * whole)
+    sampled = SampledArm.of((M, F, G), h)
+    assert_allclose(sampled.A, expected[:6, :6], atol=1e-12)
+    assert_allclose(sampled.B, expected[:6, 6:], atol=1e-12)
 
 
 def test_a_closed_loops_step_is_the_controllers_law():

@@ -11,7 +11,6 @@ from armloop.drake.plant.config import PlantConfig
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.experiment.excitation import Reference
 from armloop.robot.arm import Arm
-from armloop.schemas.scenarios import PAPER
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +54,10 @@ class TrackingScenario:
     gains: PidGains
     reference: Reference
     score: tuple[float, float]
-    controllers: tuple[str, ...] = PAPER
-    seed: int = 0
-    bandwidth: float | None = None
-    pickup: Pickup | None = None
-    wear: Wear | None = None
-    rate: np.ndarray | None = None
-    used: float = 1.0
+    controllers: tuple[str, ...]
+    seed: int
+    bandwidth: float | None
+    pickup: Pickup | None
+    wear: Wear | None
+    rate: np.ndarray | None
+    used: float
