@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import three_axis
+from synthetic import fourier_motion, three_axis
 
 from armloop.data.motion import Motion, Samples
+from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import catalogue
 from armloop.identification.reconstruction.catalogue import Law, Laws, permanent
+from armloop.identification.reconstruction.rigid_body import body_of
 from armloop.robot.arm import load_arm
 
 RNG = np.random.default_rng(4)
@@ -49,6 +51,15 @@ def test_the_mass_matrix_is_what_an_acceleration_of_one_adds() -> None:
         silent = Laws([Law(effect(INERTIAS, **{flag: True}), 2.0, 2)])
         assert silent.inertial(arm, q) == [False, False] and silent.mass(arm, q).shape == (4, 3, 3, 2)
     assert Laws().mass(arm, q).shape == (4, 3, 3, 0)
+
+
+def test_the_mass_matrix_of_bodies_and_laws_is_what_its_columns_add_up_to() -> None:
+    arm, q = three_axis(), RNG.normal(size=(5, 3))
+    base, laws = BaseParameters.of_arm(arm, rotors=True), Laws([Law(effect(INERTIAS), 2.0, 2)])
+    body = body_of(arm, base, laws, fourier_motion(2.0, 100.0, 1))
+    theta = RNG.normal(size=base.count + 2)
+    np.testing.assert_allclose(body.mass(theta, q), body.columns(q) @ theta, atol=1e-9)
+    assert body.positive.tolist() == [*base.positive.tolist(), False, False]
 
 
 def test_a_column_that_is_constant_at_a_joint_and_not_zero_there() -> None:

@@ -10,6 +10,7 @@ from synthetic import three_axis
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import lagrangian, rigid_body
 from armloop.regression.moments import Moments
+from armloop.robot.arm import load_arm
 
 
 def moments(beta: list[float], noise: float = 0.0, seed: int = 0) -> Moments:
@@ -79,3 +80,10 @@ def test_priors_are_the_drawings_by_so_many_kilograms() -> None:
     unit = np.concatenate([np.tile([1, *[length] * 3, *[length**2] * 6], 3), np.full(3, length**2)])
     covariance = base.grouping @ np.diag(unit**2) @ base.grouping.T
     np.testing.assert_allclose(np.linalg.inv(one.precision), covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_of_a_single_joint_what_is_not_known_lies_a_metre_away() -> None:
+    arm = load_arm("three_axis", lock={"joint_2": 0.0, "joint_3": 0.0})
+    base = BaseParameters.of_arm(arm, rotors=True)
+    prior = rigid_body._priors(arm, base, np.zeros(11 * arm.n))["links as in the URDF ± 1 kg"]
+    np.testing.assert_allclose(np.linalg.inv(prior.precision), base.grouping @ base.grouping.T)

@@ -163,7 +163,7 @@ class TestTurnedSigns:
         both = fit_of([0.3, 0.4], [0.6, 0.6], GOOD)
         assert Fits(turned_1=one, turned_12=both, half_0=plain, half_1=plain).turned(plain) == [0]
 
-    def test_no_friction_neither_brakes_nor_drives_and_no_inertia_is_none(self) -> None:
+    def test_no_friction_neither_brakenor_drives_and_no_inertia_is_none(self) -> None:
         none = fit_of([0.1, 0.1], [0.0, 0.0], [1.0, 0.0])
         assert none.physical([0]) and not none.physical([0, 1]) and not none.driven([1])
         assert fit_of([0.1], [0.0], [-1.0]).driven([0]) and not fit_of([0.1], [0.1], [-1.0]).driven([0])
@@ -293,6 +293,10 @@ def test_errors_friction_and_inertia_of_a_fit() -> None:
     assert found.power[0] == pytest.approx((brakes - drives) / (brakes + drives), abs=0.03)
     assert found.power[1] == 0.0  # friction of less than a fiftieth of the torque says nothing
     assert problem.fit(np.full(2, 10.0), np.arange(2)).power.tolist() == pytest.approx(found.power.tolist())
+    for level, brake in ((0.015, 0.0), (0.03, 1.0)):
+        tau[:, 1] += level * sizes[1] * np.sign(v[:, 1])
+        assert problem.fit(np.ones(2), np.arange(2)).power[1] == pytest.approx(brake, abs=0.2)
+        tau[:, 1] -= level * sizes[1] * np.sign(v[:, 1])
     turned = problem.fit(-np.ones(2), np.arange(2))
     np.testing.assert_allclose(turned.power, -found.power)
     np.testing.assert_allclose(turned.inertia, -found.inertia)

@@ -19,11 +19,13 @@ from armloop.export.formula import formula
 from armloop.laws.effects import (
     INERTIA,
     REGISTRY,
+    Context,
     Effect,
     Element,
     Law,
     LinearJointEffect,
     Parameter,
+    ProfiledJointEffect,
     effect,
     hypotheses,
     register,
@@ -55,6 +57,18 @@ class Unknown(LinearJointEffect):
 
     def column(self, motion, joint):
         return motion.v[:, joint]
+
+
+class Smoothed(ProfiledJointEffect):
+    name = "smoothed_step"
+    parameter, unit, law = "level", "TAU", "c tanh(v/s)"
+    shape_name, shape_unit = "speed", "POS/s"
+
+    def column(self, motion, joint, *shape):
+        return np.tanh(motion.v[:, joint] / shape[0])
+
+    def shapes(self, context):
+        return [0.1, 0.2, 0.4]
 
 
 @pytest.fixture(autouse=True)
@@ -380,3 +394,23 @@ def test_one_sample_is_a_motion_of_its_own():
         [v.tolist()],
         [vdot.tolist()],
     ]
+
+
+def test_a_profiled_effect_of_ones_own_has_a_positive_shape_with_a_value_between_those_tried():
+    level, speed = Smoothed.parameters
+    assert (level.name, level.unit, level.positive) == ("level", "TAU", True)
+    assert (speed.name, speed.unit, speed.shape) == ("speed", "POS/s", "continuous")
+    assert speed.fault(0.5) == "" and speed.fault(0.0) == "must be above 0" and Smoothed.complexity == 2
+    arm, motion = three_axis(), fourier_motion(2.0, 100.0, 1)
+    law, context = Smoothed(2), Context(arm, motion)
+    x = motion.v[:, 1] / 0.2
+    # the value, and the derivative by the logarithm of the shape, by a central difference of 0.03
+    own = np.column_stack([np.tanh(x), -x / np.cosh(x) ** 2])
+    np.testing.assert_allclose(law.columns(context, 0.2), own, atol=3e-4)
+    # what is half of the level and a tenth more in log s
+    found = law.estimates(arm, np.array([0.5, 0.05]), np.zeros((2, 2)), 0.2)
+    values = {key: one.value for key, one in found.items()}
+    assert values == pytest.approx({"level": 0.5, "speed": 0.2 * np.exp(0.1)})
+    expected = np.zeros((motion.samples, 3))
+    expected[:, 1] = 0.5 * np.tanh(motion.v[:, 1] / values["speed"])
+    np.testing.assert_allclose(law.torque(context, values), expected, atol=1e-12)

@@ -17,6 +17,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.dynamics.physics import joint_limits
 from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.catalogue import Laws
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.fitting import Fitting
@@ -77,15 +78,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     fitting = Fitting(arm, training, design, _priors(arm, base, nominal), options, progress)
     ladder, laws = fitting.chosen()
     r = base.count + laws.count
-    shape = Body(
-        lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
-        lambda theta, q: (
-            mass_matrix(arm, base, theta[: base.count], q) + laws.mass(arm, q) @ theta[base.count :]
-        ),
-        postures(motion),
-        *joint_limits(arm, motion_range(motion)),
-        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
-    )
+    shape = body_of(arm, base, laws, motion)
 
     def physical(
         solution: Solution, friction: list[list[FrictionTerm]]
@@ -140,6 +133,19 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     ]
     found.notes += physics_notes(final.history)
     return found
+
+
+def body_of(arm: Arm, base: BaseParameters, laws: Laws, motion: Motion) -> Body:
+    """The mass matrix of base parameters and of laws that add inertia."""
+    return Body(
+        lambda q: np.concatenate([mass_columns(arm, base, q), laws.mass(arm, q)], axis=3),
+        lambda theta, q: (
+            mass_matrix(arm, base, theta[: base.count], q) + laws.mass(arm, q) @ theta[base.count :]
+        ),
+        postures(motion),
+        *joint_limits(arm, motion_range(motion)),
+        np.concatenate([base.positive, np.zeros(laws.count, dtype=bool)]),
+    )
 
 
 def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:

@@ -62,7 +62,7 @@ class _Fit:
         self.onto = rows @ self.P
         self.own = 1.0 - np.einsum("ps,ps->p", self.onto, rows)
         self.left = moments.b - self.onto @ moments.b[support]
-        self.rss = max(moments.yy - float(self.beta @ moments.b[support]), 0.0)
+        self.rss = moments.yy - float(self.beta @ moments.b[support])
 
     def losses(self) -> Array:
         """(s,) by how much dropping each term alone would raise the squared error."""
@@ -224,7 +224,7 @@ class _Search:
         # All have as many terms: the least error is the best.
         k = int(np.argmin(np.where(gain > 0, rss - gain, np.inf)))
         rest = np.delete(fit.support, some[k])
-        score = self.problem.criterion(max(float(rss[k] - gain[k]), 0.0), len(rest) + added)
+        score = self.problem.criterion(rss[k] - gain[k], len(rest) + added)
         return float(score), np.concatenate([rest, chosen[k]])
 
 

@@ -105,7 +105,7 @@ class Reduction:
         return Reduction(moments, forced, free, unit * signal, onto, yy, reduced)
 
     def part(self, part: Moments) -> Moments:
-        """Moments of a part of the data, in the same columns and units as the whole."""
+        """Moments of a part of the data, in the same columns and units as the whole, which leaves some signal."""
         forced, free, onto = self.forced, self.free, self.onto
         G, b, yy = part.G[np.ix_(free, free)], part.b[free], part.yy
         if len(forced):
@@ -114,11 +114,9 @@ class Reduction:
             G = G - onto.T @ mixed - mixed.T @ onto + onto.T @ F @ onto
             b = b - onto.T @ part.b[forced] - mixed.T @ own + onto.T @ F @ own
             yy = yy - 2 * float(own @ part.b[forced]) + float(own @ F @ own)
-        signal = np.sqrt(self.yy) or 1.0
+        signal = np.sqrt(self.yy)
         unit = self.scale / signal
-        return Moments(
-            G * np.outer(unit, unit), b * unit / signal, yy / self.yy if self.yy else 0.0, part.count
-        )
+        return Moments(G * np.outer(unit, unit), b * unit / signal, yy / self.yy, part.count)
 
     def coefficients(self, beta: Array) -> Array:
         """(all columns,) coefficients of β of the reduced problem, the forced ones by least squares given β."""
