@@ -23,7 +23,6 @@ import os
 import re
 import resource
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -38,7 +37,7 @@ sys.dont_write_bytecode = True
 
 import pytest  # noqa: E402
 from places import PACKAGE, ROOT, Mutant, mutants  # noqa: E402
-from trace_lines import ARGUMENTS, KEPT, Traced, ends_with_parent, traced  # noqa: E402
+from trace_lines import ARGUMENTS, KEPT, Traced, ended, ends_with_parent, traced  # noqa: E402
 
 #: Rooms whose numerics are changed; the tests that must see it lie in the folder of the same name.
 ROOMS = (
@@ -61,8 +60,6 @@ AT_HAND = (
 )
 #: Times what its tests take that a mutant may take, and seconds that everything else may.
 PATIENCE, MARGIN = 3.0, 15.0
-#: Seconds without any work after which a mutant that waits for something is dead.
-WAITING = 300.0
 #: Seconds of its room's quick tests that a mutant is tried on, and of those that are left, marked slow or not, and of the
 #: rooms that guard it: the quickest that execute its statement. One that they do not see counts as survived, though a
 #: longer test may see it.
@@ -154,12 +151,6 @@ def _try(tests: list[Traced], source: Path, pipe: int) -> None:
     os._exit(pytest.main([*ARGUMENTS, *files], plugins=[_Only([test.name for test in tests], pipe)]))
 
 
-def _worked(process: int) -> int:
-    """Ticks of the processor's time that a process has had (Linux: proc_pid_stat(5))."""
-    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-    return int(fields[11]) + int(fields[12])
-
-
 def killer(tests: list[Traced], source: Path) -> str | None:
     """The first of the tests that fails with the package there, or what else ended them; None if all pass."""
     read, write = os.pipe()
@@ -170,19 +161,8 @@ def killer(tests: list[Traced], source: Path) -> str | None:
         finally:
             os._exit(99)
     os.close(write)
-    # the limit is on the processor's time, which others do not take; this one is for a test that waits
-    status, worked, since = 0, -1, time.monotonic()
-    while not (done := os.waitpid(child, os.WNOHANG))[0] and time.monotonic() < since + WAITING:
-        if (now := _worked(child)) != worked:
-            worked, since = now, time.monotonic()
-        time.sleep(0.02)
-    try:
-        os.killpg(child, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        pass
-    if not done[0]:
-        done = os.waitpid(child, 0)
-    status = os.waitstatus_to_exitcode(done[1])
+    # the limit is on the processor's time, which others do not take; beside it none may only wait
+    status = ended(child)
     name = os.read(read, 10_000).decode()
     os.close(read)
     if status == pytest.ExitCode.OK:
