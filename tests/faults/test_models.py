@@ -67,6 +67,11 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
     (("components",), [None, {}, "x"], r"components is"),
     (("components", 0, "kind"), ["magic", None, ..., 3], "kind|unknown"),
     (("components", 0, "parameters"), [None, [], [1.0] * 7, ["a"] * 30, [1e300] * 30, ...], "parameters"),
+    (
+        ("components", 0, "parameters", 20),
+        [1e9, -2e6],
+        "rigid_body: the mass of link 3 is .*; no link has more than 1e",
+    ),
     (("components", 0, "base_parameters"), [None, [], {"m1": "x"}, {"m1": None}, ...], "base_parameters"),
     (
         ("friction",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +19,14 @@ from armloop.util.errors import InputError
 Call = Callable[[SimpleNamespace], Any]
 CSV = "run.csv"
 
+
+def with_nan(motion: Motion, name: str, value: float) -> Motion:
+    """A motion with a number of joint 2 that is none, at sample 3."""
+    x = getattr(motion, name).copy()
+    x[3, 1] = value
+    return replace(motion, **{name: x})
+
+
 #: What was handed in, and what is said of it.
 WRONG: dict[str, tuple[Call, str]] = {
     "a log's path that is None": (
@@ -28,6 +37,7 @@ WRONG: dict[str, tuple[Call, str]] = {
     "a log in place of its path": (lambda x: al.read_log(x.run), "it is of type MotionLog"),
     "a list in place of a path": (lambda x: al.read_log([CSV]), "it is of type list"),
     "paths that are a number": (lambda x: al.read_logs(3), "a list of them; it is of type int"),
+    "no path of a log": (lambda x: al.read_logs([]), "there is none; give one at least"),
     "logs in place of their paths": (lambda x: al.read_logs([x.run]), "it is of type MotionLog"),
     "gains in text": (lambda x: al.read_log(CSV, drive_gains="1,1,1"), "drive_gains is no array of numbers"),
     "an arm that is a list": (
@@ -163,6 +173,14 @@ WRONG: dict[str, tuple[Call, str]] = {
     "a step that is none": (
         lambda x: x.model.feedforward(*np.zeros((3, 3)), step=0),
         "step is 0; it must be 1, 2 or 3",
+    ),
+    "a motion that is nowhere": (
+        lambda x: x.model.predict(with_nan(x.motion, "vdot", np.nan)),
+        "vdot2 of the motion is nan at sample 3; every number must be finite",
+    ),
+    "a motion that is everywhere": (
+        lambda x: x.model.predict(with_nan(x.motion, "q", -np.inf)),
+        "q2 of the motion is -inf at sample 3",
     ),
     "a step of a motion that is none": (lambda x: x.model.predict(x.motion, step=4), "step is 4; it must be"),
     "two joints": (

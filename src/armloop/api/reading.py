@@ -51,7 +51,7 @@ def read_logs(
 ) -> list[MotionLog]:
     """Read several logs: paths, or a pattern such as ``"logs/*.csv"`` (in the order of their names).
 
-    Arguments and errors as of :func:`read_log`; a pattern that matches nothing raises ``LogError``.
+    Arguments and errors as of :func:`read_log`; no path, and a pattern that matches nothing, raise ``LogError``.
     """
     if isinstance(paths, str | Path):
         pattern = str(paths)
@@ -65,6 +65,8 @@ def read_logs(
             raise LogError(
                 f"paths of logs must be text, a pathlib.Path or a list of them; it is of type {type(paths).__name__}"
             ) from None
+        if not found:
+            raise LogError("paths of logs: there is none; give one at least")
     arm = None if arm is None else as_arm(arm)
     return [read_log(path, arm, tau_unit=tau_unit, drive_gains=drive_gains) for path in found]
 

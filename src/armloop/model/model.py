@@ -317,6 +317,13 @@ class ReconstructedModel:
             raise ModelError(
                 f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
             )
+        for name in ("q", "v", "vdot"):
+            x = getattr(motion, name)
+            if not math.isfinite(x.sum()) and not np.isfinite(x).all():
+                k, j = (int(i) for i in np.argwhere(~np.isfinite(x))[0])
+                raise ModelError(
+                    f"{name}{j + 1} of the motion is {x[k, j]} at sample {k}; every number must be finite"
+                )
 
 
 def _check_step(step: int) -> None:

@@ -281,10 +281,16 @@ def _agree(model: ModelData) -> None:
     for part in model.components:
         if isinstance(part, TermsData):
             lengths.append((f"terms of step {part.step}", part.joints))
-        elif isinstance(part, RigidBodyData) and len(part.parameters) not in (10 * n, 11 * n):
-            raise ModelError(
-                f"rigid_body: {len(part.parameters)} parameters, {n} links need {10 * n} or {11 * n}"
-            )
+        elif isinstance(part, RigidBodyData):
+            if len(part.parameters) not in (10 * n, 11 * n):
+                raise ModelError(
+                    f"rigid_body: {len(part.parameters)} parameters, {n} links need {10 * n} or {11 * n}"
+                )
+            for k, mass in enumerate(part.parameters[: 10 * n : 10]):
+                if abs(mass) > HEAVIEST:
+                    raise ModelError(
+                        f"rigid_body: the mass of link {k + 1} is {mass:g} kg; no link has more than {HEAVIEST:g}"
+                    )
     for place, values in lengths:
         if values is not None and len(values) != n:
             raise ModelError(f"{place}: {len(values)} joints, the arm has {n}")
