@@ -247,7 +247,9 @@ def test_recordings_are_joined_into_a_log_of_runs() -> None:
         "run", [recording(0.0)], Instruments(torque_noise=0.5), np.random.default_rng(1)
     )
     noise = 0.5 * np.sqrt(50 / 3) * np.random.default_rng(1).standard_normal((3, 1))
-    assert_allclose(noisy.tau - noise, [[3], [4], [5]], atol=1e-6)
+    assert noisy.tau.tolist() == np.round(np.array([[3], [4], [5]]) + noise, 6).tolist()
+    third = collection._as_log("run", [recording(1 / 3)], instruments, np.random.default_rng(1))
+    assert third.time.tolist() == [0.333333, 0.433333, 0.533333]
 
 
 def test_the_log_since_a_grasp() -> None:

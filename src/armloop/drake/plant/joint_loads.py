@@ -37,8 +37,8 @@ class ServoGains:
     p : N*m/rad (N/m) on the position, d : N*m*s/rad (N*s/m) on the velocity
     """
 
-    p: float = 5e4
-    d: float = 1e3
+    p: float
+    d: float
 
 
 @scalar_template("JointLoads_", __name__, [float, AutoDiffXd])
