@@ -72,6 +72,7 @@ def test_a_block_is_handed_on_as_it_was_sampled(model, monkeypatch) -> None:
     monitor._advance(context, context.get_mutable_state())
     ((motion, tau, slides),) = handed
     assert_allclose(motion.time, 3.0 + 0.1 * np.arange(10))
+    assert motion.starts.tolist() == [0]
     assert_allclose(np.hstack([tau, motion.q, motion.v, motion.vdot]), rows)
     assert np.argwhere(~slides).tolist() == [[3, 0], [3, 1], [3, 2]]
 

@@ -37,6 +37,12 @@ def test_it_records_every_other_millisecond_from_where_the_velocity_is_known(ref
     assert recorded(reference, window=0.0).time[0] == pytest.approx(1e-3)
 
 
+def test_by_default_it_steps_a_millisecond_and_the_velocity_is_known_after_six(reference) -> None:
+    arm = SpeedModeArm(load_arm("three_axis"), FRICTION)
+    assert_allclose(arm.follow(reference, rate=1e6).time, 1e-3 * np.arange(6, 400), atol=1e-12)
+    assert arm.plant.plant.time_step() == 1e-3
+
+
 def test_the_velocity_is_the_central_difference_of_the_positions(reference) -> None:
     every = recorded(reference, rate=1000.0)
     assert_allclose(every.v[20:-20], (every.q[40:] - every.q[:-40]) / 0.04, atol=1e-9)

@@ -18,10 +18,8 @@ T = TypeVar("T")
 
 
 def per_joint(values: list[float], n: int, where: str, *, spread: bool = True) -> Any:
-    """Return (n,) finite numbers of a list of n, or, with `spread`, of one."""
+    """Return (n,) numbers of a list of n, or, with `spread`, of one."""
     array = np.array(values, dtype=float)
-    if not np.isfinite(array).all():
-        raise ScenarioError(f"{where} is {values}; it must hold finite numbers")
     if spread and len(array) == 1:
         return np.full(n, array[0])
     if len(array) != n:

@@ -71,7 +71,7 @@ def JointLoads_(T: type) -> Any:
             *,
             effects: Realisation,
             servo: ServoGains | None = None,
-            X_tool: Array | None = None,
+            X_tool: Array,
             law: Law | None = None,
             converter: Any = None,
         ) -> None:
@@ -94,9 +94,9 @@ def JointLoads_(T: type) -> Any:
             # Python's own floats throughout: numpy's scalars take three times as long.
             self._rubbing = _rubbing(friction, effects.laws)
             self._explicit_laws = [
-                Placed(along, tuple(t for t in terms if t.element.part == "position"))
+                Placed(along, soft)
                 for along, terms in effects.laws
-                if any(t.element.part == "position" for t in terms)
+                if (soft := tuple(t for t in terms if t.element.part == "position"))
             ]
             self._memories = [
                 (along, term)
@@ -111,7 +111,7 @@ def JointLoads_(T: type) -> Any:
                 if t.element.part == "inertia"
             ]
             self._contacts = effects.contacts
-            self._tool = np.zeros(3) if X_tool is None else np.asarray(X_tool)[:3, 3]
+            self._tool = np.asarray(X_tool)[:3, 3]
             self._laws = [*effects.own, *([] if law is None else [law])]
             self._servo = servo
             self._state = self.DeclareVectorInputPort("state", 2 * n)
