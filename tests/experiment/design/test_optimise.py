@@ -18,6 +18,7 @@ from armloop.experiment.design import (
     data_ratio,
     excite,
     nominal_torque,
+    optimise,
     random_references,
     sampled,
     told_apart,
@@ -148,6 +149,19 @@ def test_a_seed_is_a_reference(made: Excitation) -> None:
     first, again, other = (design.reference.cosine for design in designs if design is not None)
     assert np.array_equal(first, again)
     assert not np.allclose(first, other)
+
+
+def test_iterations_are_counted_over_stages_and_starts(
+    made: Excitation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(optimise, "paced", lambda progress: progress)
+    monkeypatch.setattr(optimise, "_STAGES", ((30.0, 2), (1e3, 1)))
+    problem = Problem(Series(3, 6, 6.0), made.regression, CRITERIA["logdet"], made.limits)
+    problem.optimise(2, 1, progress=said.append)
+    counted = [int(line.split()[1]) for line in said if line.startswith("iteration")]
+    assert counted == [1, 2, 3, 4, 5, 6]
+    assert said[0] == "iteration 1 of at most 6" and said[3].startswith("start 1 of 2: ")
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ exactly, on a finer grid, by `Limits.fitted`; several random starts are followed
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +22,7 @@ from armloop.experiment.design.limits import Limits
 from armloop.experiment.design.series import Series, sampled
 from armloop.experiment.excitation import FourierReference
 from armloop.util.arrays import Array
-from armloop.util.progress import Progress, silent
+from armloop.util.progress import Progress, paced, silent
 
 #: Samples per period of the highest harmonic, while optimising and when checking.
 _COARSE, _FINE = 16, 320
@@ -59,10 +61,13 @@ class Problem:
         rng = np.random.default_rng(seed)
         best: tuple[float, FourierReference | None] = (-np.inf, None)
         values = []
+        stages = [(weight, max(1, round(effort * iterations))) for weight, iterations in _STAGES]
+        each, tell = sum(iterations for _, iterations in stages), paced(progress)
         for start in range(starts):
-            x = self._random_start(rng)
-            for weight, iterations in _STAGES:
-                x = self._improve(x, weight, max(1, round(effort * iterations)))
+            x, done = self._random_start(rng), start * each
+            for weight, iterations in stages:
+                x = self._improve(x, weight, iterations, _counting(tell, done, starts * each))
+                done += iterations
             reference = self.limits.fitted(self.series.reference(x), self.fine_step)
             value = np.nan if reference is None else self.value(reference)
             values.append(float(value))
@@ -100,7 +105,7 @@ class Problem:
         now, then = (np.hypot(r.cosine, r.sine).sum(axis=1) for r in (fitted, before))
         return np.column_stack([fitted.offset, x[:, 1:] * (now / then)[:, None]])
 
-    def _improve(self, x: Array, weight: float, iterations: int) -> Array:
+    def _improve(self, x: Array, weight: float, iterations: int, iterated: Callable[[Array], None]) -> Array:
         # in these units every coefficient moves the joint by a comparable part of its limits
         unit = np.tile(self.limits.ranges.velocity[:, None], (1, x.shape[1]))
         unit[:, 0] = self.limits.travel[0]
@@ -115,9 +120,16 @@ class Problem:
             (x / unit).ravel(),
             jac=True,
             method="L-BFGS-B",
+            callback=iterated,
             options={"maxiter": iterations, "maxfun": 2 * iterations, "maxcor": 20},
         )
         return np.asarray(found.x.reshape(x.shape) * unit)
+
+
+def _counting(tell: Progress, done: int, total: int) -> Callable[[Array], None]:
+    """What an optimiser calls at every iteration: says which it is, when so many of all were done before."""
+    numbers = itertools.count(done + 1)
+    return lambda _: tell(f"iteration {next(numbers)} of at most {total}")
 
 
 class Objective:
