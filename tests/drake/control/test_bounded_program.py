@@ -129,6 +129,20 @@ def test_velocities_stay_near_those_of_the_round_before() -> None:
         assert_allclose(answer.d[1], part * last, atol=2e-3)
 
 
+def test_velocities_far_from_those_of_the_round_before_have_their_price_beside_a_deviations() -> None:
+    """min d² / L² + w v² / V² with k d + c v = -m, of a knot that both are free at; L a hundredth, V a tenth."""
+    offset, none = np.array([[0.0], [2.5]]), np.zeros((2, 1))
+    stiff, damped, w = np.full((2, 1, 1), 40.0), np.full((2, 1, 1), 4.0), 0.3
+    answer = Program(
+        *(0.05, offset, [stiff, damped, 0 * stiff], np.array([2.0]), np.array([np.inf])),
+        *(none, none, none + 9.0, none, w),
+    ).solve()
+    assert answer is not None
+    cheap = np.array([40.0 * 0.01**2, 4.0 * 0.1**2 / w])
+    assert_allclose(answer.d[:2, 1, 0], -0.5 * cheap / (cheap @ [40.0, 4.0]), atol=1e-5)
+    assert_allclose(answer.torque[1], 2.0, atol=2 * TOLERANCE)
+
+
 def test_what_no_motion_keeps_is_told() -> None:
     offset = np.full((K, 1), 2.0)
     assert program(offset, J=[np.zeros((K, 1, 1))] * 3).solve() is None

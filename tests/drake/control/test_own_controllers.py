@@ -85,3 +85,36 @@ def test_what_is_no_controller_is_refused(sliding_mode):
 def test_a_law_with_other_ports_is_refused(short):
     with pytest.raises(ValueError, match="mine: has the input ports none; a control law has state"):
         add_arm_under(DiagramBuilder(), short.plant, LeafSystem(), short.reference, name="mine")
+
+
+class Ports(LeafSystem):
+    """A law with the ports that are said, of so many entries each."""
+
+    def __init__(self, inputs: dict[str, int], tau: int = 3) -> None:
+        super().__init__()
+        for name, size in inputs.items():
+            self.DeclareVectorInputPort(name, size)
+        if tau:
+            self.DeclareVectorOutputPort("tau", tau, lambda context, output: None)
+
+
+@pytest.mark.parametrize(
+    ("law", "told"),
+    [
+        (Ports({"state": 6, "q_ref": 3, "wind": 3}), "has the input ports state, q_ref, wind; a control law"),
+        (Ports({"q_ref": 3, "v_ref": 3}), "has the input ports q_ref, v_ref; a control law"),
+        (Ports({"state": 6}, tau=0), "has the input ports state; a control law"),
+        (Ports({"state": 3, "q_ref": 3}), "its port state has 3 entries, three_axis has 3 joints"),
+        (Ports({"state": 6, "q_ref": 6}), "its port q_ref has 6 entries, three_axis has 3 joints"),
+        (Ports({"state": 6}, tau=2), "its port tau has 2 entries, three_axis has 3 joints"),
+    ],
+)
+def test_ports_of_a_law_are_those_of_the_loop_and_of_its_joints(short, law, told):
+    with pytest.raises(ValueError, match=f"mine: {told}"):
+        add_arm_under(DiagramBuilder(), short.plant, law, short.reference, name="mine")
+
+
+@pytest.mark.parametrize("ports", [(), ("q_ref",), ("q_ref", "v_ref", "vdot_ref", "tau_ff")])
+def test_a_law_has_those_ports_that_it_wants(short, ports):
+    law = Ports({"state": 6, **dict.fromkeys(ports, 3)})
+    assert add_arm_under(DiagramBuilder(), short.plant, law, short.reference).controller is law

@@ -181,6 +181,20 @@ class TestReferences:
             else:
                 assert self.of(kind="fourier") is reference
 
+    def test_limits_are_looked_at_every_hundredth_of_a_second_from_the_start(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[Any] = []
+
+        def evaluate(t: Any) -> Any:
+            asked.append(t)
+            return np.zeros((3, 3)), None, None
+
+        reference = SimpleNamespace(duration=0.1, evaluate=evaluate)
+        monkeypatch.setattr(scenario_references, "fourier_reference", lambda *_: reference)
+        assert self.of(kind="fourier") is reference
+        assert_allclose(asked, [0.01 * np.arange(10)])
+
     @pytest.mark.parametrize("kind", ["places", "csv"])
     def test_it_lasts_ten_minutes_at_most(self, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
         q = np.zeros((1, 3))

@@ -8,7 +8,7 @@ again.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -118,12 +118,12 @@ class Realisation:
 
     viscous: Array
     rotor_inertia: Array
-    laws: tuple[Placed, ...] = ()
-    faults: tuple[Fault, ...] = ()
-    contacts: tuple[tuple[float, float, Array], ...] = ()
-    payloads: tuple[tuple[float, Array, float | None], ...] = ()
-    R_WB: Array = field(default_factory=lambda: np.eye(3))
-    own: tuple[Law, ...] = ()
+    laws: tuple[Placed, ...]
+    faults: tuple[Fault, ...]
+    contacts: tuple[tuple[float, float, Array], ...]
+    payloads: tuple[tuple[float, Array, float | None], ...]
+    R_WB: Array
+    own: tuple[Law, ...]
 
 
 def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:

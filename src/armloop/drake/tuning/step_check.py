@@ -41,7 +41,7 @@ class _Hold:
 
     torque: Array
 
-    def feedforward(self, q: Array, v: Array, vdot: Array, step: int = 3) -> Array:
+    def feedforward(self, q: Array, v: Array, vdot: Array, step: int) -> Array:
         return self.torque
 
 
