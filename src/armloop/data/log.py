@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armloop.data.plausibility import Finding, Recorded, doubts, faults
+from armloop.data.plausibility import doubts, faults
+from armloop.data.recorded import Finding, Recorded
 from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError

@@ -1,0 +1,39 @@
+"""A recorded motion as plain arrays, and what checks find in it: columns, rows and a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from armloop.util.arrays import Array
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong, or doubtful, with some columns of a log; a sentence with ``columns`` as its subject.
+
+    Attributes:
+        columns: such as ``"column v2"``.
+        text: what is wrong and what would be right.
+        row: index of the row from 0, or None where no single row is at fault.
+    """
+
+    columns: str
+    text: str
+    row: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A recorded motion of n joints at N instants in runs without gaps, and what the checks share.
+
+    time (N,), q, v, tau (N, n), vdot (N, n) or None; ``derived``: v was differentiated from q.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    tau: Array
+    vdot: Array | None
+    runs: Sequence[slice]
+    derived: bool = False
