@@ -47,7 +47,7 @@ def test_the_way_from_a_bag_to_a_simulator_and_c(tmp_path, measured):
             line = line.replace(name, str(path))
         out = armloop(line, tmp_path)
         if "diagnose" in line:
-            assert "Verdict: no_effect" in out  # the model of this very log
+            assert "Verdict: no effect" in out  # the model of this very log
         if "export" in line:
             assert "read back by" in out
     assert (tmp_path / "out" / "ur10.xml").is_file() and (tmp_path / "out" / "ur10.c").is_file()

@@ -54,8 +54,8 @@ def test_steps_and_scores(loop: SimpleNamespace) -> None:
 
 def test_a_diagnosis_names_effect_and_errors(loop: SimpleNamespace, clean: object) -> None:
     text = diagnosis_table(loop.diagnosis)
-    assert "effects_found" in text and "joint spring, joint 2" in text and "stiffness" in text
-    assert "no_effect" in diagnosis_table(clean)
+    assert "Verdict: effects found" in text and "joint spring, joint 2" in text and "stiffness" in text
+    assert "Verdict: no effect" in diagnosis_table(clean)
 
 
 def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) -> None:

@@ -151,7 +151,8 @@ def compensation_tables(diagnosis: Diagnosis, compensation: Closing) -> list[Tab
 def diagnosis_table(diagnosis: Diagnosis, compensation: Closing | None = None) -> str:
     """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
     sentences = [*findings(diagnosis), *reasons(diagnosis), *blame(diagnosis)]
-    parts = [f"Verdict: {diagnosis.verdict}", "\n".join(map(_wrapped, sentences))]
+    verdict = diagnosis.verdict.replace("_", " ")
+    parts = [f"Verdict: {verdict}", "\n".join(map(_wrapped, sentences))]
     parts += map(str, found_tables(diagnosis))
     for found, alike in confounded(diagnosis):
         lines = [_wrapped(f"- {other}: {why}") for other, why in alike]
