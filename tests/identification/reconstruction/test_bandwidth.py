@@ -335,6 +335,26 @@ def test_what_is_regressed_at_a_corner() -> None:
     np.testing.assert_array_equal(twice.blocks, np.concatenate([blocks, blocks + blocks[-1] + 1]))
 
 
+def test_a_log_with_nothing_beyond_the_filters_reach_adds_nothing() -> None:
+    arm = three_axis()
+    base, log = BaseParameters.of_arm(arm, rotors=True), run(seconds=10.0)
+    tables = [
+        bandwidth.table_at(logs, arm, base, TEN_HZ, 10.0, [10.0, 1.0])
+        for logs in ([log], [run(seconds=1.0), log, run(seconds=1.0)])
+    ]
+    assert tables[0] is not None and tables[1] is not None
+    np.testing.assert_array_equal(tables[0].columns, tables[1].columns)
+    np.testing.assert_array_equal(tables[0].blocks, tables[1].blocks)
+    # whenever it began, but for a sample at each end whose time is rounded
+    late = bandwidth.table_at([replace(log, time=log.time + 64.0)], arm, base, TEN_HZ, 10.0, [10.0, 1.0])
+    assert late is not None
+    shared = np.abs(np.subtract.outer(late.motion.time - 64.0, tables[0].motion.time)) < 1e-3
+    assert shared.sum() >= len(tables[0].tau) - 2
+    here, there = np.nonzero(shared)
+    np.testing.assert_allclose(late.columns[here], tables[0].columns[there], atol=1e-6)
+    assert bandwidth.table_at([run(seconds=1.0)], arm, base, TEN_HZ, 10.0, [10.0, 1.0]) is None
+
+
 @pytest.mark.parametrize(("samples", "stride"), [(6000, 2), (5990, 1)])
 def test_nine_thousand_rows_are_enough(samples: int, stride: int) -> None:
     log, arm = run(seconds=samples / 100), three_axis()

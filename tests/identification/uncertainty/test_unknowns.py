@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from armloop.identification.uncertainty.solving import moved, solve, solve_given
 from armloop.identification.uncertainty.standard_errors import (
     Assembled,
     Fitted,
+    _residuals,
     covariances,
     gauss_newton_steps,
     standard_errors,
@@ -210,6 +212,33 @@ def test_sums_of_equations_add_over_samples_and_say_how_the_model_fits() -> None
         np.testing.assert_allclose(whole.score[k], X.T @ left[:, k], atol=1e-9)
     nothing = Assembled.of(model, data, [Fitted((1, 2, 3), np.zeros_like(rows))])
     assert nothing.misfit() == 0.0 and nothing.jacobian[0].shape == whole.jacobian[0].shape
+
+
+@pytest.mark.parametrize(("kind", "at_once"), [("terms", 8192), ("bodies", 8192), ("bodies", 150)])
+def test_joints_that_share_parameters_weigh_by_what_is_left_of_them(
+    kind: str, at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(import_module(_residuals.__module__), "_PIECE", at_once)
+    model = MODELS[kind]
+    data = samples(model, 400)
+    noise = np.random.default_rng(2).normal(size=data.tau.shape) * np.geomspace(0.05, 1.0, model.arm.n)
+    data = replace(data, tau=data.tau + noise)
+    rows = np.random.default_rng(1).uniform(size=data.tau.shape) < 0.7
+    rows[:, -1] &= np.arange(400) < 200
+    every = [Fitted((1, 2, 3), rows)]
+    residual, spread = _residuals(problems(model), data, every)
+    np.testing.assert_allclose(residual, noise * rows, atol=1e-9)
+    np.testing.assert_allclose(spread, (noise**2).sum(axis=0, where=rows)[None] / rows.sum(axis=0))
+    for problem, (_, step) in zip(problems(model), gauss_newton_steps(model, data, every), strict=True):
+        G, b = np.zeros((len(step), len(step))), np.zeros(len(step))
+        for design in problem.designs(data):
+            own = rows[:, design.joint]
+            X = design.X[own] / np.sqrt(spread[0, design.joint])
+            G[np.ix_(design.where, design.where)] += X.T @ X
+            b[design.where] += X.T @ noise[own, design.joint] / np.sqrt(spread[0, design.joint])
+        np.testing.assert_allclose(step, np.linalg.solve(G, b), rtol=1e-5, atol=1e-7)
+    nothing, none = _residuals(problems(model), data, [Fitted((1, 2, 3), np.zeros_like(rows))])
+    assert not nothing.any() and not none.any()
 
 
 @pytest.mark.parametrize("kind", ["terms", "bodies"])

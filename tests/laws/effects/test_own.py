@@ -194,6 +194,15 @@ def test_what_is_no_effect_is_not_registered(kind, says):
     assert not REGISTRY.own_names()
 
 
+def test_an_effect_without_parameters_says_itself_what_it_estimates():
+    made = {key: lambda *_: None for key in Effect.__abstractmethods__}
+    with pytest.raises(InputError, match="lacks parameters"):
+        register(type("Bare", (Effect,), {"name": "bare", "parameters": (), **made}))
+    named = {"name": "bare", "parameters": (), "estimates": lambda *_: {}}
+    register(type("Bare", (Effect,), {**made, **named}))
+    assert REGISTRY.own_names() == ["bare"]
+
+
 def test_an_unknown_effect_says_what_to_do():
     register(Cubic)
     with pytest.raises(ModelError, match=r"unknown effect 'eddy'; install the package .* own: cubic_drag"):

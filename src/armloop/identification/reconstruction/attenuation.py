@@ -81,8 +81,7 @@ def _of(chunk: Chunk, choice: Choice, columns: Columns, fits: Sequence[Fit], noi
         waves, gram = terms.columns(part.motion), terms.gram(part.motion)
         X = columns.chosen(part, joint, support)
         k, beside = len(own), X[:, len(own) :]
-        load = part.tau - part.rest
-        tau = part.tau[:, joint] - friction.torque(part.motion, load=load)[:, joint]
+        tau = part.tau[:, joint] - friction.torque(part.motion)[:, joint]
         G = np.empty((X.shape[1], X.shape[1]))
         G[:k, :k], G[k:, k:] = gram[:k, :k], beside.T @ beside
         G[:k, k:] = waves[:, :k].T @ beside
