@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from armloop.drake.control.controllers import LISTED
+from armloop.drake.experiments import scenarios
 from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenarios import load_plan, load_plant, load_tracking, plant_names
 from armloop.drake.plant.config import Instruments, PlantConfig
@@ -232,3 +233,17 @@ def test_what_a_file_leaves_out_is_as_in_python():
         assert getattr(given, name) == getattr(instruments, name)
     arm = load_plant("three_axis")
     assert given.time_step == PlantConfig(arm.config.friction, arm.config.ranges).time_step
+
+
+@pytest.mark.parametrize("key", ["static_settle", "velocity_settle"])
+def test_a_segment_settles_for_more_than_ten_samples(key, tmp_path, monkeypatch):
+    path = tmp_path / "collection.yaml"
+    monkeypatch.setattr(scenarios, "scenario_path", lambda name: path)
+    other = {"static_settle": "velocity_settle", "velocity_settle": "static_settle"}[key]
+    for seconds, told in ((0.1, True), (0.0999, True), (0.1001, False)):
+        path.write_text(f"mine: {{rate: 100.0, {key}: {seconds}, {other}: 1.0}}\n")
+        if told:
+            with pytest.raises(ScenarioError, match=f"mine: {key} must be above 10 sample periods, 0.1 s"):
+                load_plan("mine")
+        else:
+            assert getattr(load_plan("mine"), key) == seconds

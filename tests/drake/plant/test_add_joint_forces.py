@@ -1,0 +1,96 @@
+"""Which ports an effect has, and what may be added to a plant of one's own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import ConstantVectorSource
+
+from armloop.drake import EffectTorque, JointFriction, JointFrictionSystem, add_joint_forces
+from armloop.drake.plant.plant import add_links
+from armloop.robot.arm import load_arm
+from armloop.util.errors import InputError
+
+ARM = load_arm("three_axis")
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "parameters", "ports"),
+    [
+        ("joint_spring", 2, {"stiffness": 3.0, "rest": 0.25}, ["state"]),
+        ("coulomb_friction", 2, {"level": 0.4}, ["state"]),
+        ("load_dependent_friction", 2, {"coefficient": 0.1}, ["state", "load"]),
+        ("rotor_inertia", 2, {"inertia": 0.1}, ["state", "vdot"]),
+        ("payload", None, {"mass": 0.5, "com": [0.1, 0.0, 0.0]}, ["state", "vdot"]),
+    ],
+)
+def test_an_effect_has_the_ports_that_its_law_needs(
+    name: str, joint: int | None, parameters: Any, ports: list[str]
+) -> None:
+    system = EffectTorque(ARM, name, joint, parameters)
+    assert [system.get_input_port(k).get_name() for k in range(system.num_input_ports())] == ports
+
+
+def built() -> tuple[DiagramBuilder, MultibodyPlant]:
+    """A builder with the arm, and with something else."""
+    builder = DiagramBuilder()
+    builder.AddSystem(ConstantVectorSource([1.0]))
+    plant = builder.AddSystem(MultibodyPlant(0.0))
+    add_links(plant, ARM)
+    plant.Finalize()
+    return builder, plant
+
+
+def friction(level: float) -> Any:
+    return JointFrictionSystem([JointFriction(level, level)] * 3)
+
+
+def test_forces_of_all_systems_add_up_on_the_plant_that_they_look_at() -> None:
+    builder, plant = built()
+    systems = [
+        friction(1.0),
+        EffectTorque(ARM, "joint_spring", 2, {"stiffness": 3.0, "rest": 0.25}),
+        friction(0.5),
+    ]
+    assert add_joint_forces(builder, plant, systems) == systems
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    own = plant.GetMyMutableContextFromRoot(context)
+    q, v = np.array([0.3, -0.5, 0.7]), np.array([1.0, -2.0, 3.0])
+    plant.SetPositionsAndVelocities(own, np.concatenate([q, v]))
+    force = plant.get_applied_generalized_force_input_port().Eval(own)
+    assert_allclose(force, -1.5 * np.sign(v) - [0.0, 3.0 * (q[1] - 0.25), 0.0], atol=1e-12)
+
+
+def test_what_cannot_be_added_is_told() -> None:
+    builder, plant = built()
+    _, elsewhere = built()
+    with pytest.raises(InputError, match="the plant is in no diagram of this builder"):
+        add_joint_forces(builder, elsewhere, [friction(1.0)])
+    with pytest.raises(InputError, match="systems is empty"):
+        add_joint_forces(builder, plant, [])
+    there = builder.AddSystem(friction(1.0))
+    with pytest.raises(InputError, match="is in the builder already"):
+        add_joint_forces(builder, plant, [friction(0.5), there])
+
+    class Half(LeafSystem):
+        def __init__(self, state: bool) -> None:
+            super().__init__()
+            if state:
+                self.DeclareVectorInputPort("state", 6)
+            else:
+                self.DeclareVectorOutputPort("force", 3, lambda context, output: None)
+
+    for half in (Half(True), Half(False)):
+        with pytest.raises(InputError, match="Half: has not the input port state and the output port force"):
+            add_joint_forces(builder, plant, [half])
+    with pytest.raises(InputError, match="is for 2 joints, the plant has 3"):
+        add_joint_forces(builder, plant, [JointFrictionSystem([JointFriction()] * 2)])
+    add_joint_forces(builder, plant, [friction(0.5)])
+    with pytest.raises(InputError, match="applied_generalized_force is taken"):
+        add_joint_forces(builder, plant, [friction(0.5)])
