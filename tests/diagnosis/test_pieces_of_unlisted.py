@@ -68,7 +68,7 @@ class TestLawThatIsNotListed:
     def test_of_fewer_parameters_a_law_that_leaves_significantly_less_is_enough(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        leads, seen = iter((3.1, 3.0)), []
+        leads, seen = iter((3.1, 3.0, 3.1)), []
 
         def lead_of(*sums: np.ndarray) -> float:
             seen.append([each.tolist() for each in sums])
@@ -77,6 +77,7 @@ class TestLawThatIsNotListed:
         monkeypatch.setattr(unlisted, "lead_of", lead_of)
         assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "bare"
         assert self.found(monkeypatch, 90.0, 2, 100.0, 400.0)[1] == "effects"
+        assert self.found(monkeypatch, 90.0, 1, 100.0, 400.0)[1] == "bare"
         # squares of what is left, by blocks of two rows each, and how many rows those are
         np.testing.assert_allclose(seen[0], [[50, 50], [45, 45], [2, 2]])
 
