@@ -11,6 +11,7 @@ from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionTerm
 from armloop.model import AddedEffect
 from armloop.robot.arm import load_arm
+from armloop.robot.kinematics import nominal_parameters, regressor
 
 Q, V = np.array([0.3, -0.5, 0.7]), np.array([0.4, -0.01, 0.0])
 
@@ -42,6 +43,13 @@ def test_dry_friction_fades_in_and_viscous_friction_is_the_plants(arm) -> None:
     assert_allclose(force(model, smoothing=0.1), -(2 * np.tanh(V / 0.1) + drag), rtol=1e-12)
     each = [0.1, 0.2, 0.3]
     assert_allclose(force(model, smoothing=each), -(2 * np.tanh(V / each) + drag), rtol=1e-12)
+
+
+def test_friction_by_load_has_the_load_of_the_links_that_do_not_accelerate(arm) -> None:
+    model = model_of(arm, friction=(FrictionTerm("load_sign", 0.1),))
+    load = (regressor(arm, Q[None], V[None], 0 * V[None]) @ nominal_parameters(arm))[0]
+    assert np.abs(load[1:]).min() > 0.1
+    assert_allclose(force(model), -0.1 * np.abs(load) * np.tanh(V / 0.02), rtol=1e-9, atol=1e-12)
 
 
 def test_what_fades_in_more_slowly_keeps_its_own_width(arm) -> None:

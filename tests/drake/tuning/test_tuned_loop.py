@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -81,6 +82,9 @@ def test_a_degree_and_a_millimetre(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_allclose(found.dry, 0.5)
     assert_allclose(found.deviation(), 0.1)
     assert [dry for _, dry, _ in asked["steps"]] == [False, True]
+    # the largest deviation of each joint, either way, at any time
+    apart = np.array([[0.1, 0.0], [0.3, -0.4], [0.2, 0.1]])
+    assert_allclose(replace(found, smooth=found.linear - apart).deviation(), [0.3, 0.4])
 
 
 @pytest.mark.parametrize(
