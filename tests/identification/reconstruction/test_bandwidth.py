@@ -349,7 +349,7 @@ def test_a_log_with_nothing_beyond_the_filters_reach_adds_nothing() -> None:
     late = bandwidth.table_at([replace(log, time=log.time + 64.0)], arm, base, TEN_HZ, 10.0, [10.0, 1.0])
     assert late is not None
     shared = np.abs(np.subtract.outer(late.motion.time - 64.0, tables[0].motion.time)) < 1e-3
-    assert shared.sum() >= len(tables[0].tau) - 2
+    assert shared.sum() >= max(len(tables[0].tau), len(late.tau)) - 2
     here, there = np.nonzero(shared)
     np.testing.assert_allclose(late.columns[here], tables[0].columns[there], atol=1e-6)
     assert bandwidth.table_at([run(seconds=1.0)], arm, base, TEN_HZ, 10.0, [10.0, 1.0]) is None
