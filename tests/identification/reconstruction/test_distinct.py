@@ -39,6 +39,13 @@ def test_of_columns_that_are_one_function_on_the_data_the_first_is_kept() -> Non
     assert not repeated(apart.T @ apart, first, np.array([1])).any()
 
 
+def test_columns_are_one_where_they_differ_by_less_than_a_thousandth() -> None:
+    for square, same in ((0.9e-6, True), (1.1e-6, False)):
+        cosine = np.sqrt(1 - square)
+        G = np.array([[4.0, -6 * cosine], [-6 * cosine, 9.0]])
+        assert repeated(G, np.zeros(0, dtype=int), np.arange(2)).tolist() == [False, same]
+
+
 def test_viscous_friction_stands_once_where_all_steps_are_regressed_together() -> None:
     # The torque follows a velocity that was not filtered a second time, as the library's v does, and friction's not.
     motion = fourier_motion(15.0, 100.0, 1)
