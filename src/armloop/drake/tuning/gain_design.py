@@ -70,12 +70,15 @@ def _joint(
 def _at_crossover(sampled: SampledArm, crossing: float, margin: float) -> PidGains:
     """Return the gains of a single joint whose loop crosses 1 at `crossing` rad/s with the margin, rad."""
     w, corner = np.array([crossing]), _INTEGRAL * crossing
-    one, zero = np.ones(1), np.zeros(1)
-    a = complex(sampled.loops(PidGains(one, corner * one, zero), w)[0, 0, 0])
-    b = complex(sampled.loops(PidGains(zero, zero, one), w)[0, 0, 0])
+    a = complex(sampled.loops(_of_one_joint(1.0, corner, 0.0), w)[0, 0, 0])
+    b = complex(sampled.loops(_of_one_joint(0.0, 0.0, 1.0), w)[0, 0, 0])
     wanted = np.exp(1j * (margin - np.pi))
     p, d = np.linalg.solve([[a.real, b.real], [a.imag, b.imag]], [wanted.real, wanted.imag])
     if d < 0:  # more phase than asked for without any
         p, d = 1 / abs(a), 0.0
     p = max(p, 0.0)
-    return PidGains(p * one, corner * p * one, d * one)
+    return _of_one_joint(p, corner * p, d)
+
+
+def _of_one_joint(kp: float, ki: float, kd: float) -> PidGains:
+    return PidGains(np.array([kp]), np.array([ki]), np.array([kd]))
