@@ -50,6 +50,7 @@ ROOMS = (
 )
 #: Tests of other rooms that guard a room's numerics too.
 GUARDS = {
+    "drake": ("faults",),
     "laws": ("dynamics", "model"),
     "identification/reconstruction": ("identification/goodness", "identification/validation"),
 }
@@ -63,7 +64,7 @@ PATIENCE, MARGIN = 3.0, 15.0
 #: Seconds of its room's quick tests that a mutant is tried on, and of those that are left, marked slow or not, and of the
 #: rooms that guard it: the quickest that execute its statement. One that they do not see counts as survived, though a
 #: longer test may see it.
-QUICK, SLOW = 20.0, 45.0
+QUICK, SLOW = 20.0, 90.0
 
 
 @cache
