@@ -13,6 +13,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from armloop.drake import EffectTorque, JointFriction, JointFrictionSystem, add_joint_forces
 from armloop.drake.plant.plant import add_links
+from armloop.laws.effects import REGISTRY, Law, Parameter, register
 from armloop.robot.arm import load_arm
 from armloop.util.errors import InputError
 
@@ -34,6 +35,31 @@ def test_an_effect_has_the_ports_that_its_law_needs(
 ) -> None:
     system = EffectTorque(ARM, name, joint, parameters)
     assert [system.get_input_port(k).get_name() for k in range(system.num_input_ports())] == ports
+
+
+class Fading(Law):
+    """Dry friction that fades in over a speed of its own."""
+
+    name = "fading"
+    parameters = (Parameter("level", "TAU"), Parameter("speed", "POS/s", above=0.0, shape="continuous"))
+    law = "c tanh(v / w)"
+    elements = ("smooth_sign",)
+
+
+def test_a_law_that_fades_in_by_itself_does_so_over_its_own_speed() -> None:
+    REGISTRY.forget()
+    register(Fading)
+    try:
+        own = EffectTorque(ARM, "fading", 2, {"level": 2.0, "speed": 0.5}, smoothing=0.01)
+        listed = EffectTorque(ARM, "coulomb_friction", 2, {"level": 2.0}, smoothing=0.01)
+    finally:
+        REGISTRY.forget()
+    for system, width in ((own, 0.5), (listed, 0.01)):
+        context = system.CreateDefaultContext()
+        system.GetInputPort("state").FixValue(context, [0.0, 0.0, 0.0, 9.0, 0.02, 9.0])
+        tau = system.GetOutputPort("tau").Eval(context)
+        assert_allclose(tau, [0.0, 2.0 * np.tanh(0.02 / width), 0.0], rtol=1e-12)
+        assert_allclose(system.GetOutputPort("force").Eval(context), -tau)
 
 
 def built() -> tuple[DiagramBuilder, MultibodyPlant]:
