@@ -166,7 +166,11 @@ def _nearest(R: Array, wanted: Array, bodies: Array, drives: Array, x: Array) ->
         far, near = R @ step, barrier @ step
         growth = np.linalg.eigvalsh(near[: 16 * n].reshape(n, 4, 4)).ravel()
         growth = np.append(growth, near[16 * n :])
-        x = x + _exact_length(off @ far + towards @ near, far @ far, growth) * step
+        step = _exact_length(off @ far + towards @ near, far @ far, growth) * step
+        # Where a change costs so much that the cone's wall is but rounding, the whole step may end behind it.
+        while not _is_inside(x + step, n):
+            step = step / 2
+        x = x + step
         if np.hypot(np.linalg.norm(far), np.linalg.norm(near)) < _CONVERGED:
             break
     return x
@@ -182,6 +186,15 @@ def barrier_factor(x: Array, n: int) -> Array:
 def _root(x: Array, n: int) -> Array:
     """(n, 4, 4) L with J = L L^T."""
     return np.asarray(np.linalg.cholesky(pseudo_inertias(x[: 10 * n].reshape(n, 10))))
+
+
+def _is_inside(x: Array, n: int) -> bool:
+    """Whether every pseudo-inertia has a root, and what follows is positive."""
+    try:
+        _root(x, n)
+    except np.linalg.LinAlgError:
+        return False
+    return bool((x[10 * n :] > 0).all())
 
 
 def _ones(n: int, drives: int) -> Array:

@@ -44,6 +44,16 @@ def assert_bodies(found: Realizable) -> None:
     np.testing.assert_allclose(BASE.from_full(found.full), found.theta[: BASE.count], atol=1e-9)
 
 
+@pytest.mark.parametrize("noise", [1e-3, 1e-4, 1e-6])
+def test_exact_data_that_no_bodies_have_are_refused(noise: float) -> None:
+    """The cost of the same bodies grows as the noise's square falls, beyond what the cone's wall can be resolved against."""
+    plain, exact = (nearest(wrong=0.03, noise=size)[0] for size in (1e-2, noise))
+    assert not exact.accepted
+    assert exact.cost / plain.cost * (noise / 1e-2) ** 2 > 0.99  # the least that any bodies cost
+    inertias = pseudo_inertias(exact.full[:-3].reshape(-1, 10))
+    assert np.linalg.eigvalsh(inertias).min() > -1e-12 * np.abs(inertias).max()
+
+
 def test_what_bodies_have_is_left_alone():
     found, solution = nearest(wrong=0.0, noise=0.1)
     assert found.accepted and found.cost == 0
