@@ -83,7 +83,7 @@ def plainly(x, rows, starts, period, lags):
             (i, i + lag) for i in range(len(x) - lag) if run[i] == run[i + lag] and rows[i] and rows[i + lag]
         ]
         rho.append((lag, len(pairs), sum(z[i] * z[j] for i, j in pairs)))
-    known = [(lag, total / n) for lag, n, total in rho if n > max(1.0, 0.05 * rho[0][1])]
+    known = [(lag, total / n) for lag, n, total in rho if n > 0.05 * rho[0][1]]
     area, (before, last) = 0.0, known[0]
     for lag, value in known[1:]:
         area += (max(value, 0.0) + max(last, 0.0)) / 2 * (lag - before) * period
@@ -103,6 +103,16 @@ def test_the_area_is_that_of_every_pair_within_its_run(seed, lengths):
     for used in (np.ones(N, bool), rows):
         expected = plainly(x, used, starts, 0.01, max(lengths) // 2)
         assert correlation_time(x, used, motion(lengths), 0.01) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_lag_at_which_few_samples_have_a_partner_tells_nothing():
+    # beyond the short runs only the long one has pairs: at 13 samples 17 of 330, at 14 less than one in twenty
+    lengths = [10] * 30 + [30]
+    x, every = np.repeat([*[1.0, -1.0] * 15, 1.0], lengths), np.ones(330, bool)
+    starts = np.cumsum([0, *lengths[:-1]])
+    found = correlation_time(x, every, motion(lengths), 0.01)
+    assert found == pytest.approx(plainly(x, every, starts, 0.01, 13), rel=1e-9)
+    assert found > 2 * 0.1  # of constants, over ten samples and more
 
 
 def test_short_and_empty_data_are_worth_their_samples():
@@ -128,6 +138,7 @@ def test_blocks_are_joined_evenly_when_there_are_too_many():
     assert np.unique(numbers, return_counts=True)[1].max() == 30
     thousand = independent_blocks(motion([10] * 1000), 0.1)
     assert len(np.unique(thousand)) == 1000
+    assert len(np.unique(independent_blocks(motion([10] * 1001), 0.1))) == 501
 
 
 def test_no_sample_covers_no_time():

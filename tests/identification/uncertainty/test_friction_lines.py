@@ -43,6 +43,11 @@ def test_the_line_follows_a_law_that_is_none() -> None:
     # the straight line nearest to v²/2 has the slope of its chord, and lies below zero at rest
     assert found["viscous"]["value"] == pytest.approx(0.5 * (low + high), rel=0.02)
     assert found["coulomb"]["value"] < 0.3
+    # least squares at a hundred speeds
+    found = line([FrictionTerm("sign", 0.3), FrictionTerm("quadratic", 0.5)], np.zeros((2, 2)))
+    v = np.linspace(*found["speeds"], 100)
+    nearest = np.polyfit(v, 0.3 + 0.5 * v**2, 1)
+    assert [found[key]["value"] for key in ("viscous", "coulomb")] == pytest.approx(nearest, rel=1e-9)
     assert line([], np.zeros((0, 0))) == {}
 
 
@@ -67,17 +72,22 @@ def test_the_stribeck_falls_own_velocity_has_its_part_in_the_error() -> None:
     samples = Samples(motion, np.zeros_like(motion.q), np.ones(motion.q.shape, dtype=bool), 0.02)
     rows = np.abs(motion.v[:, 0]) > 0.05
     names = [law[0].name(1), law[1].name(1), "v_s", law[2].name(1)]
-    own = np.diag([0.0, 0.0, 0.05**2, 0.0])
+    # the fall's velocity and the level that it falls from, correlated
+    own = np.zeros((4, 4))
+    own[np.ix_([0, 2], [0, 2])] = [[0.02**2, 0.6 * 0.02 * 0.05], [0.6 * 0.02 * 0.05, 0.05**2]]
     found = friction_line(model, 0, names, own, 12.34, samples, rows)
 
-    def moved(by: float) -> dict:
-        terms = (law[0], replace(law[1], parameter=0.4 + by), law[2])
+    def moved(level: float, by: float) -> dict:
+        terms = (replace(law[0], coefficient=0.5 + level), replace(law[1], parameter=0.4 + by), law[2])
         other = replace(model, friction=FrictionLaw((terms, (), ())))
         return friction_line(other, 0, names, own, 12.34, samples, rows)
 
     for key in ("coulomb", "viscous"):
-        slope = (moved(1e-4)[key]["value"] - moved(-1e-4)[key]["value"]) / 2e-4
-        assert found[key]["std_error"] == pytest.approx(0.05 * abs(slope), rel=1e-3)
+        slopes = [
+            (moved(*step)[key]["value"] - moved(*-step)[key]["value"]) / 2e-4 for step in 1e-4 * np.eye(2)
+        ]
+        variance = slopes @ own[np.ix_([0, 2], [0, 2])] @ slopes
+        assert found[key]["std_error"] == pytest.approx(np.sqrt(variance), rel=1e-3)
         assert found[key]["degrees_of_freedom"] == 12.3
     nothing = friction_line(model, 0, names, own, 9.0, samples, np.zeros_like(rows))
     assert nothing == {}

@@ -114,6 +114,9 @@ def test_the_textbooks_covariance_takes_every_sample_as_independent_and_what_is_
         spread = np.var(part) * len(part) / (len(part) - columns.shape[1])
         expected[place, place] = spread * np.linalg.inv(columns.T @ columns)
     np.testing.assert_allclose(sums.independent_covariance(), expected, rtol=1e-6, atol=1e-12)
+    # of one sample and one coefficient nothing is left over: as if of one
+    one = Equations(np.ones((1, 1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.zeros(1, int), np.array([3.0]))
+    assert one.independent_covariance()[0, 0] == pytest.approx(3.0)
 
 
 def test_degrees_of_freedom_are_satterthwaites():
@@ -140,3 +143,13 @@ def test_a_column_of_zeros_hurts_no_other():
     np.testing.assert_allclose(more.scale[:3], 1 / np.sqrt(np.diag(sums.jacobian.sum(axis=0))))
     np.testing.assert_allclose(more.covariance()[:3, :3], sums.covariance(), rtol=1e-6)
     assert more.step()[3] == 0.0
+    small = Equations(1e-6 * sums.jacobian, sums.score, sums.count, sums.stage, sums.variance)
+    np.testing.assert_allclose(small.scale, 1e3 * sums.scale)
+
+
+def test_a_ridge_of_one_part_in_ten_to_the_ten_holds_what_equal_columns_do_not_tell_apart():
+    # (ones + ε I) x = (1, -1) has the solution (1, -1)/ε
+    flat = Equations(
+        np.ones((1, 2, 2)), np.array([[1.0, -1.0]]), np.ones((1, 2)), np.zeros(2, int), np.ones(2)
+    )
+    np.testing.assert_allclose(flat.step(), [1e10, -1e10], rtol=1e-4)

@@ -33,7 +33,7 @@ def correlation_time(residual: Array, rows: Mask, motion: Motion, period: float)
     """
     if not rows.any():
         return period
-    lags = min(_LAGS, max(1, int(np.diff([*motion.starts, motion.samples]).max()) // 2))
+    lags = min(_LAGS, int(np.diff([*motion.starts, motion.samples]).max()) // 2)
     products, pairs = np.zeros(lags + 1), np.zeros(lags + 1)
     z = np.where(rows, residual - residual[rows].mean(), 0.0)
     for run in motion.runs():
@@ -41,19 +41,19 @@ def correlation_time(residual: Array, rows: Mask, motion: Motion, period: float)
             part = slice(start, min(start + _PIECE, run.stop))
             products += _autocovariance(z[part], lags)
             pairs += _autocovariance(rows[part].astype(float), lags)
-    known = np.flatnonzero(pairs > max(1.0, _PARTNERS * pairs[0]))
+    known = np.flatnonzero(pairs > _PARTNERS * pairs[0])
     rho = products[known] / pairs[known] / max(products[0] / pairs[0], TINY)
     ends = np.flatnonzero(rho <= 0)
-    last = int(ends[0]) if len(ends) else len(rho) - 1
+    last = int(ends[0]) if len(ends) else len(rho)
     area = np.trapezoid(np.maximum(rho[: last + 1], 0.0), known[: last + 1] * period)
     return max(2 * float(area), period)
 
 
 def _autocovariance(x: Array, lags: int) -> Array:
     """(lags + 1,) sums of products of x with itself, shifted."""
-    size = 1 << int(np.ceil(np.log2(2 * len(x))))
-    spectrum = np.fft.rfft(x, size)
-    sums = np.fft.irfft(np.abs(spectrum) ** 2, size)[: min(lags + 1, len(x))]
+    from scipy.signal import correlate  # takes long to load
+
+    sums = correlate(x, x, method="fft")[len(x) - 1 :][: lags + 1]
     return np.pad(sums, (0, lags + 1 - len(sums)))
 
 
@@ -68,7 +68,7 @@ def block_length(correlation: float, covered: float) -> float:
 def covered_time(time: Array, rows: Mask) -> float:
     """Seconds that the chosen samples of (N,) cover; gaps of more than ten of their usual steps left out."""
     steps = np.diff(time[rows])
-    return float(steps[(steps > 0) & (steps <= 10 * np.median(steps))].sum()) if len(steps) else 0.0
+    return float(np.maximum(steps, 0.0)[steps <= 10 * np.median(steps)].sum()) if len(steps) else 0.0
 
 
 def independent_blocks(motion: Motion, seconds: float) -> NDArray[np.intp]:

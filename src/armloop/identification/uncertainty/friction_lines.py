@@ -78,4 +78,4 @@ def _column(term: FrictionTerm, v: Array) -> Array:
     motion = Motion(
         np.arange(float(len(v))), np.zeros_like(rates), rates, np.zeros_like(rates), np.arange(len(v))
     )
-    return np.where(np.abs(v) > 0, np.sign(v), 0.0) if term.kind == "hysteresis" else term.column(motion, 0)
+    return np.sign(v) if term.kind == "hysteresis" else term.column(motion, 0)

@@ -57,18 +57,21 @@ class Equations:
     def _scaled(self) -> Array:
         return self.jacobian * np.multiply.outer(self.scale, self.scale)
 
+    def _ridged(self, products: Array) -> Array:
+        return products + _RIDGE * np.eye(len(self.scale))
+
     def step(self) -> Array:
         """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
-        total = self._scaled.sum(axis=0) + _RIDGE * np.eye(len(self.scale))
+        total = self._ridged(self._scaled.sum(axis=0))
         return np.asarray(self.scale * np.linalg.solve(total, self.scale * self.score.sum(axis=0)))
 
     def covariance(self) -> Array:
         """(p, p) covariance, blocks being independent and the errors within them anything."""
         # Scores of least squares sum to zero; where a constraint or a correction for noise in the columns moved
         # the solution they do not, and what all samples have in common is no error.
-        share = self.count / np.maximum(self.count.sum(axis=0), 1.0)
+        share = self.count / np.maximum(self.count.sum(axis=0), TINY)
         score = (self.score - share * self.score.sum(axis=0)) * self.scale
-        without = self._scaled.sum(axis=0) - self._scaled + _RIDGE * np.eye(score.shape[1])
+        without = self._ridged(self._scaled.sum(axis=0) - self._scaled)
         moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
         moved = moved - moved.mean(axis=0)
         inner = moved.T @ moved * (self.blocks - 1) / self.blocks
@@ -78,7 +81,7 @@ class Equations:
         """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""
         same = self.stage[:, None] == self.stage
         total = np.where(same, self._scaled.sum(axis=0), 0.0)
-        inverse = np.linalg.inv(total + _RIDGE * np.eye(len(total)))
+        inverse = np.linalg.inv(self._ridged(total))
         used = np.array([np.count_nonzero(self.stage == s) for s in self.stage])
         samples = np.maximum(self.count.sum(axis=0) - used, 1.0)
         spread = self.variance * self.count.sum(axis=0) / samples
@@ -91,7 +94,7 @@ class Equations:
         blocks is (Σ w)²/Σ w² (Satterthwaite; Carter, Schnepel and Steigerwald 2017).
         """
         total = self._scaled.sum(axis=0)
-        inverse = np.linalg.inv(total + _RIDGE * np.eye(len(total)))
+        inverse = np.linalg.inv(self._ridged(total))
         noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
         weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
         effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY)
