@@ -149,6 +149,9 @@ def test_peaks_lie_apart() -> None:
     assert _peaks(level, 1) == [1, 5, 3]
     assert _peaks(level, 2) == [1, 5]
     assert len(_peaks(np.ones(100), 2)) == 6
+    # at the beginning, too
+    assert _peaks(np.array([3.0, 2.0, 0.0, 1.0]), 1) == [0, 3]
+    assert _peaks(np.array([2.0, 3.0, 0.0, 0.0, 1.0]), 1) == [1, 4]
 
 
 def test_beside_a_line_nothing_is_left_but_the_event() -> None:

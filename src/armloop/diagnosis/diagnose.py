@@ -196,7 +196,7 @@ def _by_joint(fit: Fit, values: Array) -> Array:
 
 def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
     """x / y, NaN where y is zero."""
-    return np.divide(x, y, out=np.full(len(x), np.nan), where=y > 0)
+    return np.divide(x, y, out=np.full(len(x), np.nan), where=y != 0)
 
 
 def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:

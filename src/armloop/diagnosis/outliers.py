@@ -70,7 +70,7 @@ def _bursts(motion: Motion, level: Array, threshold: float) -> tuple[list[slice]
             continue
         gaps = np.flatnonzero(np.diff(motion.time[above]) > _PAUSE)
         for group in np.split(above, gaps + 1):
-            peak = float(level[group[0] : group[-1] + 1].max())
+            peak = float(level[group].max())
             inside = np.flatnonzero(level[group[0] : group[-1] + 1] > _EDGE * peak) + group[0]
             burst = slice(int(inside[0]), int(inside[-1]) + 1)
             start, end = motion.time[burst.start], motion.time[burst.stop - 1]

@@ -161,7 +161,13 @@ class TestWhatIsNotDetermined:
         )
 
     def test_what_another_regression_found_is_told_apart(self) -> None:
-        assert self.errors((0, 0, 1)).undetermined() == []
+        errors = self.errors((0, 0, 1))
+        assert errors.undetermined() == []
+        # products within a regression alone, in units of what it left
+        G = errors.equations.jacobian.sum(axis=0)
+        errors.equations.variance = np.array([2.0, 2.0, 4.0])
+        G[:2, 2] = G[2, :2] = 0.0
+        np.testing.assert_allclose(errors.gram, np.diag([1 / 2, 1 / 2, 1 / 4]) @ G)
 
     def test_a_joints_own_coefficient_is_told_with_its_joint(self) -> None:
         errors = self.errors()

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from armloop.identification.uncertainty.standard_errors import (
     standard_errors,
 )
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, problems
-from armloop.laws.friction import FrictionTerm
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
 from armloop.robot.kinematics import nominal_parameters
@@ -64,6 +65,7 @@ def models() -> dict[str, ReconstructedModel]:
     scara = ARMS["scara"]
     return {
         "terms": terms(),
+        "terms and a load": replace(terms(), friction=FrictionLaw((LOADED,) * ARMS["scara"].n)),
         "bodies": rigid(False),
         "bodies and rotors": rigid(True),
         "energies": model_of(scara, energies(scara), friction=LOADED),
@@ -126,6 +128,7 @@ def test_every_unknown_is_named_once_with_its_joint_and_step(model: Reconstructe
     for problem in problems(model):
         keys = [(u.kind, u.joint, u.name) for u in problem.unknowns]
         assert len(set(keys)) == len(keys)
+        assert {u.step for u in problem.unknowns if u.kind == "shared"} <= {1}
         for joint in {u.joint for u in problem.unknowns if u.kind == "friction"}:
             own = [u for u in problem.unknowns if u.kind == "friction" and u.joint == joint]
             law = model.friction.terms[joint]
@@ -187,6 +190,25 @@ def test_the_best_of_the_iterates_is_kept() -> None:
 
     kept, better = solve(model, Worse)  # type: ignore[arg-type]
     assert kept is model and not better
+
+
+@pytest.mark.parametrize(
+    ("misfits", "looks", "best"),
+    [
+        ((1000.0, 500.0, 499.0, 498.5, 1.0), 4, 3),  # an iteration must remove a thousandth
+        ((5.0, 4.0, 3.0, 2.0, 1.0, 0.5), 5, 4),  # of four iterates at most
+        ((5.0, 5.0, 1.0), 2, 0),  # what is as good is no better
+    ],
+)
+def test_it_goes_on_as_long_as_it_is_worth_while(misfits: tuple[float, ...], looks: int, best: int) -> None:
+    model, seen = MODELS["terms"], []
+
+    def assembled(one: ReconstructedModel) -> Any:
+        seen.append(one)
+        return SimpleNamespace(misfit=lambda: misfits[seen.index(one)], steps=lambda: steps(one, 1e-3))
+
+    found, better = solve(model, assembled)
+    assert (len(seen), better) == (looks, best > 0) and found is seen[best]
 
 
 def test_sums_of_equations_add_over_samples_and_say_how_the_model_fits() -> None:
@@ -298,8 +320,23 @@ def test_of_many_unknowns_the_directions_that_the_torque_feels_most_are_kept(
     assert few.shape == (9, 2) and few[0, 1] == 0.0
     best = np.sort(np.linalg.eigvalsh(np.sqrt(covariance) @ X.T @ X @ np.sqrt(covariance)))[-2:].sum()
     assert ((X @ few) ** 2).sum() == pytest.approx(best) and best < variance
-    lost = np.diag([1.0, np.nan, 4.0])  # what no sample determined
-    assert np.isfinite(propagated.leading(lost, np.eye(3))).all()
+    monkeypatch.setattr(propagated, "_NUMBERS", 16)
+    assert propagated.leading(covariance, X.T @ X).shape == (9, 1)
+    # what no sample determined has no direction
+    lost = np.array([[1.0, np.nan, 0.5], [np.nan, np.nan, np.nan], [0.5, np.nan, 4.0]])
+    found = propagated.leading(lost, np.eye(3))
+    np.testing.assert_allclose(
+        found @ found.T, [[1.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.5, 0.0, 4.0]], atol=1e-12
+    )
+
+
+def test_a_models_file_keeps_so_many_numbers_of_so_many_digits() -> None:
+    # 41 directions of 81 unknowns would be 2501 numbers, zeros above the diagonal left out
+    assert propagated.leading(np.eye(81), np.eye(81)).shape == (81, 40)
+    kept = propagated.to_dict([], np.array([[1 / 3, 0.0], [1e6 / 7, -2e-9 / 3]]))["directions"]
+    assert kept == ["0.33333", "1.4286e+05 -6.6667e-10"]
+    np.testing.assert_array_equal(propagated._directions(kept), [[0.33333, 0.0], [1.4286e5, -6.6667e-10]])
+    assert propagated._directions([]).shape == (0, 0)
 
 
 def test_what_a_later_step_finds_is_not_in_the_residual_of_an_earlier_one() -> None:

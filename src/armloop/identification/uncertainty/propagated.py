@@ -31,8 +31,8 @@ def leading(covariance: Array, gram: Array) -> Array:
     values, vectors = np.linalg.eigh(_symmetric(np.where(known & known[:, None], covariance, 0.0)))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     turned = np.linalg.eigh(_symmetric(root.T @ gram @ root))[1][:, ::-1]
-    r = np.arange(1, p + 1)
-    enough = max(1, int(np.count_nonzero(r * (2 * p - r + 1) <= 2 * _NUMBERS)))
+    r = np.arange(p) + 1
+    enough = int(np.count_nonzero(r * (2 * p - r + 1) <= 2 * _NUMBERS))
     return np.asarray(np.linalg.qr((root @ turned[:, :enough]).T)[1].T)
 
 

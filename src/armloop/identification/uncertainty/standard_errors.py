@@ -65,20 +65,23 @@ class Errors:
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
     @property
+    def _products(self) -> Array:
+        """(p, p) products of the columns that were regressed together."""
+        own = self.equations.stage[:, None] == self.equations.stage
+        return np.where(own, self.equations.jacobian.sum(axis=0), 0.0)
+
+    @property
     def gram(self) -> Array:
         """(p, p) products of the columns that were regressed together, in units of the residual's variance."""
-        own = self.equations.stage[:, None] == self.equations.stage
-        return np.where(own, self.equations.jacobian.sum(axis=0), 0.0) / self.equations.variance[:, None]
+        return self._products / self.equations.variance[:, None]
 
     def undetermined(self) -> list[dict[str, Any]]:
         """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
 
         A joint's own friction stays, of two terms that are one function on these samples.
         """
-        own = self.equations.stage[:, None] == self.equations.stage
-        G = np.where(own, self.equations.jacobian.sum(axis=0), 0.0)
         order = np.argsort([unknown.kind != "friction" for unknown in self.unknowns], kind="stable")
-        kept, sums = identifiable(G[np.ix_(order, order)])
+        kept, sums = identifiable(self._products[np.ix_(order, order)])
         lost = sorted(set(range(len(order))) - set(kept.tolist()))
         if not lost:
             return []

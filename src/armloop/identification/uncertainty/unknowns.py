@@ -74,13 +74,14 @@ class Problem:
 
 def problems(model: ReconstructedModel) -> list[Problem]:
     """The regressions whose solution the model is; effects that a diagnosis added are left aside."""
-    if any(isinstance(component, RigidBody | Lagrangian) for component in model.components):
-        return [_shared(model)]
+    bodies = [component for component in model.components if isinstance(component, RigidBody | Lagrangian)]
+    if bodies:
+        return [_shared(model, *bodies)]
     return [_sparse(model, joint) for joint in range(model.arm.n)]
 
 
 def _sparse(model: ReconstructedModel, joint: int) -> Problem:
-    found = [c for c in model.components if isinstance(c, SparseTerms) and c.coefficients[:, joint].any()]
+    found = [c for c in model.components if isinstance(c, SparseTerms)]
     used = [np.flatnonzero(component.coefficients[:, joint]) for component in found]
     unknowns = [
         Unknown("joints", joint, name, value, step)
@@ -105,8 +106,7 @@ def _sparse(model: ReconstructedModel, joint: int) -> Problem:
     return Problem(unknowns, False, designs)
 
 
-def _shared(model: ReconstructedModel) -> Problem:
-    (body,) = (c for c in model.components if isinstance(c, RigidBody | Lagrangian))
+def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
     if isinstance(body, RigidBody):
         base = BaseParameters.of_arm(model.arm, rotors=len(body.parameters) == 11 * model.arm.n)
         names, values = list(body.names), body.values
@@ -153,6 +153,6 @@ def _friction_columns(
         columns.append(term.column(motion, joint, load))
         if term.kind == "stribeck":
             v, vs = motion.v[:, joint], term.parameter
-            slope = -2 * v**2 / vs**3 * stribeck_fall(v, vs) * np.sign(v)
+            slope = -2 * v * np.abs(v) / vs**3 * stribeck_fall(v, vs)
             columns.append(term.coefficient * slope)
     return columns
