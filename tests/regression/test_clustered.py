@@ -22,6 +22,29 @@ def test_it_is_the_jackknife_over_clusters() -> None:
     assert clustered_covariance(X, y - X @ beta, cluster) == pytest.approx(moved.T @ moved * 6 / 7, rel=1e-5)
 
 
+def test_what_all_rows_have_in_common_is_no_error() -> None:
+    rng = np.random.default_rng(0)
+    cluster, left = rng.integers(0, 7, 60), rng.normal(size=60)
+    X = np.ones((60, 1))
+    found = clustered_covariance(X, left - left.mean() + 3.0, cluster)
+    assert found == pytest.approx(clustered_covariance(X, left - left.mean(), cluster), rel=1e-9)
+
+
+def test_columns_that_are_nearly_one_are_held_by_a_ridge() -> None:
+    """Ridge regression of unit columns without each cluster: rows of the ridge's root beside the data's."""
+    rng = np.random.default_rng(0)
+    cluster, x, y = rng.integers(0, 7, 60), rng.normal(size=60), rng.normal(size=60)
+    X = np.column_stack([x, x + 1e-4 * rng.normal(size=60)])
+    size = np.linalg.norm(X, axis=0)
+    left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    fits = []
+    for k in range(7):
+        Z = np.vstack([X[cluster != k] / size, 1e-4 * np.eye(2)])
+        fits.append(np.linalg.lstsq(Z, np.append(left[cluster != k], [0.0, 0.0]), rcond=None)[0] / size)
+    moved = np.array(fits) - np.mean(fits, axis=0)
+    assert clustered_covariance(X, left, cluster) == pytest.approx(moved.T @ moved * 6 / 7, rel=1e-5)
+
+
 @pytest.mark.parametrize(("rows", "columns"), [(5, 0), (0, 0), (0, 2)])
 def test_nothing_has_no_covariance(rows: int, columns: int) -> None:
     found = clustered_covariance(np.zeros((rows, columns)), np.ones(rows), np.arange(rows))

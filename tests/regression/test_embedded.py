@@ -95,7 +95,7 @@ def test_of_two_starts_the_better_end_is_taken():
     assert beta[0] == pytest.approx(5.0, rel=1e-5)
     # nearest to least squares first, then near nothing
     assert effect.begun[0][0] == pytest.approx(5.0, rel=1e-6)
-    assert 4.0 < effect.begun[1][0] < 4.999
+    assert effect.begun[1][0] == pytest.approx(5.0 / 1.001, rel=1e-6)
     assert len(effect.begun) == 2
 
 
@@ -112,6 +112,53 @@ def test_linear_ones_need_but_one_start_and_nothing_has_no_coefficient():
     assert Counted.begun == 1
     beta, free, J = solve(Moments.of(X, rng.normal(size=80)), [], [])
     assert beta.shape == (0,) and free == [] and J.shape == (0, 0)
+
+
+def test_a_curved_one_of_as_many_parameters_as_coefficients_has_two_starts():
+    class Counted(Sphere):
+        begun = 0
+
+        def start(self, beta):
+            Counted.begun += 1
+            return super().start(beta)
+
+    X, rng = data(3)
+    solve(Moments.of(X, rng.normal(size=80)), [Counted()], [3])
+    assert Counted.begun == 2
+
+
+def test_a_step_that_helps_nowhere_is_tried_at_four_lengths():
+    asked = []
+
+    class Stubborn(Linear):
+        def embed(self, x):
+            asked.append(x[0])
+            return np.array([1.0 if len(asked) == 1 else 9.0]), np.eye(1)
+
+    beta, _, _ = solve(Moments.of(np.ones((4, 1)), np.full(4, 3.0)), [Stubborn()], [1])
+    first, *tried = asked
+    # from 1 least squares is at 3
+    np.testing.assert_allclose(np.array(tried) - first, 2 * np.array([1.0, 0.3, 0.1, 0.03]), rtol=1e-6)
+    assert beta.tolist() == [1.0]
+
+
+def test_it_ends_where_a_step_removes_less_than_a_ten_thousand_millionth():
+    sizes, asked = [1e-3, 4e-10, 2.5e-10, 2e-10, 1e-10], []
+
+    class Slow(Linear):
+        def embed(self, x):
+            asked.append(x)
+            return np.array([1.0 + np.sqrt(sizes[min(len(asked), 5) - 1])]), np.eye(1)
+
+    # (1 - β)² + 1: of 1 the third step removes 0.5e-10, the second 1.5e-10
+    solve(Moments(np.eye(1), np.ones(1), 2.0, 1.0), [Slow()], [1])
+    assert len(asked) == 4
+
+
+def test_what_equal_columns_do_not_tell_apart_is_followed_for_thirty_steps():
+    # each of (ones + ε I) x = b with b = (1, -1)/10⁶, as the start
+    beta, _, _ = solve(Moments(np.ones((2, 2)), np.array([1e-6, -1e-6]), 1.0, 9.0), [Linear()], [2])
+    np.testing.assert_allclose(beta, 31 * 1e-6 / 1e-8 * np.array([1.0, -1.0]), rtol=1e-4)
 
 
 def test_columns_of_round_off_have_no_scale_and_no_coefficient():

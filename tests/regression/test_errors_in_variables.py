@@ -32,6 +32,13 @@ def test_too_much_noise_is_left_alone():
     assert corrected(moments.G, exact, moments.b) is None
 
 
+def test_of_every_direction_half_must_be_signal():
+    b = np.array([0.3, 0.8])
+    for share, found in ((0.5, [0.6, 0.8]), (0.49, None), (0.0, None)):
+        beta = corrected(np.eye(2), np.diag([share, 1.0]), b)
+        assert (beta if beta is None else beta.tolist()) == found
+
+
 def test_dependent_columns_are_left_alone():
     G = np.ones((2, 2))
     assert corrected(G, G, np.ones(2)) is None

@@ -111,6 +111,22 @@ def test_an_error_of_nothing_is_not_negative():
         assert max(found) < 1e-9 * moments.yy
 
 
+@pytest.mark.parametrize(("own", "gains"), [(1.5e-9, True), (0.7e-9, False)])
+def test_a_column_that_the_support_all_but_spans_gains_nothing(own, gains):
+    """Unit columns of which a thousand-millionth of the second's square must be its own."""
+    c = np.sqrt(1 - own)
+    found = Moments(np.array([[1.0, c], [c, 1.0]]), np.array([0.0, 1e-6]), 1.0, 9.0).gains(np.array([0]))[1]
+    assert found[1] == pytest.approx(1e-12 / own if gains else 0.0, rel=0.01)
+
+
+def test_a_ridge_holds_what_equal_columns_do_not_tell_apart():
+    # (ones + ε I) x = b with b = (1, -1)/10⁷ has the solution b/ε, and explains 2/10¹⁴/ε
+    twins = Moments(np.ones((2, 2)), np.array([1e-7, -1e-7]), 1.0, 9.0)
+    np.testing.assert_allclose(twins.solve(), [1e-7 / 2e-13, -1e-7 / 2e-13], rtol=1e-2)
+    for error, _ in (twins.gains(np.arange(2)), twins.losses(np.arange(2))):
+        assert error == pytest.approx(1 - 2e-14 / 1e-12, rel=1e-4)
+
+
 def test_columns_of_given_squares_are_made_one_long():
     assert unit_length(np.array([4.0, 0.01, 1e-300])).tolist() == pytest.approx([0.5, 10.0, 1e150])
     assert np.isfinite(unit_length(np.zeros(1))).all()

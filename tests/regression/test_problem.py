@@ -1,12 +1,16 @@
 """What an estimator is handed: forced columns out, unit sizes, a criterion; and coefficients back."""
 
+import importlib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from armloop.regression.estimators import Estimator
 from armloop.regression.estimators.adaptive_lasso import adaptive_lasso
 from armloop.regression.estimators.lasso import lasso
 from armloop.regression.estimators.problem import Problem, Reduction, halves
-from armloop.regression.estimators.stability import _dealt, _drawn
+from armloop.regression.estimators.stability import _dealt, _drawn, stability
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
@@ -43,6 +47,13 @@ def test_forced_columns_are_projected_out_and_what_they_span_is_left_out():
     np.testing.assert_allclose(beta, [*exact, 0.0], rtol=1e-5)
 
 
+def test_a_ridge_holds_forced_columns_that_are_equal():
+    # (ones + ε I) x = b with b = (1, -1)/10⁷ explains 2/10¹⁴/ε
+    G = np.block([[np.ones((2, 2)), np.zeros((2, 1))], [np.zeros((1, 2)), np.eye(1)]])
+    reduction = Reduction.of(Moments(G, np.array([1e-7, -1e-7, 0.5]), 1.0, 9.0), np.arange(2))
+    assert reduction.yy == pytest.approx(1 - 2e-14 / 1e-12, rel=1e-4)
+
+
 def test_a_part_is_seen_in_the_units_of_the_whole():
     X, y = data()
     forced = np.array([0, 3])
@@ -64,6 +75,7 @@ def test_without_forced_columns_and_without_a_signal():
     whole = Reduction.of(Moments.of(X[:, :5], 0 * y), NONE)
     assert (whole.yy, whole.reduced.yy) == (0.0, 0.0)
     assert not whole.reduced.b.any()
+    np.testing.assert_allclose(whole.scale, 1 / np.linalg.norm(X[:, :5], axis=0))
     parts = [Moments.of(X[k::5, :5], 0 * y[k::5]) for k in range(5)]
     support, beta = Sparse("lasso").fit(total(parts), np.array([1]), parts=parts)
     assert support.tolist() == [1] and beta.tolist() == [0.0]
@@ -194,6 +206,48 @@ def test_halves_are_complementary_and_drawn_ones_deviate_as_sums_of_half_the_sam
     np.testing.assert_allclose(found, expected, atol=4 * expected.max() * np.sqrt(2 / len(deviations)))
 
 
+def test_a_fit_is_asked_in_samples_worth_a_sample_and_to_rounding_of_the_larger_signal(monkeypatch):
+    asked = []
+
+    class Asked(Estimator):
+        def choose(self, problem):
+            asked.append(problem)
+            return np.zeros(problem.size)
+
+    assert Sparse() == Sparse("evidence", None, 1.0, 40, 2.0)
+    X, y = data()
+    moments = Moments.of(X, y)
+    monkeypatch.setattr(Sparse, "how", property(lambda self: Asked()))
+    for power, count, worth in ((0.0, 100.0, 40.0), (1e3, 100.0, 40.0), (0.0, 4.0, 2.0)):
+        Sparse(gamma=0.3, max_terms=7, correlation=2.5, penalty=0.1).fit(
+            replace(moments, count=count), NONE, power
+        )
+        problem = asked[-1]
+        assert (problem.count, problem.gamma, problem.max_terms, problem.penalty) == (worth, 0.3, 7, 0.1)
+        assert problem.floor == pytest.approx(1e-12 * max(moments.yy, power * count) / moments.yy)
+
+
+def test_stability_keeps_what_nine_halves_in_ten_agree_on(monkeypatch):
+    module = importlib.import_module("armloop.regression.estimators.stability")
+    dealt, terms = [], []
+
+    def path(half, most):
+        terms.append(most)
+        return None, np.array([[1.0], [float(len(terms) <= 45)], [float(len(terms) <= 44)]])
+
+    monkeypatch.setattr(module, "path", path)
+    monkeypatch.setattr(module, "_dealt", lambda problem, rng: dealt.append(len(problem.parts)) or ())
+    part = Moments(np.eye(3), np.full(3, 0.2), 1.0, 100.0)
+    found = stability(Problem(part, (part,) * 7, 100.0, 1e-12, 1.0, 40, None))
+    # three columns: the root of six, two terms, of each of fifty halves
+    assert np.flatnonzero(found).tolist() == [0, 1] and terms == [2] * 50 and dealt == []
+    terms.clear()
+    stability(Problem(part, (), 100.0, 1e-12, 1.0, 1, None))
+    assert terms == [1] * 50
+    stability(Problem(part, (part,) * 8, 100.0, 1e-12, 1.0, 40, None))
+    assert dealt == [8]
+
+
 def test_a_doubtful_column_goes_only_if_the_criterion_is_better_without_it():
     rng = np.random.default_rng(7)
     X = rng.normal(size=(300, 5))
@@ -214,6 +268,8 @@ def test_a_doubtful_column_goes_only_if_the_criterion_is_better_without_it():
         support = shorter if criterion(shorter) < criterion(support) else support
     assert kept.tolist() == support
     assert 2 in support and 1 not in support
+    # in whatever unit
+    assert sparse.prune(Moments.of(X, 1e-9 * y), np.arange(5), np.array([1, 2, 3])).tolist() == support
     # a single doubtful column has no rivals: it costs but what it costs
     for size in (0.0, 0.18, 0.21, 0.25, 1.0):
         z = X[:, 0] + size * X[:, 4] / np.linalg.norm(X[:, 4]) * np.sqrt(300) + noise
@@ -231,6 +287,9 @@ def test_what_is_below_round_off_of_a_larger_signal_is_worth_no_term():
     y = 1e-3 * X[:, 1]
     moments = Moments.of(X, y)
     assert Sparse().fit(moments, NONE)[0].tolist() == [1]
+    assert Sparse().support(Moments.of(X, 1e-9 * y), NONE).tolist() == [1]
+    # a single one to choose from
+    assert Sparse().fit(Moments.of(X[:, :2], y), np.array([0]))[0].tolist() == [0, 1]
     # a signal a million times as large leaves such a remainder by rounding
     assert Sparse().fit(moments, NONE, power=1e8)[0].tolist() == []
     assert Sparse().fit(moments, NONE, power=1e4)[0].tolist() == [1]

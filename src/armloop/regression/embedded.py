@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from armloop.regression.moments import Moments
+from armloop.regression.moments import Moments, unit_length
 from armloop.util.arrays import Array
 
 _ITERATIONS = 30
@@ -115,4 +115,4 @@ def unit_scale(G: Array) -> Array:
     """(p,) factors that make columns with the moments G one long; zero for what is no column but rounding errors."""
     size = np.diag(G)
     there = size > _NOTHING * size.max(initial=0.0)
-    return np.where(there, 1 / np.sqrt(np.where(there, size, 1.0)), 0.0)
+    return np.where(there, unit_length(size), 0.0)

@@ -106,14 +106,14 @@ def _pair_gains(G: Array, left: Array) -> Array:
     """
     size = np.einsum("kcc->kc", G)
     spanned = size < DEPENDENT
-    scale = np.where(spanned, 0.0, 1 / np.sqrt(np.maximum(size, DEPENDENT)))
+    scale = 1 / np.sqrt(np.maximum(size, DEPENDENT))
     z = left * scale
     r = G * scale[:, :, None]
     r *= scale[:, None, :]
     area = 1.0 - r * r
     area[spanned] = 0.0
     area.transpose(0, 2, 1)[spanned] = 0.0
-    area[:, np.arange(G.shape[1]), np.arange(G.shape[1])] = 0.0
+    np.einsum("kcc->kc", area)[:] = 0.0
     r *= -2 * z[:, :, None]
     r *= z[:, None, :]
     r += (z * z)[:, :, None]
@@ -131,10 +131,8 @@ class _Search:
 
     def run(self) -> Index:
         none = np.zeros(0, dtype=np.intp)
-        if self.max_terms == 0:
-            return none
         best, last = (self.problem.score(none), none), none
-        for betas in path(self.moments, 2 * self.max_terms)[1].T[1:]:
+        for betas in path(self.moments, 2 * self.max_terms)[1].T:
             last = np.flatnonzero(betas).astype(np.intp)
             if len(last) <= self.max_terms:
                 best = min(best, (self.problem.score(last), last), key=_score)

@@ -49,11 +49,10 @@ def lasso(problem: Problem) -> Array:
     steps = min(steps, 6 * problem.max_terms)
     if len(problem.parts) >= 2:
         train, check = halves(problem.parts)
-        ratio = train.yy
-        unit = Moments(train.G / ratio, train.b / ratio, 1.0, train.count)
-        alphas, betas = path(unit, steps, _LAST)
+        alphas, betas = path(train, steps, _LAST * train.yy)
         errors = [check.squared_error(beta) for beta in betas.T]
-        best = float(alphas[int(np.argmin(errors))])
+        # in units of the signal that was fitted
+        best = float(alphas[int(np.argmin(errors))] / train.yy)
         return path(problem.moments, 2 * steps, best)[1][:, -1]
     _, betas = path(problem.moments, steps, _LAST)
     scores = [

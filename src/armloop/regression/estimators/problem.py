@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -110,7 +110,7 @@ class Reduction:
         G, b, yy = part.G[np.ix_(free, free)], part.b[free], part.yy
         if len(forced):
             mixed, F = part.G[np.ix_(forced, free)], part.G[np.ix_(forced, forced)]
-            own = Moments(self.moments.G[np.ix_(forced, forced)], self.moments.b[forced], 0.0, 0.0).solve()
+            own = self.moments.solve(forced)
             G = G - onto.T @ mixed - mixed.T @ onto + onto.T @ F @ onto
             b = b - onto.T @ part.b[forced] - mixed.T @ own + onto.T @ F @ own
             yy = yy - 2 * float(own @ part.b[forced]) + float(own @ F @ own)
@@ -123,11 +123,8 @@ class Reduction:
         full = np.zeros(len(self.moments.b))
         full[self.free] = self.scale * beta
         if len(self.forced):
-            rest = (
-                self.moments.b[self.forced] - self.moments.G[np.ix_(self.forced, self.free)] @ full[self.free]
-            )
-            F = self.moments.G[np.ix_(self.forced, self.forced)]
-            full[self.forced] = Moments(F, rest, 0.0, 0.0).solve()
+            rest = self.moments.b - self.moments.G[:, self.free] @ full[self.free]
+            full[self.forced] = replace(self.moments, b=rest).solve(self.forced)
         return full
 
 
