@@ -150,13 +150,15 @@ class TestSharedSamples:
 
     def test_steady_creep_keeps_direction_and_half_of_its_speed_over_a_period_of_the_corner(self) -> None:
         v = np.full((30, 1), 0.008)
-        v[10], v[20] = 0.0041, 0.0039
+        v[10], v[20] = 0.004, 0.0039
         # two samples to both sides
         steady = shared._steady(self.samples(v))[:, 0]
         assert np.flatnonzero(~steady).tolist() == [18, 19, 20, 21, 22]
         assert np.array_equal(shared._steady(self.samples(-v))[:, 0], steady)
         assert np.flatnonzero(~shared._steady(self.samples(v, starts=(0, 20)))[:, 0]).tolist() == [20, 21, 22]
         assert not shared._steady(self.samples(v, cutoff=0.0)).any()
+        assert shared._steady(self.samples(np.full((30, 1), 0.008), cutoff=0.8)).all()
+        assert not shared._steady(self.samples(np.zeros((30, 1)))).any()
         turn = np.where(np.arange(30) < 15, 0.008, -0.008)[:, None]
         assert np.flatnonzero(~shared._steady(self.samples(turn))[:, 0]).tolist() == [13, 14, 15, 16]
 
@@ -204,6 +206,21 @@ class TestSharedSamples:
                 shared.check_rank(G, base)
         with pytest.raises(ExcitationError, match=f"leaves {third + 1} of {base.count} inertial parameters"):
             shared.check_rank(G, base)
+
+    def test_of_columns_that_are_alike_the_sum_is_known(self) -> None:
+        base = BaseParameters.of_arm(three_axis())
+        leads = [name.split(" ")[0] for name in base.names]
+        assert any(" " in name for name in base.names[1:3])
+        G = np.eye(base.count)
+        G[1:3, 1:3] = 1.0
+        (note,) = shared.undetermined_notes(G, base)
+        assert note.startswith(f"the motion does not determine 1 of {base.count} inertial parameters")
+        assert f"by themselves: {leads[2]} were taken" in note
+        assert note.endswith(f"; what it determines is {leads[1]} + {leads[2]}")
+
+    def test_the_plain_friction_follows_from_a_sample_alone(self) -> None:
+        kinds = [term.kind for term in shared.PLAIN_FRICTION]
+        assert kinds == ["offset", "smooth_sign", "viscous", "quadratic"]
 
 
 class TestCorners:

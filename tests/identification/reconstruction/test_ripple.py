@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_1samp
 from synthetic import three_axis
 
+from armloop.data.log import MotionLog
+from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import ripple
 from armloop.identification.reconstruction.ripple import Residual
 from armloop.robot.arm import load_arm
@@ -86,6 +89,60 @@ def test_a_line_is_twenty_times_as_strong_as_the_orders_a_quarter_around_it() ->
     for others in (near, [*range(20, 75), *range(126, 180)]):
         line = ripple._line(even((100, 4.0), *((k, 0.5) for k in others)), ORDERS, 3)
         assert line is not None and line[0] == 100.0
+
+
+def test_a_line_has_six_orders_beside_it_that_it_does_not_leak_into() -> None:
+    """A quarter of 36 holds those 7, 8 and 9 away; of 35 there are only four. One that has none hides no other."""
+    line = ripple._line(even((36, 1.0)), ORDERS, 3)
+    assert line is not None and line[0] == 36.0
+    assert ripple._line(even((35, 1.0)), ORDERS, 3) is None
+    line = ripple._line(even((20, 3.0), (100, 2.0)), ORDERS, 3)
+    assert line is not None and line[0] == 100.0
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.001, True), (0.999, False)])
+def test_the_chance_is_student_s_of_what_blocks_gain(
+    factor: float, found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each block by itself, whatever its size, beside fits of the other folds; for any order of any joint."""
+    left = residual(0.5, 0.5, blocks=20, there=range(0, 20, 2))
+    left = Residual(left.q, left.left * np.where(left.block == 5, 2.0, 1.0), left.block)
+    gains = []
+    for k in range(20):
+        X = np.column_stack([np.sin(100 * left.q), np.cos(100 * left.q)])
+        own, others = left.block == k, left.block % 5 != k % 5
+        after = left.left[own] - X[own] @ np.linalg.lstsq(X[others], left.left[others], rcond=None)[0]
+        a, b = np.sum(left.left[own] ** 2), np.sum(after**2)
+        gains.append((a - b) / (a + b))
+    chance = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue)
+    assert chance < 0.5
+    monkeypatch.setattr(ripple, "_CHANCE", factor * chance * 200 * 3)
+    monkeypatch.setattr(ripple, "_STANDS_OUT", 5.0)
+    assert (ripple._line(left, ORDERS, 3) is not None) == found
+
+
+def test_what_the_corner_takes_away_is_left_of_the_torque() -> None:
+    """A third of the sample rate is told from what a model explains, in blocks of one and a half seconds."""
+    time = np.arange(2000) / 200
+    wave = np.sin(2 * np.pi * 60 * time)
+    q = np.column_stack([0.3 * time, np.sin(time), 0.2 * time])
+    v = np.column_stack([0.3 + 0 * time, np.cos(time), 0.2 + 0 * time])
+    logs = [MotionLog(time + 100 * k, q, v, q + (1 + k) * wave[:, None], name=f"run{k}") for k in range(2)]
+    short = MotionLog(time[:20] + 50, q[:20], v[:20], q[:20], name="short")
+    how = Conditioning(cutoff_hz=5.0)
+    samples = preprocess(logs, how)
+    held = samples.motion.time > 105.0
+    model: Any = SimpleNamespace(arm=three_axis(), conditioning=how, predict=lambda motion: motion.q)
+    residuals, period = ripple._residuals(model, [logs[0], short, logs[1]], samples, held)
+    assert period == pytest.approx(1 / 200)
+    for j, left in enumerate(residuals):
+        at = np.interp(left.q, q[:, j], time) if j != 1 else None
+        if at is not None:
+            first = left.block < 7
+            times = np.where(first, 1.0, 2.0)
+            np.testing.assert_allclose(left.left, times * np.sin(2 * np.pi * 60 * at), atol=0.05)
+            assert sorted(set(left.block[first])) == [*range(7)] and left.block.max() == 10
+            assert at[~first].max() == pytest.approx(5.0, abs=0.1) and at[first].max() > 9.7
 
 
 @pytest.mark.parametrize("samples", [499, 500])

@@ -34,7 +34,7 @@ FRICTION = (
     FrictionTerm("quadratic"),
 )
 #: What the load is estimated with, before any friction that depends on it is regressed.
-PLAIN_FRICTION = FRICTION[:2] + FRICTION[4:]
+PLAIN_FRICTION = tuple(term for term in FRICTION if term.kind != "hysteresis")
 #: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion, unless it creeps steadily: so much
 #: of the largest speed must the smallest one be, over a period of the filter to both sides.
 _SLIDING, _STEADY = 0.01, 0.5
@@ -106,7 +106,8 @@ def check_rank(G: Array, base: BaseParameters) -> None:
     Args:
         G: (r, r) products of the base parameters' columns.
     """
-    weak = base.count - len(identifiable(G)[0])
+    kept, _ = identifiable(G)
+    weak = base.count - len(kept)
     if weak > base.count // 3:
         raise ExcitationError(
             f"the motion leaves {weak} of {base.count} inertial parameters undetermined; log exciting motion of all "
