@@ -212,3 +212,51 @@ def test_sums_grow_at_the_columns_that_act() -> None:
     np.testing.assert_allclose(made.G, expected.G, atol=1e-12)
     np.testing.assert_allclose(made.b, expected.b, atol=1e-12)
     assert (made.yy, made.count) == (pytest.approx(expected.yy), 30.0)
+
+
+class TestTermsThatNothingExcites:
+    """A Stribeck fall is one at the onset of sliding and next to nothing, 1e-90 maybe, at any speed above."""
+
+    TERMS = (FrictionTerm("offset"), FrictionTerm("viscous"), FrictionTerm("stribeck_peak", parameter=0.1))
+
+    def pooled(self, slowest: list[float], passive: bool, seed: int = 0) -> Pooled:
+        """Of one joint whose speeds begin with the slowest of each fold."""
+        rng, parts = np.random.default_rng(seed), []
+        for low in slowest:
+            v = np.append(low, rng.uniform(1.0, 2.0, 40))
+            X = np.column_stack([rng.normal(size=41), np.ones(41), v, np.exp(-((v / 0.1) ** 2))])
+            parts.append(Moments.of(X, X @ [1.0, 0.3, 0.5, 0.0] + 0.01 * rng.normal(size=41)))
+        sums = JointSums([parts], [parts])
+        return Pooled(sums, [list(self.TERMS)], len(slowest), passive=passive)
+
+    @pytest.mark.parametrize("passive", [True, False])
+    def test_they_stay_zero_and_cost_nothing_where_the_joint_is_slow(self, passive: bool) -> None:
+        pooled = self.pooled([1.5, 1.5, 0.0], passive)
+        with_fall, without = [[0, 1, 2]], [[0, 1]]
+        weights = pooled.solve(without).weights
+        # of the fold in which it creeps the others say nothing
+        expected = pooled.held_out(without, weights)[2]
+        np.testing.assert_allclose(
+            pooled.held_out(with_fall, weights)[2], expected, rtol=1e-6
+        )  # the ridge's size
+        fast = self.pooled([1.5, 1.5], passive)
+        theta = fast.solve(with_fall).theta
+        assert theta[3] == 0.0
+        np.testing.assert_allclose(theta[:3], fast.solve(without).theta, rtol=1e-6)
+
+    @pytest.mark.parametrize("repeats", [1.0, 4.0])
+    def test_one_sample_at_the_onset_of_sliding_excites(self, repeats: float) -> None:
+        rng = np.random.default_rng(1)
+        for squares, excited in ((1.01 * repeats, True), (0.99 * repeats, False)):
+            fall = np.append(np.full(4, np.sqrt(squares / 4)), np.zeros(40))
+            X = np.column_stack([rng.normal(size=44), np.ones(44), rng.uniform(1, 2, 44), fall])
+            part = Moments.of(X, X @ [1.0, 0.3, 0.5, 0.7])
+            pooled = Pooled(JointSums([[part]], [[part]]), [list(self.TERMS)], 1, repeats)
+            assert pooled.solve([[0, 1, 2]]).theta[3] == pytest.approx(0.7 if excited else 0.0, rel=1e-4)
+
+    def test_what_grows_with_speed_or_load_is_excited_however_little(self) -> None:
+        terms = [FrictionTerm("viscous"), FrictionTerm("load_sign"), FrictionTerm("cubic")]
+        X = 1e-6 * np.random.default_rng(2).normal(size=(40, 4))
+        part = Moments.of(X, X @ [1.0, 0.3, 0.5, 0.7])
+        pooled = Pooled(JointSums([[part]], [[part]]), [terms])
+        np.testing.assert_allclose(pooled.solve([[0, 1, 2]]).theta, [1.0, 0.3, 0.5, 0.7], rtol=1e-4)

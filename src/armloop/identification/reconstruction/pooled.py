@@ -17,9 +17,10 @@ from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from armloop.identification.reconstruction.joint_sums import JointSums
-from armloop.laws.friction import FrictionTerm
+from armloop.laws.friction import FrictionTerm, Sliding
 from armloop.regression.moments import Moments, total, unit_length
 from armloop.util.arrays import TINY, Array
+from armloop.util.functions import NUMPY
 
 #: For every joint the candidates of its friction that are used, by their place.
 Choice = list[list[int]]
@@ -91,6 +92,9 @@ class Pooled:
         self._wholes = [total(parts) for parts in self._parts]
         self._all = [total(own) for own in sums.parts]
         self._held_out = [total(own[folds:]) if own[folds:] else None for own in sums.parts]
+        # A term is excited as much as by one sample at the onset of sliding: what a fast motion leaves of a Stribeck fall,
+        # 1e-90 maybe, would else be regressed as if it were a column like any other.
+        self._least = [repeats * np.array([_at_rest(term) ** 2 for term in own]) for own in candidates]
 
     @property
     def everything(self) -> Choice:
@@ -181,14 +185,17 @@ class Pooled:
         size = r + sum(map(len, choice))
         G, b = np.zeros((size, size)), np.zeros(size)
         start = r
-        for part, chosen, weight in zip(parts, choice, weights, strict=True):
-            own, end = r + np.array(chosen, dtype=np.intp), start + len(chosen)
+        for part, chosen, weight, least in zip(parts, choice, weights, self._least, strict=True):
+            end = start + len(chosen)
+            own = np.array(chosen, dtype=np.intp)
+            excited = np.diag(part.G)[r + own] > least[own]
             G[:r, :r] += weight * part.G[:r, :r]
-            G[start:end, start:end] = weight * part.G[np.ix_(own, own)]
-            G[:r, start:end] = weight * part.G[:r, own]
-            G[start:end, :r] = G[:r, start:end].T
+            own, mine = r + own[excited], start + np.flatnonzero(excited)
+            G[np.ix_(mine, mine)] = weight * part.G[np.ix_(own, own)]
+            G[:r, mine] = weight * part.G[:r, own]
+            G[mine, :r] = G[:r, mine].T
             b[:r] += weight * part.b[:r]
-            b[start:end] = weight * part.b[own]
+            b[mine] = weight * part.b[own]
             start = end
         G[np.diag_indices(size)] *= 1 + _RIDGE
         if prior is not None:
@@ -198,7 +205,8 @@ class Pooled:
         return G, b
 
     def _solved(self, G: Array, b: Array, choice: Choice) -> Array:
-        scale = unit_length(np.diag(G))
+        # what nothing excites stays zero, whatever rounding makes of it
+        scale = unit_length(np.diag(G)) * (np.diag(G) > 0)
         G, b = G * np.outer(scale, scale), scale * b
         G[np.diag_indices(len(b))] += _ROUND_OFF
         bound = np.zeros(len(b), dtype=bool)
@@ -231,3 +239,9 @@ class Pooled:
             found.append(np.concatenate([theta[: self.shared], own]))
             start += len(chosen)
         return found
+
+
+def _at_rest(term: FrictionTerm) -> float:
+    """What a friction term is at the onset of sliding, per unit of its coefficient; 0 where that depends on the load."""
+    still = Sliding(np.float64(0.0), np.float64(0.0), 1.0, np.float64(0.0))
+    return 0.0 if term.by_load else float(term.element.value(still, term.parameter, NUMPY))
