@@ -210,15 +210,20 @@ def test_what_estimators_say_of_themselves():
 
 
 @pytest.mark.parametrize(
-    ("held_out", "penalty", "steps"), [(False, None, [12]), (True, None, [12, 24]), (True, 0.1, [80])]
+    ("held_out", "penalty", "steps", "last"),
+    [(False, None, [12], 1e-5), (True, None, [12, 24], 0.5e-5), (True, 0.1, [80], 0.1)],
 )
-def test_so_many_steps_of_the_lassos_path_are_followed(held_out, penalty, steps, monkeypatch):
+def test_so_many_steps_of_the_lassos_path_are_followed(held_out, penalty, steps, last, monkeypatch):
     """Six to a term that is allowed, twice as many to a penalty that was chosen, eight to a column to one that is given."""
     module = importlib.import_module("armloop.regression.estimators.lasso")
     asked, follow = [], module.path
     monkeypatch.setattr(
-        module, "path", lambda moments, most, last: asked.append(most) or follow(moments, most, last)
+        module,
+        "path",
+        lambda moments, most, last: asked.append((most, last)) or follow(moments, most, last),
     )
-    parts = tuple(Moments(np.eye(10) / 2, np.linspace(0.1, 0.4, 10), 1.0, 100.0) for _ in range(2))
+    parts = tuple(Moments(np.eye(10) / 2, np.linspace(0.1, 0.4, 10), 0.5, 100.0) for _ in range(2))
     lasso(Problem(total(parts), parts if held_out else (), 200.0, 1e-12, 1.0, 2, penalty))
-    assert asked == steps
+    assert [most for most, _ in asked] == steps
+    # to a part of the signal that is fitted
+    assert asked[0][1] == pytest.approx(last)

@@ -206,6 +206,9 @@ def test_so_far_it_looks(monkeypatch):
     _Search(given)._best(fit, np.array([[0, 1], [2, 3]]), 2)
     assert screened == [(2, 120, 120)]
     monkeypatch.setattr(_Search, "_best", best)
+    with monkeypatch.context() as patch:
+        patch.setattr(_Search, "_exchange", lambda self, fit, removed, added: (removed, added))
+        assert list(_Search(given)._moves(fit))[1:] == [(1, 1), (2, 2), (3, 2)]
     for removed, added, count in ((1, 1, 14), (2, 2, 66), (3, 2, 220)):
         sizes.clear()
         _Search(given)._exchange(fit, removed, added)

@@ -204,6 +204,10 @@ def test_halves_are_complementary_and_drawn_ones_deviate_as_sums_of_half_the_sam
     expected = rss / (400 - 5) * given.moments.G / 4
     found = np.cov(np.array(deviations).T)
     np.testing.assert_allclose(found, expected, atol=4 * expected.max() * np.sqrt(2 / len(deviations)))
+    # of fewer samples more by what is left of them beside the columns, one at least
+    for count, left in ((7.0, 2.0), (5.5, 1.0)):
+        first, _ = next(_drawn(replace(given, count=count), np.random.default_rng(1)))
+        np.testing.assert_allclose(first.b - given.moments.b / 2, deviations[0] * np.sqrt(395 / left))
 
 
 def test_a_fit_is_asked_in_samples_worth_a_sample_and_to_rounding_of_the_larger_signal(monkeypatch):
@@ -233,7 +237,8 @@ def test_stability_keeps_what_nine_halves_in_ten_agree_on(monkeypatch):
 
     def path(half, most):
         terms.append(most)
-        return None, np.array([[1.0], [float(len(terms) <= 45)], [float(len(terms) <= 44)]])
+        # a term counts that comes at any step of the path
+        return None, np.array([[0.0, 1.0], [float(len(terms) <= 45), 0.0], [0.0, float(len(terms) <= 44)]])
 
     monkeypatch.setattr(module, "path", path)
     monkeypatch.setattr(module, "_dealt", lambda problem, rng: dealt.append(len(problem.parts)) or ())
