@@ -180,7 +180,11 @@ def test_what_is_regressed_together_must_be_worth_its_terms(
     criterion: float, better: bool, velocities: list[int] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reports = [StepReport(k, [1, 1], 9, 9, [1], [5]) for k in (1, 2, 3)]
-    new = [replace(report, orders=velocities, terms=[4 + k], samples=[7]) for k, report in enumerate(reports)]
+    orders = [9, 9], velocities, [8, 8]
+    new = [
+        replace(report, orders=own, terms=[4 + k], samples=[7])
+        for k, (report, own) in enumerate(zip(reports, orders, strict=True))
+    ]
     monkeypatch.setattr(revision, "regress_step", lambda *_: (["terms"], [["law"]], new))
     monkeypatch.setattr(revision, "_model", lambda found: None)
     monkeypatch.setattr(revision, "_counts", lambda found: None)

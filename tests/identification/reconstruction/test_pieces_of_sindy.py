@@ -118,7 +118,10 @@ def test_the_setting_with_the_least_error_is_taken_of_all_orders(
     assert [law[0].kind for law in found.friction] == ["sign"] * 3
     assert [law[0].coefficient for law in found.friction] == pytest.approx([0.0, 3.0, 0.0])
     assert report.terms == [0, 3 - order, 0]
+    # of each order the least error is told: that of nothing, or of the direction alone, not of coefficients of 1e3
+    assert all(error < 2.0 for _, error in report.trials)
     (terms,) = found.components
+    assert (report.step, terms.step) == (3, 3)
     assert isinstance(terms, SparseTerms) and terms.coefficients.shape == (2 - order, 3)
 
 

@@ -9,7 +9,8 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.regimes import Clusters, Condition
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.stepwise import _impure, stepwise
+from armloop.identification.reconstruction.step import PARTS
+from armloop.identification.reconstruction.stepwise import _impure, _together, steps, stepwise
 from armloop.identification.reconstruction.trials import HeldOut
 from armloop.model import ReconstructedModel
 from armloop.regression.sparse import Sparse
@@ -55,6 +56,26 @@ def found(noisy: Samples) -> Found:
 
 
 @pytest.mark.slow
+def test_each_step_looks_at_its_condition_for_powers_of_its_own():
+    """No powers of velocities in gravity, one or two beside constant velocities, one beside accelerations."""
+    options = Options(max_order=2)
+    plans = steps((True, True), options)
+    assert [plan.parts for plan in plans] == [(part,) for part in PARTS]
+    assert [plan.conditions for plan in plans] == [(1,), (2,), (3,)]
+    assert [plan.friction for plan in plans] == [("sign",), ("viscous", "stribeck"), ()]
+    powers = ((0,), (1, 2), (1,))
+    for plan, own in zip(plans, powers, strict=True):
+        assert sorted(plan.orders) == [(N1, N2) for N1 in (1, 2) for N2 in own]
+    (whole,) = _together((True, True), options)
+    assert (whole.parts, whole.conditions) == (PARTS, (1, 2, 3))
+    assert whole.friction == ("sign", "viscous", "stribeck") and whole.orders == ((1, 2), (2, 2))
+    # smallest library first, and only that if none is as small as allowed
+    assert plans[1].orders[0] == (1, 1)
+    assert [plan.orders for plan in steps((True, True), Options(max_order=2, max_candidates=0))] == [
+        *(((1, 0),), ((1, 1),), ((1, 1),))
+    ]
+
+
 def test_the_papers_orders_come_out_of_exact_data():
     samples = conditioned_samples((400, 2500, 2500))
     found = found_on(samples, max_order=4)

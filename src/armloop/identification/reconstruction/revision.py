@@ -90,7 +90,7 @@ def _counts(found: Found) -> Array:
 
 def _plan(revolute: tuple[bool, ...], found: Found, options: Options) -> StepPlan:
     """All libraries, positions at the first step's order, the others up to what the later steps chose."""
-    first, second, third = ((report.orders or [1, 0])[0] for report in found.reports)
+    first, second, third = ((report.orders or [1])[0] for report in found.reports)
     every = tuple((N1, 2) for N1 in range(1, max(2, second, third) + 1))
     every = tuple(order for order in every if order[0] <= options.max_order) or every[:1]
     plan = StepPlan(PARTS, every, ("sign", "viscous", "stribeck"), (1, 2, 3), still=first)
@@ -129,23 +129,23 @@ class Leftover:
         run = np.searchsorted(motion.starts, np.arange(len(r)), side="right")
         same = (run[lag:] == run[:-lag]) & (condition[lag:] == condition[:-lag])
         both = usable[lag:] & usable[:-lag] & same[:, None]
-        sums = np.zeros((3, 3, r.shape[1]))
-        for label in (1, 2, 3):
+        products, squares, pairs = np.zeros((3, 3, r.shape[1]))
+        for k, label in enumerate((1, 2, 3)):
             rows = both & (condition[lag:] == label)[:, None]
-            sums[0, label - 1] = np.sum(r[lag:] * r[:-lag], axis=0, where=rows)
-            sums[1, label - 1] = np.sum(0.5 * (r[lag:] ** 2 + r[:-lag] ** 2), axis=0, where=rows)
-            sums[2, label - 1] = rows.sum(axis=0)
+            products[k] = np.sum(r[lag:] * r[:-lag], axis=0, where=rows)
+            squares[k] = np.sum(0.5 * (r[lag:] ** 2 + r[:-lag] ** 2), axis=0, where=rows)
+            pairs[k] = rows.sum(axis=0)
         independent = usable & chunk.independent[:, None]
         total, count = np.sum(r**2, axis=0, where=independent), independent.sum(axis=0).astype(float)
-        return Leftover(sums[0], sums[1], sums[2], total, count)
+        return Leftover(products, squares, pairs, total, count)
 
     def worst(self) -> tuple[float, int, int]:
         """The largest part of a squared residual that repeats, at which joint (from 0), and in which condition.
 
         It is set against the joint's noise in all conditions: a mistake that would be drowned in most of them is none.
         """
-        noise = (self.squares - self.products).sum(axis=0) / np.maximum(self.pairs.sum(axis=0), 1.0)
-        repeats = np.where(self.pairs >= _FEWEST, self.products / np.maximum(self.pairs, 1.0), 0.0)
+        noise = (self.squares - self.products).sum(axis=0) / np.maximum(self.pairs.sum(axis=0), _FEWEST)
+        repeats = np.where(self.pairs >= _FEWEST, self.products / np.maximum(self.pairs, _FEWEST), 0.0)
         share = repeats / np.maximum(repeats + np.maximum(noise, 0.0), TINY)
         label, joint = np.unravel_index(int(np.argmax(share)), share.shape)
         return float(share[label, joint]), int(joint), int(label) + 1
