@@ -255,16 +255,20 @@ class TestIsolability:
             return SimpleNamespace(parameters=["of the first", "of the rival"][-len(effects) :])
 
         monkeypatch.setattr(confounded, "fit", fit)
-        effects = [self.of("first"), self.of("second", 2)]
+        effects = [self.of("first"), self.of("second", 2), self.of("third", 3)]
         laws = [self.law(effect) for effect in effects]
-        rivals = [[(self.of("rival"), 0.1), (self.of("second", 2), 0.1), (self.of("none", 1, None), 0.1)], []]
+        rivals = [
+            [(self.of("rival"), 0.1), (self.of("second", 2), 0.1), (self.of("none", 1, None), 0.1)],
+            [],
+            [],
+        ]
         outcome = SimpleNamespace(found=[SimpleNamespace(rivals=each) for each in rivals])
         evidence = SimpleNamespace(residual=lambda known: "all of it")
         diagnosis: Any = SimpleNamespace(outcome=outcome, evidence=evidence)
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
         (pair,) = confounded.pairs(diagnosis, laws, run)
-        assert asked == [(["second", "rival"], [1.0, 5.0], "all of it")]
-        assert (pair.found, pair.others) == (laws[0], (laws[1],))
+        assert asked == [(["second", "third", "rival"], [1.0, 1.0, 5.0], "all of it")]
+        assert (pair.found, pair.others) == (laws[0], (laws[1], laws[2]))
         assert (pair.rival.effect.place[0], pair.rival.shape) == ("rival", 5.0)
         assert pair.rival.added.parameters == "of the rival"
 

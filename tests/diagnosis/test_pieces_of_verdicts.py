@@ -54,7 +54,7 @@ class TestIntervalOfAPush:
         given = motion(of.get("lengths", (200,)))
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given, reach=reach, period=0.01))
         residual = np.zeros((given.samples, 1))
-        residual[slice(*of.get("true", (50, 100)))] = 2.0
+        residual[slice(*of.get("true", (50, 100)))] = 3.0
         kind: Any = self.KIND
         found = pushes._interval(evidence, residual, np.ones_like(residual), slice(*burst), kind)
         return found.start, found.stop
@@ -75,6 +75,9 @@ class TestIntervalOfAPush:
         assert self.found((90, 110), true=(90, 94)) == (90, 110)
         assert self.found((90, 110), true=(90, 95), reach=1.0) == (90, 95)
         assert self.found((90, 110), true=(92, 110), reach=0.0) == (92, 110)
+        # four samples are more than an instant
+        assert self.found((88, 96), true=(90, 94), reach=0.0) == (90, 94)
+        assert self.found((88, 96), true=(90, 93), reach=0.0) == (88, 96)
 
 
 class TestTrialOfAPush:

@@ -88,6 +88,25 @@ def test_energy_beyond_the_baselines_is_what_is_localised(
     assert whereabouts(evidence, fitted, 1).share == 0.0
 
 
+@pytest.mark.parametrize("blocks", [2, 5, 12])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_stretch_is_the_shortest_of_all_runs_of_blocks(seed: int, blocks: int) -> None:
+    rng = np.random.default_rng(seed)
+    block = np.repeat(3 + np.arange(blocks), rng.integers(2, 6, blocks))
+    time, energy = 0.1 * np.arange(len(block)), 1e-3 * rng.exponential(size=len(block))
+    first = int(rng.integers(0, blocks))
+    energy[(block >= 3 + first) & (block < 3 + first + max(1, blocks // 4))] *= 50.0
+    stretches = (
+        (length, (block >= 3 + k) & (block < 3 + k + length))
+        for length in range(1, blocks + 1)
+        for k in range(blocks - length + 1)
+    )
+    length, inside = next(one for one in stretches if energy[one[1]].sum() >= places._MOST * energy.sum())
+    short = length <= places._SHORT * blocks
+    expected = (time[inside][0], time[inside][-1]) if short else None
+    assert places._stretch(time, block, energy) == expected
+
+
 def test_the_words_name_both() -> None:
     where = Whereabouts((3.0, 9.5), "joint 2 carries more than 5 N*m", 0.93)
     words = "it is found from 3.0 to 9.5 s, 93 % of it where joint 2 carries more than 5 N*m"

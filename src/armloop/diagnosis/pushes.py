@@ -102,7 +102,12 @@ def push(
 
     def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
         trial, kind = pair
-        return forceful and kind.effect.joint is not None, kind.effect.complexity, kind.link > 0, -trial.share
+        return (
+            forceful and kind.effect.joint is not None,
+            kind.effect.complexity,
+            bool(kind.link),
+            -trial.share,
+        )
 
     best, chosen = min(equals, key=order)
     if best.own < _EXPLAINED:

@@ -67,8 +67,8 @@ def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tupl
     load, of = evidence.context.load, joints[joint]
     v = motion.v[rows]
     found = [
-        (f"joint {joint + 1} moves in the {name} direction", sign * v[:, joint] > 0)
-        for name, sign in (("positive", 1), ("negative", -1))
+        (f"joint {joint + 1} moves in the positive direction", v[:, joint] > 0),
+        (f"joint {joint + 1} moves in the negative direction", v[:, joint] < 0),
     ]
     sizes = [
         (f"joint {k + 1} moves", "faster", "slower", np.abs(v[:, k]), f"{each.position_unit}/s")
