@@ -55,7 +55,9 @@ def test_squares_by_condition_and_by_block(part: Any, sorted_: bool, monkeypatch
             blocks[place] += np.array([LEFT[k] ** 2, np.ones(2)]) * MOVING[k]
     np.testing.assert_allclose(found.blocks, blocks)
     # samples that are no time series have no blocks
-    assert Tally.of(chunk(0.0), model, sorter, part).blocks.shape == (0, 2, 2)
+    still = Tally.of(chunk(0.0), model, sorter, part)
+    assert still.blocks.shape == (0, 2, 2)
+    assert [each.shape for each in still.places.values()] == [(2, 2)] * 2
 
 
 def test_squares_where_a_joint_turns_round_and_where_it_creeps(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,6 +116,8 @@ def test_samples_within_a_margin_of_what_was_fitted_do_not_judge(monkeypatch: py
 def test_relative_to_the_torque_where_a_joint_has_any() -> None:
     blocks = np.array([[[40.0, 60.0], [20.0, 20.0]]])
     sums = np.zeros((2, 3, 2))
-    sums[1] = [[40.0, 60.0], [80.0, 0.0], [20.0, 20.0]]
+    sums[1] = [[40.0, 60.0], [180.0, 0.0], [20.0, 20.0]]
     # a joint without torque has no relative error: the other one's alone
-    assert Tally({0: sums}, blocks, 20, {}).relative_blocks().tolist() == [0.5]
+    found = Tally({0: sums}, blocks, 20, {})
+    np.testing.assert_allclose(found.relative_blocks(), [2.0 / 9.0])
+    assert found.baseline()["nrmse"] == [pytest.approx(np.sqrt(2.0) / 3.0), None]

@@ -69,13 +69,20 @@ def test_blocks_are_relative_to_the_torque_of_the_joints_that_move_in_them() -> 
 
 def test_a_baseline_is_no_better_than_what_is_left_of_all_data() -> None:
     held = tally([[30, 20, 0]], [[1.0, 4.0, 0.0]]).baseline()
-    whole = tally([[20, 20, 20]] * 10, [[4.0, 1.0, 9.0]] * 10)
+    whole = tally([[20, 20, 20]] * 10, [[4.0, 1.0, 0.25]] * 10)
     found = at_least(held, whole)
-    assert found["rmse"] == pytest.approx([2.0, 2.0, 3.0])  # joint 3 moves in no held-out block
-    assert found["nrmse"] == pytest.approx([1.0, 1.0, 1.5]) and found["rms"] == pytest.approx([2.0, 2.0, 2.0])
-    assert found["worst"] == pytest.approx([2.0, 1.0, 3.0]) and found["samples"] == held["samples"]
+    assert found["rmse"] == pytest.approx([2.0, 2.0, 0.5])  # joint 3 moves in no held-out block
+    assert found["nrmse"] == pytest.approx([1.0, 1.0, 0.25]) and found["rms"] == pytest.approx(
+        [2.0, 2.0, 2.0]
+    )
+    assert found["worst"] == pytest.approx([2.0, 1.0, 0.5]) and found["samples"] == held["samples"]
     # of joint 3 nothing is known there but from all data
     assert found["reversals"] == [5.0, 5.0, 5.0] and found["creeping"] == [3.0, 3.0, 3.0]
     assert at_least(whole.baseline(), tally([[30, 20, 0]], [[1.0, 0.25, 0.0]]))["worst"] == pytest.approx(
-        [2.0, 1.0, 3.0]
+        [2.0, 1.0, 0.5]
     )
+    # where both are known, the larger error of the two
+    less = tally([[20, 20, 20]], [[0.0, 0.0, 0.0]])
+    less.places["reversals"][0] /= 25.0
+    assert at_least(held, less)["reversals"] == [5.0, 5.0, 1.0]
+    assert at_least(less.baseline(), tally([[30, 20, 0]], [[1.0, 4.0, 0.0]]))["reversals"] == [5.0, 5.0, 1.0]

@@ -145,7 +145,7 @@ class Tally:
         """
         scale = np.array([x if x else np.nan for x in self.score().rms]) ** 2
         errors, counts = self.blocks[:, 0], self.blocks[:, 1]
-        relative = np.where(counts >= _FEWEST, errors / np.maximum(counts, 1.0), np.nan) / scale
+        relative = np.where(counts >= _FEWEST, errors / np.maximum(counts, _FEWEST), np.nan) / scale
         known = np.isfinite(relative)
         sums = np.where(known, relative, 0.0).sum(axis=1)
         return np.where(known.any(axis=1), sums / np.maximum(known.sum(axis=1), 1), np.nan)
