@@ -57,3 +57,38 @@ def test_a_joint_that_moves_in_no_sample_has_a_problem_of_no_samples() -> None:
         moments = problem.moments(joint)
         assert moments.G.shape == (columns, columns) and moments.b.shape == (columns,)
         assert not moments.G.any() and (moments.yy, moments.count) == (0.0, 0.0)
+
+
+def test_sums_of_chunks_are_the_normal_equations_of_all_their_samples() -> None:
+    """Of each joint where it moves: of all samples, of those that choose orders, and of the others."""
+    rng = np.random.default_rng(3)
+    library = WaveProducts(Factors(3, ()), np.array([[1], [2], [4]], dtype=np.intp))
+    columns = Columns(library, (tuple(LAW), tuple(LAW[:1]), tuple(LAW[1:])))
+    parts, rows = [], []
+    for seed in (1, 2):
+        motion = fourier_motion(4.0, 10.0, seed)
+        moving = rng.random(motion.q.shape) < 0.5
+        samples = Samples(motion, rng.normal(size=motion.q.shape), moving, 0.1)
+        held, choosing, independent = (rng.random(len(motion.q)) < p for p in (0.2, 0.3, 0.8))
+        one = Chunk(samples, np.zeros(len(motion.q), dtype=np.intp), held, choosing, independent)
+        choice = Choice(None, (1, 2, 3), Found(three_axis(), friction=[[], [], []]))
+        usable = choice(one)
+        assert np.array_equal(usable.places, np.flatnonzero(independent & ~held & moving.any(axis=1)))
+        parts.append(StepSums.of(one, choice, columns))
+        rows.append(usable)
+    sums = parts[0] + parts[1]
+    problems = Problems(columns, sums)
+    for joint in range(3):
+        X = np.vstack(
+            [columns.chosen(one, joint, np.arange(3 + len(columns.friction[joint]))) for one in rows]
+        )
+        y, tau = (np.concatenate([getattr(one, key)[:, joint] for one in rows]) for key in ("rest", "tau"))
+        moves = np.concatenate([one.moving[:, joint] for one in rows])
+        validation = np.concatenate([one.validation for one in rows])
+        for chosen, mask in ((None, moves), (True, moves & validation), (False, moves & ~validation)):
+            found = problems.moments(joint, chosen)
+            np.testing.assert_allclose(found.G, X[mask].T @ X[mask], atol=1e-9)
+            np.testing.assert_allclose(found.b, X[mask].T @ y[mask], atol=1e-9)
+            assert (found.yy, found.count) == (pytest.approx(np.sum(y[mask] ** 2)), mask.sum())
+            assert sums.samples(joint, chosen) == mask.sum()
+        assert sums.scale(joint) == pytest.approx(np.sqrt(np.mean(tau[moves] ** 2)))
