@@ -176,3 +176,6 @@ def test_an_effect_is_as_clear_as_the_clearest_of_its_coefficients_in_its_stated
     ]
     assert max(stated[0]) > 2 * min(stated[0])
     np.testing.assert_allclose(found.clear, [max(own) for own in stated], rtol=1e-6)
+    # of a single coefficient Wald's chi-square is the square of that, of several at least
+    assert found.wald[1] == (pytest.approx(found.clear[1] ** 2, rel=1e-6), 1)
+    assert found.wald[0][1] == 3 and found.wald[0][0] >= (1 - 1e-6) * found.clear[0] ** 2

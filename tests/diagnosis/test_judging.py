@@ -27,7 +27,7 @@ def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = Non
     joint = np.zeros(rows, dtype=np.intp) if joint is None else joint
     none = np.zeros((rows, 0))
     stacked = Stacked(none, held_out, block, block % 2, joint, int(joint.max()) + 1, joint, none)
-    return Fit((), (), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
+    return Fit((), (), (), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
 
 
 def test_a_gain_that_lies_in_few_blocks_is_no_chance() -> None:

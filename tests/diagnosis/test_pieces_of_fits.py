@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from armloop.diagnosis import compensation, fit, next_run, trials
 from armloop.diagnosis.compensation import FeedforwardChange
 from armloop.diagnosis.evidence import Stacked
-from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.fit import Shape, _wald, deviate
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Estimate
 from armloop.regression.clustered import clustered_covariance
@@ -213,3 +214,33 @@ def test_what_feedforward_changes_along_a_run() -> None:
     np.testing.assert_allclose(found.torque[:, 0], expected)
     motion.samples = 3
     assert compensation.feedforward_change(before, after, samples).rows.tolist() == [0, 1, 2]
+
+
+class TestTogether:
+    """Whether coefficients are zero, all together: Wald's test."""
+
+    def test_it_is_the_square_of_what_decorrelates_them(self) -> None:
+        rng = np.random.default_rng(0)
+        A = rng.normal(size=(3, 3))
+        x, spread = rng.normal(size=3), A @ A.T
+        expected = float(np.sum(np.linalg.solve(np.linalg.cholesky(spread), x) ** 2))
+        assert _wald(x, spread) == (pytest.approx(expected, rel=1e-5), 3)
+        # in other units it is the same
+        units = np.array([1e-4, 1.0, 1e5])
+        assert _wald(units * x, np.outer(units, units) * spread) == (pytest.approx(expected, rel=1e-5), 3)
+
+    def test_what_nobody_knows_says_nothing(self) -> None:
+        spread = np.diag([4.0, np.inf, 0.0])
+        assert _wald(np.array([3.0, 7.0, 7.0]), spread) == (pytest.approx(9 / 4, rel=1e-6), 1)
+        assert _wald(np.array([7.0]), np.array([[np.inf]])) == (0.0, 0) and deviate(0.0, 0) == 0.0
+
+    def test_two_that_are_alike_may_be_plain_though_neither_is(self) -> None:
+        spread = np.array([[1.0, -0.99], [-0.99, 1.0]])  # their sum is known to 0.14
+        chi_square, freedom = _wald(np.array([0.5, 0.5]), spread)
+        assert chi_square == pytest.approx(0.5 / 0.01, rel=1e-5) and freedom == 2
+
+    def test_as_unlikely_as_a_normal_variable(self) -> None:
+        for z in (0.1, 1.0, 3.0, 8.0):
+            assert deviate(z * z, 1) == pytest.approx(z, rel=1e-9)
+        assert deviate(-2 * np.log(0.0027), 2) == pytest.approx(norm.isf(0.0027 / 2), rel=1e-9)
+        assert deviate(1e6, 3) == pytest.approx(1e3)  # beyond what a chance can be told by

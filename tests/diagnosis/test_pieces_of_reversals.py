@@ -241,8 +241,8 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     monkeypatch.setattr(reversals, "Outcome", lambda *of: of)
     unclear: set[tuple[str, int]] = set()
 
-    def clear(own: Any, every: Any, settled: int) -> Any:
-        assert own.rows.all() and settled == 1
+    def clear(own: Any, every: Any, settled: int, alike: bool) -> Any:
+        assert own.rows.all() and settled == 1 and alike
         found = [one for one in every[0][1:] if (one.effect.name, one.effect.joint) not in unclear]
         left = of(tuple(one.effect for one in found))
         return SimpleNamespace(found=[*every[0][:1], *found], after=left, every=every)

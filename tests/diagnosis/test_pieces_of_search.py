@@ -305,6 +305,38 @@ class TestOutcomes:
         errors["a"], errors["ac"] = (1.0,), (3.0, 2.0)
         assert kept("a", "b", "c", settled=1) == ("a", (1.0,))
 
+    def test_at_reversals_coefficients_count_together_and_with_those_of_their_kind(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Chi-squares of nine with one, two and three degrees of freedom are 3.0, 2.5 and 2.2 standard errors."""
+        kinds = {"a": "memory", "b": "memory", "c": "drag"}
+        wald = {"a": (9.01, 1), "b": (1.0, 1), "c": (9.01, 2)}
+
+        def fitted(names: str) -> Any:
+            return SimpleNamespace(clear=(0.5,) * len(names), wald=tuple(wald[name] for name in names))
+
+        monkeypatch.setattr(
+            searching,
+            "_known",
+            lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
+        )
+
+        def kept(names: str, settled: int = 0, alike: bool = True) -> str:
+            found: Any = [
+                SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
+            ]
+            given: Any = SimpleNamespace(found=found, before=None, after=fitted(names), residual=None)
+            return "".join(f.shape for f in searching.clear(cast(Any, None), given, settled, alike).found)
+
+        assert kept("a") == "a" and kept("c") == "" and kept("b") == ""
+        assert kept("a", alike=False) == ""
+        # 10.01 with two degrees of freedom are 2.7 standard errors, less than the first has alone; 14.5 are 3.4
+        assert kept("ab") == "a" and kept("abc") == "a"
+        wald["b"] = (5.5, 1)
+        assert kept("ab") == "ab" and kept("abc") == "ab"
+        # what is settled is of no kind
+        assert kept("ab", settled=1) == "a" and kept("cb", settled=1) == "c"
+
     def test_the_strength_of_an_effect_is_what_the_others_leave(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

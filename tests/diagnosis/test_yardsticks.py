@@ -162,7 +162,7 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
-    return Fit(cast(Any, effects), (), (), (), outside, stacked).score
+    return Fit(cast(Any, effects), (), (), (), (), outside, stacked).score
 
 
 def test_only_what_was_held_out_judges() -> None:

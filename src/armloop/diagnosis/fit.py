@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2, norm
 
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
@@ -47,6 +48,8 @@ class Fit:
         effects, shapes: what was fitted.
         parameters: one dict of estimates per effect, from all blocks.
         clear: per effect, how many standard errors the clearest of its coefficients is from zero.
+        wald: per effect, chi-square and degrees of freedom of all its coefficients together: where columns are alike each
+            coefficient may be anything, though what they do together is plain.
         outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
         stacked: the rows.
     """
@@ -55,6 +58,7 @@ class Fit:
     shapes: tuple[Shape, ...]
     parameters: tuple[dict[str, Estimate], ...]
     clear: tuple[float, ...]
+    wald: tuple[tuple[float, int], ...]
     outside: Array
     stacked: Stacked
 
@@ -80,13 +84,34 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
         outside.append(judged.y - judged.X @ beta)
     stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
     spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked)
-    parameters, clear, start = [], [], 0
+    parameters, clear, wald, start = [], [], [], 0
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
         parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
         clear.append(float(np.max(np.abs(free) / np.sqrt(np.diag(spread)[block] + TINY), initial=0.0)))
+        wald.append(_wald(free, spread[block, block]))
         start += len(free)
-    return Fit(tuple(effects), tuple(shapes), tuple(parameters), tuple(clear), np.array(outside), stacked)
+    said = tuple(parameters), tuple(clear), tuple(wald)
+    return Fit(tuple(effects), tuple(shapes), *said, np.array(outside), stacked)
+
+
+def _wald(x: Array, spread: Array) -> tuple[float, int]:
+    """Wald's chi-square that coefficients (k,) of this covariance (k, k) are all zero, and its degrees of freedom.
+
+    What the rows do not determine says nothing.
+    """
+    known = np.flatnonzero(np.isfinite(np.diag(spread)) & (np.diag(spread) > 0))
+    size = np.sqrt(np.diag(spread)[known])
+    R, z = spread[np.ix_(known, known)] / np.outer(size, size), x[known] / size
+    return float(z @ np.linalg.solve(R + _RIDGE * np.eye(len(known)), z)), len(known)
+
+
+def deviate(chi_square: float, freedom: int) -> float:
+    """How many standard errors of a normal variable are as unlikely as a chi-square; 0 for one of nothing."""
+    if freedom == 0:
+        return 0.0
+    chance = float(chi2.sf(chi_square, freedom))
+    return float(norm.isf(chance / 2)) if chance > TINY else float(np.sqrt(chi_square))
 
 
 class _Problem:

@@ -105,7 +105,7 @@ def judge_reversals(
         return None
     after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
     every = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
-    whole = clear(own, every, settled=len(outcome.found))
+    whole = clear(own, every, settled=len(outcome.found), alike=True)
     found = whole.found[len(outcome.found) :]
     if not found:
         return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit, Shape
+from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     SIGNIFICANCE,
     gain,
@@ -223,20 +223,38 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     return outcome
 
 
-def clear(evidence: Evidence, outcome: Outcome, settled: int = 0) -> Outcome:
+def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = False) -> Outcome:
     """The outcome without effects no coefficient of which is significant by its stated error (Wald test), the least first.
 
     What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that.
 
     Args:
         settled: so many, the first, are not asked again.
+        alike: an effect stays, too, if all its coefficients together are significant, or those of all of its kind.
     """
     found, fitted = outcome.found, outcome.after
-    while len(found) > settled and min(fitted.clear[settled:]) < SIGNIFICANCE:
-        least = settled + int(np.argmin(fitted.clear[settled:]))
+    while len(found) > settled:
+        errors = list(fitted.clear[settled:])
+        if alike:
+            errors = [max(pair) for pair in zip(errors, _together(found, fitted, settled), strict=True)]
+        if min(errors) >= SIGNIFICANCE:
+            break
+        least = settled + int(np.argmin(errors))
         found = [f for k, f in enumerate(found) if k != least]
         fitted = _known(evidence, found).fit
     return Outcome(found, outcome.before, fitted, outcome.residual)
+
+
+def _together(found: Sequence[Found], fitted: Fit, settled: int) -> list[float]:
+    """How many standard errors the coefficients of each effect are from zero together, or those of all of its kind."""
+    kinds = [f.effect.name for f in found[settled:]]
+    wald = fitted.wald[settled:]
+    each = []
+    for name, own in zip(kinds, wald, strict=True):
+        same = [pair for other, pair in zip(kinds, wald, strict=True) if other == name]
+        whole = sum(chi_square for chi_square, _ in same), sum(freedom for _, freedom in same)
+        each.append(max(deviate(*own), deviate(*whole)))
+    return each
 
 
 def _tied(effect: Effect) -> int:
