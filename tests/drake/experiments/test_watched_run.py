@@ -77,8 +77,12 @@ def test_a_change_is_named_and_supplied(scenario, model, case) -> None:
     plain = run_watched(scenario, model, [change], CHANGED, learn=LEARNED, adapt=False)
     worst = int(np.argmax(plain.after.eta))
     assert found.after.eta[worst] < 0.35 * plain.after.eta[worst]
-    # a ramp of a second, no jumps: what is supplied changes by less than a twentieth of itself in a millisecond
-    assert np.abs(np.diff(found.supplied, axis=0)).max() < 0.05 * np.abs(found.supplied).max()
+    # a ramp of a second, no jumps: what is supplied changes by less than a twentieth of itself in a millisecond, but for an
+    # inertia's where the reference begins to accelerate
+    vdot = scenario.reference.evaluate(0.001 * np.arange(len(found.supplied)))[2]
+    steady = (np.abs(np.diff(vdot, axis=0)) < 0.01 * np.abs(vdot).max(axis=0)).all(axis=1)
+    assert steady.mean() > 0.99
+    assert np.abs(np.diff(found.supplied, axis=0))[steady].max() < 0.05 * np.abs(found.supplied).max()
 
 
 @pytest.mark.slow
