@@ -117,7 +117,8 @@ def test_the_next_run_names_what_is_there_and_has_no_such_alternatives(model, ca
     law, size, truth = CASES[case]
     first = diagnose(model, [log(small_motion(3, size), law, 3)])
     assert first.verdict == "effects_found"
-    made = next_run(first, Wish(duration=40.0, starts=1))
+    # of one start alone the local optimum hangs on the processor's last digits
+    made = next_run(first, Wish(duration=40.0))
     assert made is not None and made.purpose == "alternatives"
     told = [each for each in made.told if each.then is not None]
     assert len(told) >= 1 and all(each.now < 0.3 for each in told)
