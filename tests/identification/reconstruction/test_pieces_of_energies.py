@@ -68,9 +68,9 @@ def test_an_error_is_round_off_at_least_and_of_no_sample_nothing() -> None:
     beta = np.array([1.0, 2.0])
     exact = Moments.of(X, X @ beta)
     none = Moments(np.zeros((2, 2)), np.zeros(2), 0.0, 0.0)
-    both = np.array([0, 1])
-    found = _Problem(2, [(both, exact), (both, none)]).errors(beta)
-    assert found == pytest.approx([1e-10 * exact.yy / 20, 0.0], rel=1e-3)
+    both, one = np.array([0, 1]), Moments.of(X[:1], X[:1] @ beta + 3.0)
+    found = _Problem(2, [(both, exact), (both, none), (both, one)]).errors(beta)
+    assert found == pytest.approx([1e-10 * exact.yy / 20, 0.0, 9.0], rel=1e-3)
 
 
 def said(errors: list[float], inertia: list[float] | None = None) -> list[str]:

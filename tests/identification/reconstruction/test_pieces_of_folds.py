@@ -52,6 +52,7 @@ class TestInnerFolds:
         assert self.of(600, block=2.0).block_seconds == 2.0
         assert self.of(40).block_seconds == pytest.approx(0.2)
         assert self.of(40, cutoff=10.0).block_seconds == pytest.approx(0.5)
+        assert self.of(40, cutoff=0.5).block_seconds == pytest.approx(10.0)
 
     def test_no_more_folds_than_blocks(self) -> None:
         blocks = InnerFolds(5, 1.0)
@@ -66,6 +67,9 @@ class TestInnerFolds:
         used[3:5] = False
         assert folds.deal(given, used)[0].tolist() == [1] * 3 + [2] * 2 + [2] * 4 + [0]
         assert folds.used(given, used) == 3
+        used[[0, 9]] = False  # a run counts if one of its samples does
+        assert folds.deal(given, used)[0].tolist() == [1] * 3 + [2] * 2 + [2] * 4 + [0]
+        assert folds.used(given, used) == 2
 
     def test_blocks_are_dealt_in_turn_and_their_borders_do_not_judge(self) -> None:
         given, used = samples((30,), cutoff=5.0), np.ones(30, dtype=bool)
@@ -80,6 +84,9 @@ class TestInnerFolds:
         used[:10] = False
         assert folds.deal(given, used)[0][[0, 10, 20]].tolist() == [1, 1, 0]
         assert folds.deal(replace(given, cutoff_hz=0.0), used)[1].all()
+        used[:] = True
+        later = InnerFolds(3, 1.0, before=1).deal(given, used)[0]
+        assert later[[0, 10, 20]].tolist() == [1, 2, 0]
 
     def test_within_the_filters_reach_of_a_border_the_ends_of_the_data_judge_no_more_than_others(
         self,

@@ -8,8 +8,8 @@ from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 from armloop.identification.reconstruction.joint_sums import JointSums, _Running
-from armloop.identification.reconstruction.pooled import Pooled, Prior
-from armloop.laws.friction import FrictionTerm
+from armloop.identification.reconstruction.pooled import Pooled, Prior, _at_rest
+from armloop.laws.friction import KINDS, FrictionTerm
 from armloop.regression.moments import Moments
 
 TERMS = [FrictionTerm("offset"), FrictionTerm("sign"), FrictionTerm("viscous")]
@@ -260,3 +260,71 @@ class TestTermsThatNothingExcites:
         part = Moments.of(X, X @ [1.0, 0.3, 0.5, 0.7])
         pooled = Pooled(JointSums([[part]], [[part]]), [terms])
         np.testing.assert_allclose(pooled.solve([[0, 1, 2]]).theta, [1.0, 0.3, 0.5, 0.7], rtol=1e-4)
+
+    def test_it_is_by_its_own_squares_that_a_term_is_excited(self) -> None:
+        """Beside two shared columns, one of them large."""
+        rng = np.random.default_rng(3)
+        X = np.column_stack([*rng.normal(size=(2, 44)), np.ones(44), rng.uniform(1, 2, 44), np.zeros(44)])
+        X[0, 4] = 0.9
+        part = Moments.of(X, X @ [1.0, -1.0, 0.3, 0.5, 0.7])
+        pooled = Pooled(JointSums([[part]], [[part]]), [list(self.TERMS)])
+        assert pooled.solve([[0, 1, 2]]).theta[4] == 0.0
+
+    def test_at_the_onset_of_sliding_a_term_is_its_direction_or_nothing(self) -> None:
+        """Without time: what fades with it has gone."""
+        once = {"smooth_sign", "offset", "stribeck_peak", "hysteresis", "sign", "both_ways"}
+        found = {kind for kind in KINDS if _at_rest(FrictionTerm(kind, parameter=0.2))}
+        assert found - {"fading_sign"} == once
+        assert {_at_rest(FrictionTerm(kind, parameter=0.2)) for kind in once} == {1.0}
+
+
+def test_one_fold_is_fitted_and_the_rest_judges_unless_said_otherwise() -> None:
+    data = Data()
+    sums = data.sums()
+    pooled = Pooled(sums, [TERMS, TERMS])
+    np.testing.assert_allclose(pooled.solve(SOME).theta, data.by_hand([0], SOME)[0], rtol=1e-4, atol=1e-5)
+    # what nothing was fitted to is met by nothing
+    errors = pooled.held_out(SOME, np.ones(2))
+    np.testing.assert_allclose(errors, pooled.squares, rtol=1e-12)
+    assert errors.shape == (1, 2)
+
+
+@pytest.mark.parametrize("unit", [1e4, 1e-4])
+def test_the_unit_of_torques_changes_no_relative_error(unit: float) -> None:
+    data, other = Data(), Data()
+    other.y *= unit
+    usual, scaled = data.pooled(), other.pooled()
+    theta, again = usual.solve(EVERY).theta, scaled.solve(EVERY).theta
+    np.testing.assert_allclose(again, unit * theta, rtol=1e-6)
+    np.testing.assert_allclose(
+        scaled.relative_errors(again, EVERY), usual.relative_errors(theta, EVERY), rtol=1e-6
+    )
+
+
+def test_weights_begin_with_the_torques_and_follow_what_is_left() -> None:
+    """Few rows and unequal joints, so that three rounds are not the end of it."""
+    rng = np.random.default_rng(4)
+    X = rng.normal(size=(2, 9, 3))
+    y = X @ [1.0, -1.0, 0.5] + rng.normal(size=(2, 9)) * [[0.2], [40.0]]
+    parts = [[Moments.of(X[j], y[j])] for j in range(2)]
+    found = Pooled(JointSums(parts, parts), [[], []]).solve([[], []])
+    weights = 9 / np.sum(y**2, axis=1)
+    for last in (False, False, False, True):
+        G = np.einsum("j,jni,njk->ik", weights, X, np.swapaxes(X, 0, 1))
+        theta = np.linalg.solve(G, np.einsum("j,jni,jn->i", weights, X, y))
+        if not last:
+            weights = 9 / np.sum((y - X @ theta) ** 2, axis=1)
+    # but for the ridge of 1e-7
+    np.testing.assert_allclose(found.theta, theta, rtol=1e-6)
+    np.testing.assert_allclose(found.weights, weights, rtol=1e-6)
+
+
+def test_an_exact_joint_weighs_by_round_off_and_one_of_a_single_sample_by_its_error() -> None:
+    rng = np.random.default_rng(5)
+    X = rng.normal(size=(20, 2))
+    exact, one = Moments.of(X, X @ [1.0, 2.0]), Moments.of(np.zeros((1, 2)), np.array([3.0]))
+    none = Moments.none(2)
+    parts = [[exact], [one], [none]]
+    weights = Pooled(JointSums(parts, parts), [[], [], []]).solve([[], [], []]).weights
+    assert weights[:2] == pytest.approx([20 / (1e-12 * exact.yy), 1 / 9], rel=1e-2)
+    assert np.isfinite(weights[2])

@@ -125,11 +125,11 @@ _KINDS = {"without": "", "with zeros": "zeros", "with offsets of the torque inst
 
 def _clearly(model: _Mixed, before: Array, after: Array) -> bool:
     """Whether blocks left out have less error, by several standard errors of the mean."""
-    gain = np.zeros(int(model.table.blocks.max()) + 1)
+    names, block = np.unique(model.table.blocks, return_inverse=True)
+    gain = np.zeros(len(names))
     for j, own in model.judged:
         weight = 1 / max(float(np.mean(before[own, j] ** 2)), TINY)
-        np.add.at(gain, model.table.blocks[own], weight * (before[own, j] ** 2 - after[own, j] ** 2))
-    gain = gain[np.unique(model.table.blocks)]
+        np.add.at(gain, block[own], weight * (before[own, j] ** 2 - after[own, j] ** 2))
     return bool(gain.mean() > _SURE * gain.std(ddof=1) / np.sqrt(len(gain)))
 
 
@@ -179,8 +179,8 @@ class _Mixed:
     def left_out(self, kind: str) -> Array:
         """(N, n) what is left on every other block by what was regressed on the others, both ways round."""
         left = np.zeros_like(self.table.tau)
-        for parity in (0, 1):
-            judged = self.table.blocks % 2 == parity
+        odd = (self.table.blocks % 2).astype(bool)
+        for judged in (odd, ~odd):
             theta, found, _ = self.solve(kind, ~judged)
             rest = self.table.tau - self.table.columns @ theta
             if kind:

@@ -84,9 +84,8 @@ def inner_folds(samples: Samples, used: Mask, options: Options) -> tuple[Index, 
 def _inside(motion: Motion, numbers: Index, samples: Samples) -> Mask:
     """(N,) samples further than half a period of the filter from the borders of their block, and of runs, where it ends."""
     inside = np.ones(motion.samples, dtype=bool)
-    if samples.cutoff_hz > 0:
-        reach = at_least(samples.reach / samples.period)
-        border = np.flatnonzero(np.diff(numbers)) + 1
-        near = (border[:, None] + np.arange(-reach, reach)).ravel()
-        inside[near[(near >= 0) & (near < motion.samples)]] = False
+    reach = at_least(samples.reach / samples.period)
+    border = np.flatnonzero(np.diff(numbers)) + 1
+    near = (border[:, None] + np.arange(-reach, reach)).ravel()
+    inside[near[(near >= 0) & (near < motion.samples)]] = False
     return inside

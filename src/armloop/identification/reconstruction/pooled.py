@@ -222,8 +222,7 @@ class Pooled:
             H = G[np.ix_(bound, bound)] - G[np.ix_(bound, ~bound)] @ link
             # Differences of nearly equal numbers are neither symmetric nor positive to the last digit.
             H = 0.5 * (H + H.T)
-            least = 2 * _ROUND_OFF * max(1.0, float(np.diag(H).max()))
-            H[np.diag_indices(len(H))] += max(0.0, least - float(np.linalg.eigvalsh(H)[0]))
+            H[np.diag_indices(len(H))] += max(0.0, _ROUND_OFF - float(np.linalg.eigvalsh(H)[0]))
             R = cholesky(H)
             target = solve_triangular(R, b[bound] - link.T @ b[~bound], trans="T")
             theta[bound] = nnls(R, target, maxiter=30 * len(H))[0]
