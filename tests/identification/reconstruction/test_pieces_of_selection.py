@@ -15,6 +15,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import bandwidth, shared
 from armloop.identification.reconstruction import friction_selection as selection
 from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import load_arm
 from armloop.util.errors import ExcitationError, InputError, LogError
 
 
@@ -55,6 +56,17 @@ class TestLadder:
         # a joint that does not slide anywhere counts as without error
         still = state({}, counts=((10.0, 0.0), (10.0, 0.0)))
         assert still._error(np.array([[4.0, 0.0], [4.0, 0.0]])) == pytest.approx(0.5 * np.sqrt(8 / 20))
+
+    def test_they_are_relative_to_its_squares_whatever_its_samples(self) -> None:
+        one = state({}, counts=((10.0, 1.0), (10.0, 1.0), (5.0, 0.0)))
+        one.pooled.squares = np.array([[40.0, 9.0], [40.0, 9.0], [20.0, 18.0]])
+        again = selection._State(one.pooled, [[0]], {})
+        assert again._error(np.array([[4.0, 1.0], [4.0, 4.0], [1.0, 4.0]])) == pytest.approx(
+            0.5 * (np.sqrt(9 / 100) + np.sqrt(9 / 36))
+        )
+        # a joint counts by its samples: 2 of 27, which do not differ from fold to fold
+        gain, _ = again._gain(np.array([[4.0, 2.0], [4.0, 2.0], [4.0, 2.0]]), 1.0)
+        assert gain == pytest.approx(np.log(2) * 2 / 27)
 
     def test_gains_are_mean_log_ratios_against_their_scatter_over_the_folds(self) -> None:
         one = state({})
@@ -106,6 +118,27 @@ class TestLadder:
         one = state({**first, **helps}, [[0], [0]])
         assert one.take(1, "second", one_by_one=False).joints == []
 
+    def test_all_take_what_gains_by_its_scatter_and_one_what_gains_by_twice_of_it(self) -> None:
+        """Gains of the folds a and b are sure if a + b exceeds so many times |a - b|."""
+
+        def left(a: float, b: float) -> list[float]:
+            return [4 * np.exp(-2 * a), 4 * np.exp(-2 * b)]
+
+        for a, b, everyone, alone in (
+            (1.0, -0.1, [], []),
+            (1.0, 0.3, [0, 1], []),
+            (1.0, 0.4, [0, 1], [0]),
+            (0.002, 0.002, [], []),
+            (0.003, 0.003, [0, 1], [0]),
+        ):
+            own = left(a, b)
+            all_of_them = {"0 0": 4.0, "01 01": [[x, x] for x in own]}
+            one = state(all_of_them, [[0], [0]])
+            assert one.take(1, "second", one_by_one=False).joints == everyone
+            worse = {"0 0": 4.0, "01 01": 5.0, "0 01": 5.0, "01 0": [[x, 4.0] for x in own]}
+            one = state(worse, [[0], [0]])
+            assert one.take(1, "second", one_by_one=True).joints == alone
+
     def test_a_joint_hands_back_the_rungs_that_it_does_not_miss_the_last_first(self) -> None:
         kept, missed = 4 * np.exp(0.0019), 4 * np.exp(0.0021)
         errors = {
@@ -133,6 +166,104 @@ class TestLadder:
         assert [t.parameter for t in memory.elements[1]] == [3e-4, 1e-3, 3e-3, 1e-2, 3e-2]
         slow = selection.extensions(three_axis(), motion, np.array([0.0028, 0.5, 0.5]))[0]
         assert [own[0].parameter for own in slow.elements] == [0.0007, 0.00075, 0.00075]
+
+    def test_a_slides_lengths_are_a_tenth(self) -> None:
+        arm = load_arm("scara")
+        motion = fourier_motion(5.0, 100.0, 1, arm)
+        (slide,) = np.flatnonzero(~arm.revolute)
+        for extension, kind in zip(selection.extensions(arm, motion), ("smooth_sign", "", ""), strict=False):
+            turns, slides = (
+                [t.parameter for t in extension.elements[j] if t.kind == kind] for j in (0, slide)
+            )
+            assert slides == pytest.approx([0.1 * x for x in turns])
+        falls = selection.extensions(arm, motion)[2].elements
+        assert (falls[slide][0].parameter, falls[0][0].parameter) == (0.002, 0.02)
+
+    def test_the_ladder_may_be_restricted_to_some_laws(self) -> None:
+        ladder = selection.extensions(three_axis(), fourier_motion(5.0, 100.0, 1))
+        assert selection.restricted(ladder, None) is ladder
+        sharp, viscous = FrictionTerm("smooth_sign", parameter=0.003), FrictionTerm("viscous")
+        (one,) = selection.restricted(ladder, ["viscous", "coulomb"])
+        assert one.name == "coulomb and viscous" and one.elements == [[sharp, viscous]] * 3
+        assert [e.name for e in selection.restricted(ladder, ["viscous"])] == ["viscous"]
+        assert selection.restricted(ladder, ["viscous"])[0].elements == [[viscous]] * 3
+        # with all that a rung brings it is the rung
+        assert selection.restricted(ladder, ["coulomb_fading", "viscous", "stribeck"]) == [
+            ladder[0],
+            ladder[2],
+        ]
+
+    @pytest.mark.parametrize("plenty", [True, False])
+    def test_the_laws_are_the_elements_of_the_rungs_that_were_taken(self, plenty: bool) -> None:
+        """The offset gains, the Stribeck fall and what follows do not."""
+        asked: dict[str, Any] = {}
+
+        class Faked(Table):
+            def held_out(self, choice: Any, weights: Any, prior: Any) -> np.ndarray:
+                offsets = [
+                    any(self.candidates[j][k].kind == "offset" for k in own) for j, own in enumerate(choice)
+                ]
+                more = [
+                    sum(self.candidates[j][k].kind == "cubic" for k in own) for j, own in enumerate(choice)
+                ]
+                return np.tile(np.where(offsets, 2.0, 4.0) + 0.1 * np.array(more), (2, 1))
+
+            def choice(self, laws: Any) -> Any:
+                return [[self.candidates[j].index(term) for term in law] for j, law in enumerate(laws)]
+
+            def solve(self, *given: Any) -> Any:
+                asked["solved"] = given
+                return super().solve(given[0])
+
+            def relative_errors(self, theta: Any, choice: Any) -> Any:
+                return theta, choice
+
+        def pooled(design: Any, candidates: Any, passive: bool) -> Any:
+            table = Faked({}, np.full((2, 3), 10.0))
+            table.candidates, asked["candidates"] = candidates, candidates
+            return table
+
+        motion = fourier_motion(5.0, 100.0, 1)
+        data: Any = SimpleNamespace(
+            reference=SimpleNamespace(motion=motion), slowest=lambda part: None, pooled=pooled, plenty=plenty
+        )
+        for names, rungs in ((None, 8), (["offset", "coulomb", "viscous", "nonlinear_viscous"], 3)):
+            options: Any = SimpleNamespace(friction=names, physical=True)
+            priors: Any = {} if names else {"drawings": 2.0, "nothing": 1.0}
+            found = selection.select_friction(three_axis(), data, None, options, priors)  # type: ignore[arg-type]
+            ladder = selection.restricted(selection.extensions(three_axis(), motion), names)
+            assert len(ladder) == rungs
+            every = [[t for e in ladder for t in e.elements[j]] for j in range(3)]
+            assert found.candidates == every == asked["candidates"]
+            taken = [[*ladder[0].elements[j], FrictionTerm("offset")] for j in range(3)]
+            # in the end the first is not missed either
+            assert found.laws == ([[FrictionTerm("offset")]] * 3 if plenty else taken)
+            assert [c.rung for c in found.comparisons] == [e.name for e in ladder] + [
+                "backward elimination"
+            ] * plenty
+            assert found.prior == (None if names else 2.0)
+            first, *others = found.notes
+            if names:
+                assert first == f"friction: nothing but {', '.join(names)} was allowed"
+            else:
+                assert first == "where the motion tells nothing: drawings"
+            assert len(others) == len(found.comparisons)
+            assert (
+                others[1]
+                == "friction, offset (levels by direction): joints 1, 2, 3; held-out nRMSE 0.6325 → 0.4472"
+            )
+            places = found.pooled.choice(found.laws)
+            found.solved()
+            assert asked["solved"] == (places, found.prior, False)
+            assert found.errors("theta") == ("theta", places)  # type: ignore[arg-type, comparison-overlap]
+
+    def test_a_line_says_what_a_rung_brought(self) -> None:
+        made = selection.Comparison
+        rungs = [made("one", 0.5, 0.25, None, [0, 2]), made("two", 0.25, 0.25, 0.3, [])]
+        assert selection._notes(rungs) == [
+            "friction, one: joints 1, 3; held-out nRMSE 0.5 → 0.25",
+            "friction, two: no joint; held-out nRMSE 0.25, with it 0.3",
+        ]
 
     def test_a_law_must_have_a_name(self) -> None:
         selection.check_laws(None)

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armloop.data.motion import Motion
+from armloop.features.wave_moments import WaveProducts
 from armloop.identification.reconstruction import step as steps
 from armloop.identification.reconstruction.step import PARTS, Part, StepPlan, candidates_of
 from armloop.laws.friction import FrictionTerm
@@ -37,8 +39,32 @@ def test_candidates_belong_to_the_first_step_that_has_them_and_to_their_orders()
     # what stands still is looked for to a higher order: cos and sin of three times it at every order
     more = candidates_of((True,), plan(orders=((1, 1),), still=3))
     assert more.size == 7 + 3 and len(more.subset((1, 1))) == 10 and len(more.subset((0, 0))) == 7
+    # the orders of the one and of the other may differ
+    assert candidates_of((True,), plan(orders=((2, 1),))).size == 5 * 2
+    assert len(candidates_of((True,), StepPlan(PARTS[:1], ((1, 0),), (), (1,))).subset((0, 0))) == 1
     # accelerations are linear, whatever the orders
     assert candidates_of((True,), plan(parts=PARTS[2:], orders=((1, 2),))).second.max() == 1
+
+
+def test_candidates_are_products_of_waves_and_rates() -> None:
+    found = candidates_of((True,), plan(orders=((2, 2),)))
+    q, v = np.random.default_rng(0).normal(size=(2, 40, 1))
+    motion = Motion(np.arange(40.0), q, v, 0 * q, np.array([0]))
+    columns = WaveProducts(found.factors, found.index).columns(motion)
+    waves = np.hstack([1 + 0 * q, np.cos(q), np.sin(q), np.cos(2 * q), np.sin(2 * q)])
+    expected = np.hstack([waves, waves * v, waves * v**2])
+    # each is one of the others', up to its sign and size
+    alike = np.abs(
+        (columns / np.linalg.norm(columns, axis=0)).T @ (expected / np.linalg.norm(expected, axis=0))
+    )
+    assert columns.shape == expected.shape and np.sum(alike > 1 - 1e-12) == 15
+
+
+def test_stribeck_velocities_go_from_a_hundredth_to_one_each_by_the_same_factor() -> None:
+    """A geometric grid of four decimals, of sixty."""
+    assert len(steps.STRIBECK_GRID) == 60
+    np.testing.assert_allclose(steps.STRIBECK_GRID, 0.01 * 100 ** (np.arange(60) / 59), atol=0.5001e-4)
+    assert all(round(v, 4) == v for v in steps.STRIBECK_GRID)
 
 
 class TestFriction:
@@ -160,6 +186,7 @@ def test_an_estimator_that_asks_for_parts_gets_those_of_all_samples(
         prune=lambda moments, support, forced, power: support,
     )
     joint.select(every if whole else fitted, np.arange(3), sparse)
-    assert {len(parts) for parts in seen} == {given}
+    # with no velocity to be profiled, once
+    assert [len(parts) for parts in seen] == [given]
     for part, rows in zip(seen[0], (slice(40), slice(40, 60)), strict=False):
         np.testing.assert_allclose(part.G, X[rows].T @ X[rows], atol=1e-12)

@@ -215,8 +215,7 @@ class _State:
     def __init__(self, pooled: Pooled, places: list[list[int]], priors: dict[str, Prior]) -> None:
         self.pooled, self._places = pooled, places
         self._counts = pooled.counts
-        self._count = np.maximum(self._counts.sum(axis=0), 1.0)
-        self._rms = np.sqrt(np.maximum(pooled.squares.sum(axis=0) / self._count, TINY))
+        self._squares = np.maximum(pooled.squares.sum(axis=0), TINY)
         self.taken: list[list[int]] = [[] for _ in pooled.candidates]
         self.prior: Prior | None = None
         self.prior_name: str | None = None
@@ -285,7 +284,7 @@ class _State:
 
     def _error(self, errors: Array) -> float:
         """Held-out nRMSE, mean over the joints."""
-        return float(np.mean(np.sqrt(errors.sum(axis=0) / self._count) / self._rms))
+        return float(np.mean(np.sqrt(errors.sum(axis=0) / self._squares)))
 
     def _gain(self, errors: Array, times: float, joints: list[int] | None = None) -> tuple[float, bool]:
         """Mean log ratio of the squared errors before and after, and whether it exceeds its scatter over the folds.
@@ -294,8 +293,8 @@ class _State:
         whose errors the gain is a part of.
         """
         ratios = np.log(np.maximum(self._errors, TINY) / np.maximum(errors, TINY))
-        whole = self._count.sum() if joints is None else self._count[joints].sum()
-        gains = (self._counts * ratios).sum(axis=1) / whole
+        whole = (self._counts if joints is None else self._counts[:, joints]).sum()
+        gains = (self._counts * ratios).sum(axis=1) / max(whole, 1.0)
         scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
         return float(gains.sum()), float(gains.sum()) > times * scatter
 
