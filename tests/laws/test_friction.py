@@ -116,6 +116,7 @@ def test_a_run_that_begins_in_mid_motion_begins_stretched():
         (1.0, 0.5, 1.0),  # a radian since it was at rest: slid
         (0.006, 0.5, -1 + 0.006**2 / 0.15),
         (0.0049, -1.0, 0.0),  # at rest: relaxed
+        (0.005, -1.0, 0.0),
         (0.0, 1.0, 0.0),
     ],
 )
@@ -196,6 +197,12 @@ def test_every_kind_at_a_state(kind, functions):
     assert (back, forth) == (pytest.approx(AT[kind][0], rel=1e-9), pytest.approx(AT[kind][1], rel=1e-9))
     assert (element.step, element.way, element.by_load) == AT[kind][2:]
     assert element.part == "friction" and element.of_time == (kind == "fading_sign")
+
+
+def test_a_root_is_rounded_off_where_it_has_no_slope():
+    x = 1e-10
+    root = KINDS["root"].value(Sliding(0.0, x, 1.0), 0.0, NUMPY)
+    assert root == pytest.approx(x / (2 * x * x) ** 0.25)
 
 
 def test_what_an_element_is_unless_it_is_said():

@@ -52,7 +52,6 @@ def stop_operator(q: Array, width: float, starts: ArrayLike = (0,), initial: Arr
     if len(q) == 0:
         return np.zeros_like(q)
     lower, upper = np.full_like(q, -width), np.full_like(q, width)
-    lower[0] = upper[0] = 0.0
     # maps that forget: whatever z was, it is the initial state now
     first = np.asarray(starts, dtype=int)
     lower[first] = upper[first] = width * np.asarray(initial, dtype=float)

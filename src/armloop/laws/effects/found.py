@@ -32,9 +32,9 @@ class _Factor:
     """A wave of angles (wave numbers by joint, from 0), or a position, a speed or its direction; to a power."""
 
     kind: str
+    power: int
     joint: int = 0
     wave: tuple[tuple[int, int], ...] = ()
-    power: int = 1
 
     def __call__(self, functions: Functions, q: Sequence[Any], v: Sequence[Any]) -> Any:
         if self.wave:
@@ -109,7 +109,7 @@ class FoundLaw(Effect):
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
         try:
-            terms = [(_factors(name), 0.0) for name in parameters if name not in RANGE]
+            terms = [_factors(name) for name in parameters if name not in RANGE]
         except ModelError as error:
             return str(error)
         if not terms:
@@ -123,7 +123,7 @@ class FoundLaw(Effect):
             low, high = (parameters[f"{end}_{side}"] for side in ("low", "high"))
             if any(first > last for first, last in zip(low, high, strict=True)):
                 return f"has a {end}_low above its {end}_high"
-        joints = [j for factors, _ in terms for f in factors for j in (f.joint, *(j for j, _ in f.wave))]
+        joints = [j for factors in terms for f in factors for j in (f.joint, *(j for j, _ in f.wave))]
         if max(joints, default=0) >= len(ranges[0] or []):
             return "has a term of a joint that its range does not know"
         return ""
@@ -218,11 +218,11 @@ def _factors(name: str) -> tuple[_Factor, ...]:
         if size == 0:
             raise ModelError(f"unknown term {name!r:.80}: a power is at least 1")
         if plain:
-            factors.append(_Factor(plain[0], int(plain[1:]) - 1, power=size))
+            factors.append(_Factor(plain[0], size, int(plain[1:]) - 1))
         elif function == "sign":
             if not re.fullmatch(r"v\d{1,2}", inner):
                 raise ModelError(f"unknown term {name!r:.80}: sign() takes one speed")
-            factors.append(_Factor("sign", int(inner[1:]) - 1, power=size))
+            factors.append(_Factor("sign", size, int(inner[1:]) - 1))
         else:
             if "".join(m.group() for m in _ADDEND.finditer(inner)) != inner or not inner:
                 raise ModelError(f"unknown term {name!r:.80}: {inner!r:.40} is no sum of angles")
@@ -231,7 +231,7 @@ def _factors(name: str) -> tuple[_Factor, ...]:
                 wave[int(joint) - 1] = wave.get(int(joint) - 1, 0) + int(times or 1) * (
                     -1 if sign == "-" else 1
                 )
-            factors.append(_Factor(function, wave=tuple(wave.items()), power=size))
+            factors.append(_Factor(function, size, wave=tuple(wave.items())))
     if any(f.joint < 0 or any(j < 0 for j, _ in f.wave) for f in factors):
         raise ModelError(f"unknown term {name!r:.80}: joints are counted from 1")
     return tuple(factors)
