@@ -215,3 +215,61 @@ def test_a_search_ends_at_what_no_number_of_conditions_costs_by_chance(
     assert asked == pytest.approx([2 * chi2.ppf(0.999, conditions)] * 2)
     physical_solution(solution, arm_of_one([0.0], positive), [[]], insist=True)
     assert asked[2:] == [np.inf, np.inf]
+
+
+class TestArmOfTwo:
+    """M(q) = diag(1 + b cos q1, c): negative about q1 = π, whatever q2."""
+
+    @staticmethod
+    def body() -> Body:
+        def mass_columns(q: np.ndarray) -> np.ndarray:
+            out = np.zeros((len(q), 2, 2, 3))
+            out[:, 0, 0, 0], out[:, 0, 0, 1], out[:, 1, 1, 2] = 1.0, np.cos(q[:, 0]), 1.0
+            return out
+
+        high = np.array([4.0, 1.0])
+        return Body(
+            mass_columns,
+            lambda theta, q: mass_columns(q) @ theta,
+            np.zeros((1, 2)),
+            -high,
+            high,
+            np.zeros(3, dtype=bool),
+        )
+
+    def test_postures_with_less_than_some_inertia_are_found_that_differ_in_some_joint(self) -> None:
+        clear = np.zeros((2, 3))
+        for least, found in ((0.04, False), (0.06, True)):
+            clear[0, 0] = least
+            rng, theta = np.random.default_rng(0), np.array([1.0, 0.95, 2.0])
+            postures = physical._violated(self.body(), theta, clear, rng)
+            assert (len(postures) > 0) == found and postures.shape[1] == 2
+        # the least there is 0.05
+        assert np.all(1 + 0.95 * np.cos(postures[:, 0]) <= 0.06)
+        apart = np.abs(postures[:, None] - postures[None]) > 0.05 * np.array([8.0, 2.0])
+        assert len(postures) > 2 and apart.any(axis=2).sum() == len(postures) * (len(postures) - 1)
+        clear[:] = [[0.0, 0.0, 0.0], [2.1, 0.0, 0.0]]
+        assert len(physical._violated(self.body(), theta, clear, np.random.default_rng(0)))
+
+    def test_a_posture_is_left_where_m_is_negative_in_the_end(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Searches that never end keep what they found first; the coefficients that are kept at last decide."""
+        monkeypatch.setattr(physical, "_violated", lambda *_: np.array([[np.pi, 0.0], [np.pi, 1.0]]))
+        for b, negative in ((0.5, False), (1.5, True)):
+            theta = np.array([1.0, b, 2.0])
+            monkeypatch.setattr(physical, "_within", lambda *_, theta=theta: (theta, np.zeros((0, 3))))
+            solution = Solution(theta, np.eye(3), theta, np.ones(1))
+            _, binding, left = physical._kept_positive(
+                solution, self.body(), [], np.zeros((1, 2)), np.random.default_rng(0), np.inf
+            )
+            assert binding == 0 and (left is not None) == negative
+            assert left is None or left.tolist() == [np.pi, 0.0]
+
+
+def test_what_is_left_free_is_said_with_the_inertias_that_are_negative() -> None:
+    theta = np.zeros(1)
+    wheres = (physical.EVERYWHERE, physical.LIMITS, physical.TRAINED, physical.FREE)
+    assert [PhysicalSolution(theta, 0, where).contradicted for where in wheres] == [False] * 3 + [True]
+    (plain,) = physics_notes({"kept_positive": physical.FREE})
+    assert plain.endswith("M(q) was left free")
+    (note,) = physics_notes({"kept_positive": physical.FREE, "negative": {"Izz3": -1.0, "m2": -2.0}})
+    assert note == plain + "; negative, as for no arm: Izz3, m2"

@@ -160,3 +160,81 @@ def test_stretches_of_rows_share_joint_and_fold() -> None:
     rows = Rows(zeros, joint, np.ones(7), fold, zeros, np.ones(7, dtype=bool))
     expected = [(0, 0, 0, 2), (0, 1, 2, 3), (1, 1, 3, 4), (1, 0, 4, 6), (1, 2, 6, 7)]
     assert [(j, f, s.start, s.stop) for j, f, s in rows.pieces()] == expected
+
+
+def test_two_columns_are_judged_together_though_a_joint_rests_now_and_then() -> None:
+    X, y, first, rows = problem(4, 0.3)
+    second = np.random.default_rng(9).normal(size=first.shape)
+    columns = np.concatenate([first, second], axis=2)
+    columns[:100] = 0.0
+    y = y + 0.2 * columns[rows.sample, rows.joint, 1]
+    trial = projected(X, y, rows).trial(columns)
+    assert trial is not None
+    Z = columns[rows.sample, rows.joint]
+    both = np.hstack([X, Z])
+    together = np.linalg.lstsq(both, y, rcond=None)[0]
+    np.testing.assert_allclose(trial.coefficients, together[6:], rtol=1e-4)
+    left, right = by_hand(X, Z, y, rows)
+    assert trial.removed == pytest.approx(np.sum(left**2) - np.sum(right**2), rel=1e-3)
+    new = Z - X @ np.linalg.lstsq(X, Z, rcond=None)[0]
+    rest = y - both @ together
+    scores = np.array([(new[rows.block == k] * rest[rows.block == k, None]).sum(axis=0) for k in range(40)])
+    bread = np.linalg.inv(new.T @ new)
+    np.testing.assert_allclose(trial.covariance, bread @ scores.T @ scores @ bread, rtol=1e-3, atol=1e-9)
+    # a column that is nothing makes no law of two
+    columns[..., 1] = 0.0
+    assert projected(X, y, rows).trial(columns) is None
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_a_law_is_new_by_the_part_that_no_sum_of_the_models_columns_is(unit: float) -> None:
+    """Whatever their units, and however often they are said: cos φ of it is theirs and sin φ new."""
+    X, y, _, rows = problem(6)
+    rng = np.random.default_rng(1)
+    basis = np.linalg.qr(np.hstack([X, rng.normal(size=(R, 1))]))[0]
+    sayable = np.hstack([X[:, :2] * unit, X[:, 2:], X[:, :1] + X[:, 3:4], X[:, 1:2], np.zeros((R, 1))])
+    own = projected(X, y, rows, sayable)
+    columns = np.zeros((R // 2, 2, 1))
+    new = 0.1
+    columns[rows.sample, rows.joint, 0] = np.sqrt(1 - new**2) * basis[:, :6].sum(axis=1) / np.sqrt(6)
+    columns[rows.sample, rows.joint, 0] += new * basis[:, 6]
+    assert own.trial(columns, new=0.99 * new) is not None
+    assert own.trial(columns, new=1.01 * new) is None
+    # one of two that is new is enough
+    known = np.zeros_like(columns)
+    known[rows.sample, rows.joint, 0] = X[:, 1] - X[:, 4]
+    assert own.trial(np.concatenate([known, columns], axis=2), new=0.99 * new) is not None
+
+
+def test_one_column_said_three_times_says_itself_alone() -> None:
+    X, y, columns, rows = problem(7)
+    own = projected(X, y, rows, np.repeat(X[:, :1], 3, axis=1))
+    known = np.zeros_like(columns)
+    known[rows.sample, rows.joint, 0] = X[:, 0]
+    assert own.trial(known, new=0.01) is None
+    known[rows.sample, rows.joint, 0] += 0.02 * X[:, 1] * np.linalg.norm(X[:, 0]) / np.linalg.norm(X[:, 1])
+    assert own.trial(known, new=0.01) is not None
+
+
+def test_columns_that_the_model_has_twice_or_not_at_all_change_nothing() -> None:
+    X, y, columns, rows = problem(0, 0.3)
+    plain = projected(X, y, rows).trial(columns)
+    more = projected(np.hstack([X, X[:, :1], np.zeros((R, 1))]), y, rows).trial(columns)
+    assert plain is not None and more is not None
+    np.testing.assert_allclose(more.coefficients, plain.coefficients, rtol=1e-4)
+    assert more.removed == pytest.approx(plain.removed, rel=1e-3)
+
+
+def test_what_must_be_removed_is_a_part_of_what_the_best_met_joint_leaves() -> None:
+    """Of the joints that feel it, where it is fitted."""
+    X, y, columns, rows = problem(8, 0.1)
+    rng = np.random.default_rng(2)
+    y = y + np.where(rows.joint == 1, 2.0, 0.0) * rng.normal(size=R)
+    Z = columns[rows.sample, rows.joint]
+    both = np.hstack([X, Z])
+    rest = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+    squares = [np.sum(rest[rows.joint == j] ** 2) for j in (0, 1)]
+    removed = np.sum(rest**2) - np.sum((y - both @ np.linalg.lstsq(both, y, rcond=None)[0]) ** 2)
+    own, part = projected(X, y, rows), removed / min(squares)
+    assert own.trial(columns, worth=0.999 * part) is not None
+    assert own.trial(columns, worth=1.001 * part) is None

@@ -255,14 +255,13 @@ def physical_cuts(
     """
     r = mass.shape[3]
     free = np.ones(r, dtype=bool) if positive is None else ~positive
-    bound = [not x for x in free] + [term.kind != "offset" for law in laws for term in law]
+    bound = np.array([*~free, *(term.kind != "offset" for law in laws for term in law)], dtype=bool)
     signs = np.eye(len(bound))[bound]
-    joints = np.arange(mass.shape[1])
     mass = mass.copy()
-    mass[:, joints, joints] -= clear
+    np.einsum("pjjr->pjr", mass)[...] -= clear
 
     def cuts(theta: Array) -> Array:
-        found = list(signs) if (signs @ theta < -_SLACK).any() else []
+        found = list(signs) if (theta[bound] < -_SLACK).any() else []
         M = mass @ theta[:r]
         values, vectors = np.linalg.eigh(0.5 * (M + M.transpose(0, 2, 1)))
         for k in np.flatnonzero(values[:, 0] < -_SLACK):
