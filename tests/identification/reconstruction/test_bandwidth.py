@@ -208,7 +208,7 @@ class TestPieces:
                 return replace(
                     Table(
                         np.full(1, k),
-                        np.tile([2.0, 2.0, 4.0], (100, 1)),
+                        np.tile([2.0, 2.0, 4.0], (100, 1)) * (1 + 6 * k),
                         np.zeros(100, dtype=int),
                         moving,
                         standing(100, 3),
@@ -218,7 +218,8 @@ class TestPieces:
                 )
 
             def held_out(table: Table) -> Any:
-                assert (table.moving == moving).all()  # the same samples at every corner
+                # the same samples and torques at every corner
+                assert (table.moving == moving).all() and (table.tau == [2.0, 2.0, 4.0]).all()
                 return np.array(left[int(table.columns[0])])
 
             monkeypatch.setattr(bandwidth, "table_at", table_at)
@@ -247,6 +248,7 @@ class TestPieces:
         worse = [[0.4, 0.2, 0.4], *[[0.2, 0.2, 0.4]] * 4]
         assert compared(worse).cutoff_hz == 7.1
         assert compared(worse, (99, 100, 100)).cutoff_hz == 10.0
+        assert len(compared(worse, (99, 100, 100)).trials) == 5
         assert compared(worse, (99, 99, 99)) == Bandwidth(10.0)
 
     def test_a_log_lasts_more_than_four_periods_of_the_lowest_corner(
@@ -255,6 +257,61 @@ class TestPieces:
         # 4 / 2.5 Hz
         even = [[0.2, 0.2, 0.4]] * 5
         assert compared(even, seconds=1.61).trials == () and len(compared(even, seconds=1.62).trials) == 5
+
+    def test_every_corner_sees_the_logs_that_are_long_enough_for_the_lowest(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of three logs that begin at 100 s the second is shorter; without a table at one corner the highest stands."""
+        asked: list[Any] = []
+        logs = [run(seed, seconds=seconds) for seed, seconds in ((0, 8.0), (1, 1.0), (2, 8.0))]
+        logs = [replace(log, time=log.time + 100.0) for log in logs]
+
+        def table_at(own: Any, arm: Any, base: Any, how: Any, corner: float, *rest: Any) -> Any:
+            assert base.names == BaseParameters.of_arm(three_axis(), rotors=True).names
+            asked.append((corner, [log.name for log in own], *rest))
+            table = Table(*[np.zeros((200, 3))] * 2, np.zeros(200, dtype=int), *[None] * 3)  # type: ignore[arg-type]
+            table = replace(table, moving=np.ones((200, 3), dtype=bool), motion=standing(200, 3), stride=1)
+            return None if corner == asked[0][0] * 0.5 else table
+
+        def intervals(own: Any, filters: Any, options: Any) -> Any:
+            asked.append([how.cutoff_hz for how in filters])
+            return ["first", "second", "third"]
+
+        monkeypatch.setattr(bandwidth, "table_at", table_at)
+        monkeypatch.setattr(bandwidth, "held_out_intervals", intervals)
+        monkeypatch.setattr(bandwidth, "_held_out", lambda table: np.ones(3))
+        named = [replace(log, name=f"log {k}") for k, log in enumerate(logs)]
+        how = replace(TEN_HZ, cutoff_hz=9.999)
+        corners = [9.999, 7.099, 5.0, 3.5, 2.5]
+        for libraries, filters in (((), corners), ((replace(how, cutoff_hz=4.0),), [4.0, 3.5, 2.5])):
+            asked.clear()
+            choose_bandwidth(named, three_axis(), how, libraries=libraries)
+            assert sorted(asked[0], reverse=True) == filters
+            assert [one[0] for one in asked[1:]] == corners
+            assert all(one[1:] == (["log 0", "log 2"], corners, ["first", "third"]) for one in asked[1:])
+        monkeypatch.setattr(bandwidth, "held_out_intervals", lambda *_: ["first", "second", "third"])
+        asked.clear()
+        assert choose_bandwidth(named, three_axis(), TEN_HZ) == Bandwidth(10.0) and len(asked) == 5
+        # one log that is no series is enough to ask for none
+        monkeypatch.setattr(bandwidth, "is_time_series", lambda q, runs: q is not named[1].q)
+        monkeypatch.setattr(bandwidth, "even_selection", lambda logs: list(logs))
+        asked.clear()
+        assert choose_bandwidth(named, three_axis(), TEN_HZ) == Bandwidth(10.0) and not asked
+
+    def test_blocks_are_numbered_on_from_log_to_log(self) -> None:
+        base = BaseParameters.of_arm(three_axis())
+        table = bandwidth.table_at([run(seconds=6.5)] * 3, three_axis(), base, TEN_HZ, 10.0, [10.0])
+        assert table is not None
+        first = np.searchsorted(table.motion.starts, np.arange(table.motion.samples), side="right") - 1
+        numbers = [np.unique(table.blocks[first == k]).tolist() for k in range(3)]
+        count = len(numbers[0])
+        assert numbers == [[count * k + i for i in range(count)] for k in range(3)] and count > 4
+
+    def test_a_corner_is_a_number_of_three_decimals(self) -> None:
+        log: Any = SimpleNamespace(period=0.00777, samples=10, runs=lambda: [slice(0, 10)])
+        log.read, log.select = lambda: log, lambda rows: log
+        # 0.4 / 0.00777 s
+        assert bandwidth.highest_corner([log], replace(TEN_HZ, cutoff_hz=100.0)) == 51.48
 
     def test_a_library_keeps_a_lower_corner_of_its_own(self) -> None:
         assert Bandwidth(5.0).suited(TEN_HZ).cutoff_hz == 5.0
@@ -282,6 +339,8 @@ class TestPieces:
         assert len(log.runs()) == 2
         (one,) = bandwidth.even_selection([log])
         assert one.q.tolist() == q[30:90].tolist()
+        early = MotionLog(np.arange(100.0) + np.where(np.arange(100) >= 70, 50.0, 0.0), q, log.v, q)
+        assert bandwidth.even_selection([early])[0].q.tolist() == q[:60].tolist()
         several = bandwidth.even_selection([log] * 3)
         assert [len(part.q) for part in several] == [60 // len(several)] * len(several)
 

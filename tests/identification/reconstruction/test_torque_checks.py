@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,6 +105,72 @@ def test_measured_arms_are_not_accused_and_their_faults_are_found(measured: Path
                 check_torques([exchanged(log, j - 1, j, "tau")], arm, 8.0)
 
 
+class TestWhole:
+    """Of logs with names, whose faults are given."""
+
+    @pytest.fixture
+    def asked(self, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+        asked: dict[str, Any] = {"problems": 0, "given": True, "turned": [], "exchanged": [], "scaled": []}
+
+        class Given:
+            def fit(self, signs: Any, order: Any) -> str:
+                assert signs.tolist() == [1.0] * 3 and order.tolist() == [0, 1, 2]
+                return "plain"
+
+            def turned(self, plain: str) -> Any:
+                return asked["turned"]
+
+            def better_exchanged(self, plain: str) -> Any:
+                return asked["exchanged"]
+
+            def better_scaled(self, plain: str) -> Any:
+                return asked["scaled"]
+
+            @staticmethod
+            def of(logs: Any, arm: Any, cutoff_hz: float) -> Any:
+                asked["problems"] += 1
+                return Given() if asked["given"] else None
+
+        monkeypatch.setattr(torque_checks, "Problem", Given)
+        monkeypatch.setattr(torque_checks, "even_selection", lambda logs: logs)
+        monkeypatch.setattr(torque_checks, "is_time_series", lambda q, runs: q)
+        monkeypatch.setattr(torque_checks, "meant", lambda *_: None)
+        return asked
+
+    @staticmethod
+    def check(names: str, cutoff: float = 10.0, series: tuple[bool, ...] = ()) -> str:
+        logs: Any = [SimpleNamespace(name=name, q=True, runs=lambda: None) for name in names]
+        for log, one in zip(logs, series, strict=False):
+            log.q = one
+        try:
+            check_torques(logs, three_axis(), cutoff)
+        except LogError as error:
+            return str(error)
+        return ""
+
+    def test_series_that_are_filtered_are_looked_at_if_they_move_enough(self, asked: dict[str, Any]) -> None:
+        asked["turned"] = [1]
+        assert self.check("a", 0.0) == self.check("ab", series=(True, False)) == "" and not asked["problems"]
+        asked["given"] = False
+        assert self.check("a", 0.5) == "" and asked["problems"] == 1
+        asked["given"] = True
+        assert self.check("a", 0.5).startswith("a: the sign of tau2 is turned: ")
+
+    def test_three_logs_are_named_each_once(self, asked: dict[str, Any]) -> None:
+        asked["turned"] = [0, 2]
+        for names, said in (("aba", "a, b"), ("abc", "a, b, c"), ("abcd", "a, b, c, ...")):
+            assert self.check(names).startswith(f"{said}: the sign of tau1, tau3 is turned: ")
+        asked["turned"] = [0, 1, 2]
+        assert self.check("a").startswith("a: the sign of all joints is turned: ")
+
+    def test_joints_count_from_one(self, asked: dict[str, Any]) -> None:
+        assert self.check("a") == ""
+        asked["scaled"] = [(1, 0.1)]
+        assert "fit one another: tau2 is about 10 times what" in self.check("a")
+        asked["exchanged"] = [(0, 2)]
+        assert "columns tau1 and tau3 are exchanged" in self.check("a")
+
+
 class Fits(torque_checks.Problem):
     """Fits that are given: by the joints whose sign is turned, by their order, and by the half of the blocks."""
 
@@ -110,6 +178,7 @@ class Fits(torque_checks.Problem):
         object.__setattr__(self, "fits", fits)
 
     def fit(self, signs: np.ndarray, order: np.ndarray, half: int | None = None) -> torque_checks.Fit:
+        assert set(np.abs(signs)) == {1.0}
         turned = "".join(str(j + 1) for j in np.flatnonzero(signs < 0))
         name = f"half_{half}" if half is not None else f"turned_{turned}"
         if (order != np.arange(len(order))).any():
@@ -163,6 +232,16 @@ class TestTurnedSigns:
         both = fit_of([0.3, 0.4], [0.6, 0.6], GOOD)
         assert Fits(turned_1=one, turned_12=both, half_0=plain, half_1=plain).turned(plain) == [0]
 
+    def test_what_is_physical_as_recorded_is_not_accused_however_much_better_it_were_turned(self) -> None:
+        plain = fit_of([0.5, 0.5], GOOD, GOOD)
+        assert Fits(turned_1=fit_of([0.1, 0.5], GOOD, GOOD), half_0=plain, half_1=plain).turned(plain) == []
+
+    def test_of_several_one_that_brakes_is_enough(self) -> None:
+        plain = fit_of([0.5, 0.5], [-0.1, -0.1], [-1.0, -1.0])
+        for power, turned in ((0.51, [0, 1]), (0.49, [])):
+            both = fit_of([0.4, 0.4], [0.1, power], GOOD)
+            assert Fits(turned_12=both, half_0=plain, half_1=plain).turned(plain) == turned
+
     def test_no_friction_neither_brakenor_drives_and_no_inertia_is_none(self) -> None:
         none = fit_of([0.1, 0.1], [0.0, 0.0], [1.0, 0.0])
         assert none.physical([0]) and not none.physical([0, 1]) and not none.driven([1])
@@ -203,6 +282,7 @@ class TestGains:
             ((0.1, 0.151), [0.19, 0.4], GOOD, False),  # the halves contradict each other
             ((10.0, 10.0), [0.19, 0.4], GOOD, True),  # too small is a fault, too
             ((-0.1, -0.1), [0.19, 0.4], GOOD, False),  # a sign is no gain
+            ((0.1, -0.1), [0.19, 0.4], GOOD, False),
             ((0.1, 0.1), [0.19, 0.4], [1.0, -1.0], False),  # friction would drive
             ((0.1, 0.1), [0.19, 0.9], GOOD, False),  # what the joint gains the others lose
         ],
@@ -227,6 +307,14 @@ class TestGains:
             scaled_2=fit_of([0.3, 0.1], GOOD, GOOD),
         )
         assert fits.better_scaled(self.PLAIN) == [(1, pytest.approx(0.2))]
+
+    def test_one_that_spoils_the_rest_does_not_excuse_one_that_does_not(self) -> None:
+        fits = Scaled(
+            [(0.1, 0.1), (0.2, 0.2)],
+            scaled_1=fit_of([0.1, 0.4], GOOD, GOOD),
+            scaled_2=fit_of([2.0, 0.1], GOOD, GOOD),
+        )
+        assert fits.better_scaled(self.PLAIN) == [(0, pytest.approx(0.1))]
 
     def test_a_single_joint_has_nothing_to_be_compared_with(self) -> None:
         assert Scaled([(0.1, 0.1)]).better_scaled(fit_of([0.4], [1.0], [1.0])) == []

@@ -248,11 +248,10 @@ def table_at(
 
 def _held_out(table: Table) -> Array:
     """(n,) rms of what a regression on every other block leaves on the blocks between, both ways round."""
-    scale = table.sizes(table.tau, table.moving)
+    scale, odd = table.sizes(table.tau, table.moving), (table.blocks % 2).astype(bool)
     for _ in range(2):  # joints weigh by their torques first, then by what is left of them
         left = np.zeros_like(table.tau)
-        for parity in (0, 1):
-            judged = table.blocks % 2 == parity
+        for judged in (odd, ~odd):
             X, y, _ = table.weighed(table.tau, ~judged[:, None] & table.moving, scale)
             theta = determined_solution(X, y)
             left[judged] = table.tau[judged] - table.columns[judged] @ theta
