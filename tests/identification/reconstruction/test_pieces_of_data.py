@@ -194,3 +194,23 @@ class TestCatalogue:
         effect: Any = None
         law = catalogue.Law.found(effect, 0.5, columns, 0.25)
         assert (law.size, law.constant, law.gain, law.shape) == (2, (0,), 0.25, 0.5)
+
+    def test_columns_and_parameters_of_several_laws_stand_one_after_the_other(self) -> None:
+        motion = Motion(np.arange(5.0), *np.zeros((3, 5, 3)), np.array([0]))
+        laws = []
+        for size in (1, 2, 1):
+            law = self.law(size)
+            law.effect.full_columns = lambda context, shape, size=size: np.full((5, 3, size), float(size))  # type: ignore[attr-defined]
+            law.effect.estimates = lambda arm, x, covariance, shape: (x.tolist(), covariance.tolist())  # type: ignore[attr-defined]
+            laws.append(law)
+        several, nothing = catalogue.Laws(laws), catalogue.Laws()
+        assert (nothing.tried, nothing.raw(three_axis(), motion, 1.0).shape) == (0, (5, 3, 0))
+        assert several.raw(three_axis(), motion, 1.0)[2, 1].tolist() == [1.0, 2.0, 2.0, 1.0]
+        covariance = np.arange(16.0).reshape(4, 4)
+        found = several.added(three_axis(), np.array([5.0, 6.0, 7.0, 8.0]), covariance)
+        assert [one.parameters for one in found] == [  # type: ignore[comparison-overlap]
+            ([5.0], [[0.0]]),
+            ([6.0, 7.0], [[5.0, 6.0], [9.0, 10.0]]),
+            ([8.0], [[15.0]]),
+        ]
+        assert [one.when for one in found] == ["always"] * 3

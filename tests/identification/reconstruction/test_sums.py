@@ -1,5 +1,8 @@
 """What a step regresses: what is left of a torque that passed a filter, by friction that passed it, too."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from synthetic import fourier_motion, three_axis
@@ -92,3 +95,27 @@ def test_sums_of_chunks_are_the_normal_equations_of_all_their_samples() -> None:
             assert (found.yy, found.count) == (pytest.approx(np.sum(y[mask] ** 2)), mask.sum())
             assert sums.samples(joint, chosen) == mask.sum()
         assert sums.scale(joint) == pytest.approx(np.sqrt(np.mean(tau[moves] ** 2)))
+
+
+def test_of_a_sample_what_bodies_and_friction_take_is_left_out() -> None:
+    """Even of one that is alone, or of none; without a filter as it stands."""
+    arm, motion = three_axis(), fourier_motion(1.0, 20.0, 1)
+    body: Any = SimpleNamespace(torque=lambda arm, motion, step: 3.0 * motion.q)
+    rubs = [FrictionTerm("viscous", 2.0)]
+    tau = np.random.default_rng(0).normal(size=motion.q.shape)
+    samples = Samples(motion, tau, np.ones_like(motion.q, dtype=bool), 0.05)
+    never = np.zeros(20, dtype=bool)
+    for taken in ([], [7], [2, 3, 11]):
+        independent = np.isin(np.arange(20), taken)
+        chunk = Chunk(samples, np.zeros(20, dtype=np.intp), never, never, independent)
+        usable = Choice(None, (1, 2, 3), Found(arm, [body], [rubs] * 3))(chunk)
+        assert usable.places.tolist() == taken
+        expected = (tau - 3.0 * motion.q - 2.0 * motion.v)[taken]
+        np.testing.assert_allclose(usable.rest, expected, atol=1e-12)
+        np.testing.assert_array_equal(usable.tau, tau[taken])
+
+
+def test_the_size_of_a_torque_of_one_sample_is_its_own() -> None:
+    cells: Any = {(1, False): SimpleNamespace(count=1)}
+    sums = StepSums(cells, {(1, False): np.array([9.0, 4.0])})
+    assert (sums.scale(0), sums.scale(1)) == (3.0, 1.0)

@@ -269,7 +269,7 @@ def physical_cuts(
             row = np.zeros(len(bound))
             row[:r] = np.einsum("i,ijr,j->r", u, mass[k], u)
             found.append(row)
-        return np.array(found).reshape(-1, len(bound))
+        return np.array(found).reshape(len(found), len(bound))
 
     return cuts
 

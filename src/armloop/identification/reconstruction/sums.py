@@ -76,8 +76,6 @@ class Usable:
 
     def filtered(self, x: Array) -> Array:
         """(M, c) values at the usable samples of x (N, c), filtered like the torque; runs without any are left out."""
-        if self.whole.cutoff_hz <= 0:
-            return x[self.places]
         runs = self.whole.motion.runs()
         used = [run for run in runs if np.diff(np.searchsorted(self.places, (run.start, run.stop)))[0]]
         return LowPass(self.whole.cutoff_hz, self.whole.period).each(x, used)[self.places]
