@@ -259,3 +259,116 @@ class TestSamePassage:
         evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given))
         burst = Burst(slice(30, 32), frozenset({0, 1}))
         assert contacts._comes_back(evidence, np.arange(60), level, burst) == back
+
+
+def at(time: list[float], starts: tuple[int, ...] = (0,)) -> Motion:
+    N = len(time)
+    return Motion(np.array(time), *np.zeros((3, N, 1)), np.array(starts))
+
+
+def stretches(time: list[float], new: list[float], starts: tuple[int, ...] = (0,)) -> list[tuple[int, int]]:
+    """Those of a run beside one in which nothing happens: half of all samples are quiet."""
+    quiet = (100.0 + np.arange(20.0)).tolist()
+    motion = at([*time, *quiet], (*starts, len(time)))
+    found = contacts._bursts(motion, np.arange(motion.samples), np.array([*new, *(0.0 * x for x in quiet)]))
+    return [(burst.start, burst.stop) for burst in found]
+
+
+class TestStretches:
+    #: Differences of neighbours are a tenth of a second to the bit.
+    FIVE = (-0.2, -0.1, 0.0, 0.1, 0.2)
+
+    @pytest.mark.parametrize(
+        ("new", "found"),
+        [
+            ((0, 10, 10, 10, 0), [(1, 4)]),  # a tenth of a second of the run before it and after it
+            ((0, 10, 10, 0, 0), [(1, 3)]),  # and that long itself
+            ((0, 0, -10, -10, 0), [(2, 4)]),
+            ((0, 0, 10, 0, 0), []),
+            ((0, 2.5, 10, 10, 0), [(2, 4)]),  # a quarter of its peak is none of it
+            ((0, 10, 10, 2.5, 0), [(1, 3)]),
+            ((0, 2.6, 10, 2.6, 0), [(1, 4)]),
+            ((2.6, 2.6, 10, 10, 0), []),  # there since the run began, or until it ended
+            ((0, 10, 10, 2.6, 2.6), []),
+            ((0, 4.2, 4.2, 4.2, 0), []),  # as much as is asked is not above it
+            ((0, 4.3, 4.3, 4.3, 0), [(1, 4)]),
+            ((10, 10, 10, 10, 10), []),
+        ],
+    )
+    def test_one(self, new: tuple[float, ...], found: list[tuple[int, int]]) -> None:
+        assert stretches(list(self.FIVE), list(new)) == found
+
+    def test_its_edge_is_a_part_of_its_highest(self) -> None:
+        time = (0.1 * np.arange(11)).tolist()
+        assert stretches(time, [0, 0, 0, 4, 6, 20, 6, 4, 0, 0, 0]) == [(4, 7)]
+
+    def test_a_run_that_has_just_begun_or_is_about_to_end(self) -> None:
+        time = (7.0 + 0.0625 * np.arange(9)).tolist()
+        assert stretches(time, [0, 9, 9, 9, 9, 9, 0, 0, 0]) == []
+        assert stretches(time, [0, 0, 0, 9, 9, 9, 9, 9, 0]) == []
+        assert stretches(time, [0, 0, 0, 9, 9, 9, 0, 0, 0]) == [(3, 6)]
+
+    def test_what_lasts_to_the_end_of_its_run_is_none_whatever_comes_next(self) -> None:
+        time = [0.0, 0.1, 0.2, 0.3, 5.0, 5.1, 5.2, 5.3]
+        assert stretches(time, [0, 0, 9, 9, 0, 0, 0, 0], (0, 4)) == []
+        assert stretches(time, [0, 0, 0, 0, 9, 9, 0, 0], (0, 4)) == []
+
+    def test_two_are_one_unless_they_are_farther_apart_than_a_pause(self) -> None:
+        pause = contacts.PAUSE
+        low = [0.0, 9.0, 9.0, 2.0, 9.0, 9.0, 0.0]
+        for gap, found in ((pause, [(1, 6)]), (pause + 0.01, [(1, 3), (4, 6)])):
+            time = [-9.0, -0.25, 0.0, 0.5 * gap, gap, gap + 0.25, gap + 9]
+            assert stretches(time, low) == found
+
+    def test_they_meet_at_a_pause(self) -> None:
+        one, other = (Burst(slice(*rows), frozenset({0})) for rows in ((0, 2), (3, 5)))
+        for gap, meet in ((contacts.PAUSE, True), (1.01 * contacts.PAUSE, False)):
+            time = at([-1.0, 0.0, 0.5 * gap, gap, gap + 1.0])
+            assert contacts._meet(time, one, other) is contacts._meet(time, other, one) is meet
+
+
+class TestPassages:
+    """A burst at the posture 0 among others at 1; where the arm stands at 0 again the level decides."""
+
+    def again(
+        self, levels: dict[int, float], own: tuple[int, int] = (5, 8), others: tuple[int, ...] = ()
+    ) -> bool:
+        N = 20
+        q, level = np.ones((N, 1)), np.zeros((N, 1))
+        rows = slice(*own)
+        q[rows], level[rows] = 0.0, 10.0
+        for k, x in levels.items():
+            q[k], level[k] = 0.0, x
+        for k in others:
+            level[k] = 9.0
+        moved = Motion(0.1 * np.arange(N), q, 0 * q, 0 * q, np.array([0]))
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=moved))
+        return contacts._comes_back(evidence, np.arange(N), level, Burst(rows, frozenset({0})))
+
+    def test_most_of_them_decide(self) -> None:
+        assert not self.again({})
+        assert not self.again({}, others=(12, 14))
+        assert self.again({12: 6.0}) and not self.again({12: 5.0})  # more than half of the peak
+        assert self.again({12: 6.0, 14: 6.0}) and not self.again({12: 6.0, 14: 1.0})
+        assert self.again({12: 6.0, 14: 1.0, 16: 6.0})
+        assert self.again({12: 6.0, 13: 1.0})  # one passage
+        assert not self.again({12: 6.0, 13: 1.0, 15: 1.0, 17: 1.0})
+
+    def test_its_own_surroundings_are_none(self) -> None:
+        for near in (2, 3, 4, 8, 9):
+            assert not self.again({near: 9.0}), near
+        for far in (0, 1, 11):
+            assert self.again({far: 9.0}), far
+        assert not self.again({0: 9.0}, (1, 4))
+
+    def test_it_is_where_one_of_its_joints_is_highest(self) -> None:
+        N = 20
+        q, level = np.ones((N, 1)) * [[1.0, 0.0]], np.zeros((N, 2))
+        q[[5, 6, 12], 0] = [0.0, 0.5, 0.5]
+        level[5], level[6], level[12] = [10.0, 0.0], [1.0, 4.0], [9.0, 9.0]
+        moved = Motion(0.1 * np.arange(N), q, 0 * q, 0 * q, np.array([0]))
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=moved))
+        burst = Burst(slice(5, 7), frozenset({0, 1}))
+        assert not contacts._comes_back(evidence, np.arange(N), level, burst)
+        q[12, 0] = 0.0
+        assert contacts._comes_back(evidence, np.arange(N), level, burst)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from synthetic import three_axis
 
 from armloop.data.motion import Motion
@@ -158,3 +159,60 @@ class TestParameters:
         assert self.trial(monkeypatch, kind, three_axis(), shown=[1]).own == 0.0
         assert self.trial(monkeypatch, kind, three_axis(), size=0.0) is None
         assert replace(kind).link == 0
+
+
+class TestInterval:
+    """A push of the size 2 from sample 20 to 39 of a joint, looked for within 30 samples of a burst."""
+
+    def found(
+        self, burst: slice, reach: float = 0.0, starts: tuple[int, ...] = (0,), **other: float
+    ) -> tuple[int, int]:
+        N = 100
+        y = np.zeros((N, 1))
+        y[20:40] = 2.0
+        for key, value in other.items():
+            y[int(key[1:])] = value
+        motion = Motion(0.01 * np.arange(N), *np.zeros((3, N, 1)), np.array(starts))
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=motion, period=0.01, reach=reach))
+        kind: Any = SimpleNamespace(columns=lambda evidence, part: np.ones((part.samples, 1, 1)))
+        one = pushes._interval(evidence, y, np.ones_like(y), burst, kind)
+        return one.start, one.stop
+
+    def test_it_grows_and_shrinks_to_the_push(self) -> None:
+        for burst in (slice(24, 36), slice(30, 36), slice(18, 42)):
+            assert self.found(burst, 0.04) == (20, 40)
+        assert self.found(slice(30, 34)) == (20, 40)
+        for short in (slice(30, 33), slice(30, 32)):  # its middle is too short to tell a size
+            assert self.found(short) == (short.start, short.stop)
+        assert self.found(slice(30, 35), 0.04) == (30, 35)
+
+    def test_the_size_is_that_of_the_middle(self) -> None:
+        # half of it explains a sample as well as nothing does
+        assert self.found(slice(18, 42), 0.04, _19=0.9, _40=0.9) == (20, 40)
+        assert self.found(slice(18, 42), 0.04, _19=1.1, _40=1.1) == (19, 41)
+
+    def test_it_stays_within_its_run_and_begins_with_it(self) -> None:
+        assert self.found(slice(26, 36), starts=(0, 26)) == (26, 40)
+        assert self.found(slice(22, 26), starts=(0, 28)) == (20, 28)
+        assert self.found(slice(20, 36), 0.04, starts=(0, 20), _20=1.1) == (20, 40)
+
+
+def test_the_error_of_a_force_is_that_of_independent_pieces_and_unbounded_where_it_is_not_felt() -> None:
+    rng = np.random.default_rng(8)
+    columns, left = rng.normal(size=(30, 2, 3)), rng.normal(size=(30, 2))
+    pieces, size = np.repeat(np.arange(6), 5), np.array([3.0, -1.0, 2.0])
+    bread = np.linalg.inv(sum(a.T @ a for a in columns))
+    scores = [sum(columns[k].T @ left[k] for k in range(5 * p, 5 * p + 5)) for p in range(6)]
+    spread = bread @ sum(np.outer(s, s) for s in scores) @ bread
+    assert_allclose(pushes._size_error(columns, size, left, pieces), np.sqrt(np.diag(spread)))
+    columns[:, :, 1] = 0.0
+    found = pushes._size_error(columns, size, left, pieces)
+    two = pushes._size_error(columns[:, :, [0, 2]], size[[0, 2]], left, pieces)
+    assert_allclose(found, [two[0], np.sqrt(14.0), two[1]])
+
+
+def test_a_margin_is_a_pause_long() -> None:
+    pause = pushes.PAUSE
+    time = np.array([-1.01 * pause, -pause, -0.5 * pause, 0.0, 0.5 * pause, pause, 1.01 * pause])
+    motion = Motion(time, *np.zeros((3, 7, 1)), np.array([0]))
+    assert np.flatnonzero(pushes.around(motion, slice(3, 4))).tolist() == [1, 2, 3, 4, 5]

@@ -1,0 +1,98 @@
+"""Which samples count, which are alike, and what is kept of them, by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import evidence
+from armloop.diagnosis.evidence import Evidence
+
+
+def motion(q: Any, v: Any = None) -> Motion:
+    q = np.asarray(q, dtype=float)
+    v = np.zeros_like(q) if v is None else np.asarray(v, dtype=float)
+    return Motion(0.1 * np.arange(len(q)), q, v, np.zeros_like(q), np.array([0]))
+
+
+def test_columns_are_kept_while_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    for room, kept in ((1, 1), (8, 1), (9, 2), (16, 2), (17, 3)):
+        monkeypatch.setattr(evidence, "_KEPT", room)
+        columns = evidence._Columns()
+        for shape in range(4):
+            columns.keep((("a", 1, None), float(shape)), np.zeros(1))  # eight bytes
+        assert len(columns) == kept and columns.size == 8 * kept
+
+
+@pytest.mark.parametrize(("steps", "near"), [(0, [5]), (1, [4, 5, 6]), (2, [3, 4, 5, 6, 7])])
+def test_what_the_filter_brings_in_of_a_standstill_comes_from_either_side(
+    steps: int, near: list[int]
+) -> None:
+    moving = np.ones((12, 3), dtype=bool)
+    moving[5, 1] = False
+    samples: Any = SimpleNamespace(
+        moving=moving, reach=0.1 * steps, period=0.1, motion=motion(np.zeros((12, 3)))
+    )
+    found = evidence.near_standstill(samples)
+    assert np.flatnonzero(found[:, 1]).tolist() == near and not found[:, [0, 2]].any()
+    assert moving.sum() == 35  # what it was given is left as it is
+
+
+def test_like_places_at_like_speeds_are_a_cell_of_a_joint_and_a_standstill_is_one_of_its_own() -> None:
+    places, speeds = np.meshgrid(np.arange(9.0), np.arange(9.0), indexing="ij")
+    q, v = np.column_stack([places.ravel()] * 2), np.column_stack([speeds.ravel()] * 2)
+    moving = np.ones(q.shape, dtype=bool)
+    moving[[80, 40], 0] = False
+    samples = SimpleNamespace(moving=moving, reach=0.0, period=0.1, motion=motion(q, v))
+    rows = np.ones(q.shape, dtype=bool)
+    cells = Evidence._cells.func(SimpleNamespace(samples=samples, rows=rows))  # type: ignore[attr-defined]
+    third = np.digitize(np.arange(9), [2.7, 5.4])  # thirds of what is there
+    kinds = [
+        (j, *((third[int(q[k, j])], third[int(v[k, j])]) if moving[k, j] else ("still", 0)))
+        for k in range(81)
+        for j in range(2)
+    ]
+    labels = cells.ravel().tolist()
+    assert len(set(kinds)) == len(set(labels)) == len(set(zip(kinds, labels, strict=True))) == 19
+
+
+def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    errors = np.arange(24.0).reshape(4, 2, 3)
+    monkeypatch.setattr(evidence, "torque_errors", lambda model, samples: errors)
+    rows = np.array([[True, False], [False, False], [True, True], [False, True]])
+    own = SimpleNamespace(
+        _of_motion=evidence._Columns(),
+        model=None,
+        samples=None,
+        independent=np.arange(4),
+        rows=rows,
+        kept=np.array([0, 2, 3]),
+        _places=np.array([0, 2, 3]),
+        scale=np.array([0.5, 4.0]),
+    )
+    expected = [errors[0, 0] / 0.5, errors[2, 0] / 0.5, errors[2, 1] / 4, errors[3, 1] / 4]
+    for _ in range(2):  # the second time what is kept
+        np.testing.assert_array_equal(Evidence._model_errors.func(own), expected)  # type: ignore[attr-defined]
+
+
+def test_a_joint_has_slid_that_travels_far_enough() -> None:
+    moving = np.ones((6, 3), dtype=bool)
+    moving[3] = False
+    q = np.zeros((6, 3))
+    least = evidence._TRAVEL
+    q[2] = [least, 0.99 * least, 2 * least]
+    q[4:] = q[2]
+    q[5, 2] = 4 * least
+    samples: Any = SimpleNamespace(motion=motion(q), moving=moving)
+    for ranges, slid in (
+        (None, [[1, 0, 1], [0, 0, 1]]),
+        ([[1.0, 0.5, 4.0]], [[1, 1, 0], [0, 0, 0]]),
+    ):
+        model: Any = SimpleNamespace(history={"range": ranges} if ranges else {})
+        found = evidence._sliding(samples, model)
+        first, second = np.array(slid, dtype=bool)
+        np.testing.assert_array_equal(found, [first] * 3 + [[False] * 3] + [second] * 2)

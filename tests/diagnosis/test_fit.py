@@ -1,0 +1,89 @@
+"""Rows are made once for the same nonlinear parameters, which are refined a few times; errors are clustered both ways."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armloop.diagnosis import fit
+from armloop.laws.effects import effect
+from armloop.regression.clustered import clustered_covariance
+
+
+class Rows:
+    """An evidence of one joint and four samples whose column is the nonlinear parameter itself."""
+
+    def __init__(self) -> None:
+        self.context, self.asked = None, list[float]()
+
+    def columns(self, effect: Any, value: float) -> Any:
+        del effect
+        self.asked.append(value)
+        return np.full((4, 1, 1), value)
+
+    def stack(self, residual: Any, columns: Any) -> Any:
+        return SimpleNamespace(X=columns[0][:, 0], y=residual, fold=np.array([0, 0, 1, 1]))
+
+
+def shaped(refined: Any, tried: tuple[float, ...] = (0.0,)) -> Any:
+    own: Any = effect("viscous_friction", 1)
+    own.refined, own.shapes = refined, lambda context: tried
+    return own
+
+
+def test_rows_are_made_anew_for_other_nonlinear_parameters_alone() -> None:
+    evidence: Any = Rows()
+    problem = fit._Problem(evidence, np.ones(4), [shaped(lambda x, value: value)])
+    for value in (2.0, 2.0, 3.0, 3.0, 2.0):
+        rows, sizes = problem.rows([value])
+        assert (rows.X == value).all() and sizes == [1]
+    assert evidence.asked == [2.0, 3.0, 2.0]
+
+
+@pytest.mark.parametrize("without", [None, 1])
+def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: int | None) -> None:
+    evidence: Any = Rows()
+    y = np.array([6.0, 6.0, 12.0, 12.0]) if without is not None else np.full(4, 6.0)
+    doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)])
+    rows, beta, _, J, values = fit._solved(doubling, [1.0], without)
+    last = 2.0**fit._REFINEMENTS
+    # what is returned belongs to the rows that are returned
+    assert values == [last] and (rows.X == last).all() and J.shape == (1, 1)
+    assert_allclose(beta, 6.0 / last)
+    assert evidence.asked == [1.0, 2.0, 4.0, 8.0]
+    evidence = Rows()
+    staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)])
+    assert fit._solved(staying, [1.0], without)[-1] == [3.0]
+    assert evidence.asked == [1.0, 3.0]
+
+
+def test_a_nonlinear_parameter_is_not_refined_beyond_what_is_tried() -> None:
+    evidence: Any = SimpleNamespace(context=None)
+    for tried, inside in (((0.0,), 5.0), ((1.0, 2.0), 2.0), ((6.0, 7.0, 9.0), 6.0)):
+        assert fit._bounded(shaped(None, tried), evidence, 5.0) == inside
+
+
+def test_what_blocks_and_cells_have_in_common_counts_once() -> None:
+    rng = np.random.default_rng(4)
+    R = 120
+    block, cell = rng.integers(0, 9, R), rng.integers(0, 3, R)
+    X, left = rng.normal(size=(R, 2)), rng.normal(size=R)
+    X[:, 1] *= 30.0
+    # the same in every block of a cell: what cells add is positive
+    left += np.array([3.0, -3.0, 0.5])[cell] * X[:, 0] + np.array([-0.1, 0.05, 0.1])[cell] * X[:, 1]
+    errors = 0.1 * rng.normal(size=(R, 3))
+    rows: Any = SimpleNamespace(block=block, cell=cell, model_errors=errors)
+    pairs = sorted(set(zip(block.tolist(), cell.tolist(), strict=True)))
+    common = np.array([pairs.index(pair) for pair in zip(block.tolist(), cell.tolist(), strict=True)])
+    cells = clustered_covariance(X, left, cell) - clustered_covariance(X, left, common)
+    unit = 1 / np.sqrt((X**2).sum(axis=0))
+    values, vectors = np.linalg.eigh(cells / np.outer(unit, unit))
+    assert (values > 0).any()
+    added = sum(max(x, 0.0) * np.outer(v, v) for x, v in zip(values, vectors.T, strict=True))
+    own = np.linalg.solve(X.T @ X, X.T @ errors)
+    expected = clustered_covariance(X, left, block) + added * np.outer(unit, unit) + own @ own.T
+    assert_allclose(fit.covariance(X, left, rows), expected, rtol=1e-6)
