@@ -1,0 +1,341 @@
+"""Small cases of the judgement, the search, trials and what they are told of a run, each worked out by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from effect_arm import an_arm
+from numpy.testing import assert_allclose
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import (
+    contrast,
+    evidence,
+    innovations,
+    judgement,
+    planning,
+    reversals,
+    search,
+    trials,
+    unlisted,
+)
+from armloop.diagnosis.evidence import Evidence
+from armloop.laws.effects import Context, Estimate
+from armloop.robot.arm import load_arm
+
+
+def motion(N: int, joints: int = 2, v: float = 1.0, time: Any = None) -> Motion:
+    still = np.zeros((N, joints))
+    return Motion(
+        0.1 * np.arange(N) if time is None else np.asarray(time), still, still + v, still, np.array([0])
+    )
+
+
+class TestJudgement:
+    @pytest.mark.parametrize(
+        ("gain", "lead", "times", "worth"),
+        [
+            (0.5, 3.1, 1.1, True),
+            (0.0, 3.1, 1.1, False),
+            (0.5, judgement.SIGNIFICANCE, 1.1, False),
+            (0.5, 3.1, 1.0, False),
+        ],
+    )
+    def test_worth_it_is_more_than_each_bound(
+        self, monkeypatch: pytest.MonkeyPatch, gain: float, lead: float, times: float, worth: bool
+    ) -> None:
+        for name, value in (("gain", gain), ("lead", lead), ("times_enough", times)):
+            monkeypatch.setattr(judgement, name, lambda *given, value=value: value)
+        nothing: Any = None
+        assert judgement.is_worth(nothing, nothing, nothing) is worth
+        assert judgement.is_worth(nothing, nothing, nothing, 2) is False
+
+    def test_what_the_best_removes_soaks_up_a_part(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(judgement, "lead", lambda *scores: np.inf)
+        monkeypatch.setattr(judgement, "gain", lambda current, trial: 1.0)
+        current, best = (SimpleNamespace(energy=np.array([x])) for x in (100.0, 10.0))
+        for removed, behind in ((100.0, True), (89.0, False)):
+            energy = best.energy + judgement.NEARLY * removed
+            trial: Any = SimpleNamespace(energy=energy, rows=np.zeros(1))
+            assert judgement.is_behind(current, trial, best) is behind  # type: ignore[arg-type]
+
+    def test_one_joint_that_is_surely_worse_is_enough(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        leads: dict[Any, float] = {}
+        monkeypatch.setattr(judgement, "lead", lambda trial, best: leads[trial.of])
+        monkeypatch.setattr(judgement, "gain", lambda current, trial: 1.0)
+
+        def score(*energy: float, of: Any = "all") -> Any:
+            return SimpleNamespace(
+                energy=np.array(energy), rows=np.zeros(2), of=of, of_joint=lambda j: score(*energy, of=j)
+            )
+
+        sure = judgement.SIGNIFICANCE
+        for whole, first, second, behind in (
+            (judgement.CHANCE, sure, sure, False),
+            (judgement.CHANCE + 0.1, sure, sure, True),
+            (judgement.CHANCE, sure + 0.1, 0.0, True),
+            (judgement.CHANCE, 0.0, sure + 0.1, True),
+        ):
+            leads.update({"all": whole, 0: first, 1: second})
+            assert judgement.is_behind(score(9.0, 9.0), score(9.0, 9.0), score(1.0, 1.0)) is behind
+
+    def test_one_row_counts_for_one_in_a_likelihood(self) -> None:
+        seen = np.array([1.0])
+        worse, better = (
+            SimpleNamespace(rows=np.array([1]), seen=seen, energy=np.array([x])) for x in (7.0, 1.0)
+        )
+        # twice a half of log(8 / 2)
+        assert judgement._likelier(worse, better) == pytest.approx(np.sqrt(np.log(4.0)))  # type: ignore[arg-type]
+
+
+class TestSearch:
+    def test_what_can_be_explained_is_more_than_the_baselines(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        score = SimpleNamespace(energy=np.array([9.0, 2.0]), rows=np.array([4.0, 5.0]))
+        nothing = SimpleNamespace(fit=SimpleNamespace(score=score))
+        monkeypatch.setattr(search.Known, "of", staticmethod(lambda *given: nothing))
+        given: Any = None
+        made = search._Search(given, given, given)
+        assert made.explainable[0] == 5.0 and 0 < made.explainable[1] < 1e-6
+
+    @pytest.mark.parametrize("worth", [2, 9])
+    def test_effects_are_added_while_one_is_worth_it_up_to_the_most(
+        self, monkeypatch: pytest.MonkeyPatch, worth: int
+    ) -> None:
+        made: Any = search._Search.__new__(search._Search)
+        made.evidence, made.progress = None, lambda text: None
+        made.nothing = SimpleNamespace(fit="nothing", residual=None)
+
+        def best(found: list[Any]) -> Any:
+            k = len(found)
+            effect = SimpleNamespace(place=(str(k), 1, None), label=lambda: "")
+            return SimpleNamespace(effect=effect, share=0.5) if k < worth else None
+
+        made._best, made._exchanged, made._one_for_several = best, lambda found: found, lambda found: found
+        monkeypatch.setattr(search, "_known", lambda evidence, found: SimpleNamespace(fit=len(found)))
+        monkeypatch.setattr(search, "clear", lambda evidence, outcome: outcome)
+        outcome = made.outcome()
+        assert len(outcome.found) == outcome.after == min(worth, search._MOST_EFFECTS)
+        # what is added and taken back again is the end of it
+        made._exchanged = lambda found: found[:1]
+        assert len(made.outcome().found) == 1
+
+    def test_a_body_acts_mainly_where_its_torque_is_largest_either_way(self) -> None:
+        columns = np.zeros((3, 2, 1))
+        columns[:, 0], columns[:, 1] = 1.0, -3.0
+        given: Any = SimpleNamespace(columns=lambda effect, shape: columns, scale=np.ones(2))
+        effect: Any = SimpleNamespace(joint=None)
+        shape: Any = SimpleNamespace(final=0.0)
+        assert [search._acts_mainly_on(given, effect, shape, j) for j in (0, 1)] == [False, True]
+
+
+class TestTrials:
+    @staticmethod
+    def known(values: list[float], errors: list[float]) -> Any:
+        parameters = (
+            {"a": Estimate(values[0], errors[0], "1")},
+            {"b": Estimate(values[1:], errors[1:], "1")},
+        )
+        return SimpleNamespace(fit=SimpleNamespace(parameters=parameters))
+
+    @pytest.mark.parametrize(
+        ("values", "errors", "agrees"),
+        [
+            ([trials._SAME, 0.0, 0.0], [1.0, 1.0, 1.0], True),
+            ([1.01 * trials._SAME, 0.0, 0.0], [1.0, 1.0, 1.0], False),
+            ([0.0, 0.0, -1.01 * trials._SAME], [1.0, 1.0, 1.0], False),
+            ([3.9 * trials._SAME, 0.2 * trials._SAME, 0.0], [4.0, 0.25, 1.0], True),
+            ([0.0, 0.26 * trials._SAME, 0.0], [4.0, 0.25, 1.0], False),
+            ([9.0, 9.0, 0.0], [np.inf, np.nan, 1.0], True),
+        ],
+    )
+    def test_parameters_agree_within_a_part_of_each_error(
+        self, values: list[float], errors: list[float], agrees: bool
+    ) -> None:
+        agree = trials.Known.agrees_with
+        assert agree(self.known(values, [1e9] * 3), self.known([0.0] * 3, errors)) is agrees
+
+    def test_an_effect_that_is_taken_back_is_none_of_what_is_known(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(trials.Known, "of", staticmethod(lambda *given: given))
+        effects = [SimpleNamespace(place=place) for place in "abc"]
+        known: Any = SimpleNamespace(fit=SimpleNamespace(effects=effects, shapes=[1, 2, 3]))
+        whole: Any = "whole"
+        place: Any = "b"
+        assert trials.Known.without(known, place, whole) == ("whole", [effects[0], effects[2]], [1, 3])
+
+    def test_what_is_known_is_fitted_once_a_task(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        asked = []
+
+        def known(rows: Any, effects: Any, shapes: Any) -> Any:
+            asked.append((rows.tolist(), [e.place for e in effects], shapes))
+            trial = SimpleNamespace(shapes=["old", "new"], score="score")
+            return SimpleNamespace(fit=SimpleNamespace(effects=effects), trial=lambda effect: trial)
+
+        monkeypatch.setattr(trials.Known, "of", staticmethod(known))
+        rows = np.array([[True, False], [True, True]])
+        bench: Any = SimpleNamespace(
+            task=None,
+            listed=[SimpleNamespace(place=place) for place in "abc"],
+            whole=SimpleNamespace(rows=rows, only=lambda rows: rows),
+        )
+        packed = np.packbits(rows).tobytes()
+        first: Any = (packed, ((1, "shape"),))
+        other: Any = (packed, ())
+        assert trials._tried(bench, first, 0) == ("new", "score")
+        assert trials._tried(bench, first, 1) is None and len(asked) == 1  # it is there already
+        assert trials._tried(bench, other, 1) == ("new", "score")
+        assert asked == [(rows.tolist(), ["b"], ["shape"]), (rows.tolist(), [], [])]
+
+
+class TestUnlisted:
+    @staticmethod
+    def lasting(residual: Any, cutoff: float, time: Any = None) -> float:
+        given = motion(len(residual), time=time)
+        samples = SimpleNamespace(cutoff_hz=cutoff, motion=given, period=0.1)
+        own: Any = SimpleNamespace(samples=samples, rows=np.ones((len(residual), 2), dtype=bool))
+        return unlisted._lasting(own, np.asarray(residual), 1)
+
+    def test_what_lasts_is_still_there_a_period_of_the_corner_later(self) -> None:
+        rng = np.random.default_rng(2)
+        r = 1.0 + 0.5 * rng.normal(size=200)
+        for cutoff, lag in ((0.5, 20), (2.0, 5)):
+            now, then = r[:-lag], r[lag:]
+            assert self.lasting(r, cutoff) == pytest.approx((now * then).mean() / (now**2).mean())
+        assert self.lasting(np.exp(0.1 * np.arange(200.0)), 0.5) == 1.0  # no more than all of it
+        assert self.lasting((-1.0) ** np.arange(200), 2.0) == 0.0
+        assert self.lasting(r, 0.0) == 1.0
+
+    def test_samples_a_gap_apart_tell_nothing_of_it(self) -> None:
+        """Of 120 samples a gap of 1.4 s follows, of a corner's period 2 s: what is found there is 0.4 of it off."""
+        N, rng = 120, np.random.default_rng(3)
+        first = rng.normal(size=N) + 3.0
+        time = np.concatenate([0.1 * np.arange(N), 0.1 * (N - 1) + 2.8 + 0.1 * np.arange(3)])
+        r = np.concatenate([first, [900.0] * 3])
+        # within the first part at a lag of 20; of its last samples those whose later one is near enough: none
+        now, then = first[:-20], first[20:]
+        assert self.lasting(r, 0.5, time) == pytest.approx((now * then).mean() / (now**2).mean())
+
+    def test_dry_friction_drag_and_an_offset_are_listed(self) -> None:
+        names = ["1", "v2", "sign(v2)", "v2^2*sign(v2)"]
+        left = np.zeros(1)
+        assert unlisted._Law([(1.0, name) for name in names], left).is_listed(1)
+        assert unlisted._Law([(1.0, "v2")], left).is_listed(1)
+        assert not unlisted._Law([(1.0, "v2")], left).is_listed(0)
+        assert not unlisted._Law([(1.0, "v2"), (1.0, "q2")], left).is_listed(1)
+
+    def test_a_law_is_stated_in_units_of_its_joint(self) -> None:
+        arm = load_arm("scara")  # joint 3 slides
+        own: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=motion(4, arm.n)),
+            rows=np.ones((4, arm.n), dtype=bool),
+            scale=np.full(arm.n, 2.0),
+            model=SimpleNamespace(arm=arm),
+        )
+        law: Any = SimpleNamespace(terms=[(1.5, "v3")], errors=[0.25])
+        for j, unit in ((2, "N*s/m"), (1, "N*m*s/m")):
+            assert unlisted._parameters(own, law, j)["v3"] == Estimate(3.0, 0.5, unit)
+
+
+class TestContrast:
+    def test_a_stretch_has_three_samples_and_the_filters_reach_on_both_sides(self) -> None:
+        samples: Any = SimpleNamespace(period=0.125, reach=0.25)
+        assert contrast._widths(samples, 0.125) == (3, 4)
+        assert contrast._widths(samples, 2.0) == (16, 4)
+
+    def test_as_many_are_events_as_stand_out_most(self) -> None:
+        least, clear = contrast._LEAST, contrast._CLEAR
+        low = least
+        middle, high = 2.0 * clear * low, 1.5 * clear * 2.0 * clear * low
+        assert contrast._clear([high, middle, low], [True, True, False]) == (pytest.approx(2.0 * clear), 2)
+
+
+class TestReversals:
+    def test_one_sample_of_a_joint_tells_its_error(self) -> None:
+        nothing: Any = None
+        view = reversals._View(
+            np.array([True, True, True, False]), np.array([0, 0, 1, 2]), nothing, nothing, nothing
+        )
+        fit: Any = SimpleNamespace(stacked=SimpleNamespace(joints=3), held_out=np.array([1.0, 3.0, 4.0, 9.0]))
+        assert_allclose(view.mean_squares(fit), [5.0, 16.0, np.nan])
+
+    def test_what_is_noticeable_is_a_part_of_the_torque_of_what_counts(self) -> None:
+        rows = np.array([[True, False], [True, True]])
+        own: Any = SimpleNamespace(
+            samples=SimpleNamespace(tau=np.array([[3.0, 9.0], [5.0, 8.0]])),
+            rows=rows,
+            scale=np.array([1.0, 2.0]),
+            model=SimpleNamespace(baseline={"reversals": [0.5, None]}),
+        )
+        fit: Any = SimpleNamespace(stacked=SimpleNamespace(joint=None, block=None))
+        view = reversals._View.of(own, fit, rows)
+        assert_allclose(view.noticeable, reversals.NOTICEABLE**2 * np.array([17.0, 16.0]))
+        assert_allclose(view.usual, [0.25, 0.0])
+
+
+def test_a_range_that_lies_beyond_a_stop_is_next_to_none_at_the_stop() -> None:
+    joint = SimpleNamespace(lower=-1.0, upper=2.0, velocity=3.0)
+    arm = SimpleNamespace(joints=[joint] * 3)
+    history = {"range": [[0.5] * 3, [1.0] * 3, [1.0] * 3, [9.0, -9.0, 0.0]]}
+    model: Any = SimpleNamespace(arm=arm, history=history)
+    found = planning.training_ranges(model)
+    assert (found.lower >= -1.0).all() and (found.upper <= 2.0).all() and (found.lower < found.upper).all()
+    assert_allclose(found.lower, [2.0, -1.0, -0.5], atol=1e-5)
+    assert_allclose(found.upper, [2.0, -1.0, 0.5], atol=1e-5)
+
+
+class TestWhatIsKnownOfARun:
+    @pytest.mark.parametrize(
+        ("cutoff", "reach", "smeared"), [(0.5, 0.0, 1), (9.0, 0.1, 1), (9.0, 0.2, 2), (0.0, 0.2, 0)]
+    )
+    def test_a_joint_stands_still_beyond_what_the_filter_smears(
+        self, cutoff: float, reach: float, smeared: int
+    ) -> None:
+        moving = np.ones((30, 3), dtype=bool)
+        moving[10:20, 1] = False
+        moving[25:, 0] = False
+        samples: Any = SimpleNamespace(
+            moving=moving, reach=reach, period=0.1, cutoff_hz=cutoff, motion=motion(30, 3)
+        )
+        found = innovations.at_rest(samples)
+        assert np.flatnonzero(found[:, 1]).tolist() == list(range(10 + smeared, 20 - smeared))
+        # to the end of the run it rests
+        assert np.flatnonzero(found[:, 0]).tolist() == list(range(25 + smeared, 30)) and not found[:, 2].any()
+
+    def test_the_torque_of_what_is_known_is_left_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(evidence, "smooth", lambda samples, x: 2 * x)
+        model: Any = SimpleNamespace(context=lambda motion, effects: len(effects))
+        model.predict = lambda motion: np.array([[10.0, 20.0]])
+        model.with_effects = lambda known: model
+        samples = SimpleNamespace(motion=motion(1), tau=np.array([[100.0, 200.0]]))
+        own: Any = SimpleNamespace(model=model, samples=samples)
+        known: Any = [SimpleNamespace(effect=k, torque=lambda context, k=k: k * context) for k in (1.0, 2.0)]
+        # less twice of what is predicted but for 2 and 4 of the two
+        np.testing.assert_array_equal(Evidence.residual(own, known), [[100.0 - 8.0, 200.0 - 28.0]])
+        np.testing.assert_array_equal(Evidence.residual(own, []), [[80.0, 160.0]])
+
+    def test_samples_are_no_finer_than_the_filter_has_left_them(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        given = motion(40, 3)
+        monkeypatch.setattr(evidence, "_sliding", lambda samples, model: np.ones((40, 3), dtype=bool))
+        monkeypatch.setattr(evidence, "independent_rows", lambda samples: np.ones(40, dtype=bool))
+        model: Any = SimpleNamespace(baseline={}, history={})
+        model.context = lambda motion, effects: Context(an_arm(), motion, period=0.25)
+        tau = np.zeros((40, 3))
+        tau[:, 1:] = [3.0, 4.0]
+        for cutoff, period in (
+            (0.5, 1 / (0.5 * evidence.INDEPENDENT)),
+            (0.1, 1 / (0.1 * evidence.INDEPENDENT)),
+            (1e3, 0.25),
+            (0.0, 0.25),
+        ):
+            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff)
+            made = Evidence.of(model, samples, [])
+            assert made.context.period == pytest.approx(max(period, 0.25))
+            # of a model without a baseline a hundredth of the torque; of no torque at all not nothing
+            assert made.scale[0] > 0
+            assert_allclose(made.scale[1:], [0.03, 0.04], rtol=1e-6)
