@@ -1,5 +1,7 @@
 """The stepwise method finds the paper's orders, hands on what it found, and never sees what is held out."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, conditioned_samples, three_axis
@@ -10,7 +12,13 @@ from armloop.data.regimes import Clusters, Condition
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.step import PARTS
-from armloop.identification.reconstruction.stepwise import _impure, _together, steps, stepwise
+from armloop.identification.reconstruction.stepwise import (
+    DoubleFeatureSetLibrary,
+    _impure,
+    _together,
+    steps,
+    stepwise,
+)
 from armloop.identification.reconstruction.trials import HeldOut
 from armloop.model import ReconstructedModel
 from armloop.regression.sparse import Sparse
@@ -55,7 +63,6 @@ def found(noisy: Samples) -> Found:
     return found_on(noisy, max_order=2)
 
 
-@pytest.mark.slow
 def test_each_step_looks_at_its_condition_for_powers_of_its_own():
     """No powers of velocities in gravity, one or two beside constant velocities, one beside accelerations."""
     options = Options(max_order=2)
@@ -76,6 +83,16 @@ def test_each_step_looks_at_its_condition_for_powers_of_its_own():
     ]
 
 
+def test_libraries_may_be_as_large_as_allowed_and_arms_have_four_joints():
+    """A joint's velocities beside one angle: 6 candidates of the orders 1 and 1, 9 of 1 and 2, 10 of 2 and 1, 15."""
+    for most, orders in ((8, ((1, 1),)), (9, ((1, 1), (1, 2))), (10, ((1, 1), (1, 2), (2, 1)))):
+        assert steps((True,), Options(max_order=2, max_candidates=most))[1].orders == orders
+    library = DoubleFeatureSetLibrary()
+    assert [library.suits(SimpleNamespace(n=n)) for n in (1, 4, 5)] == [True, True, False]
+    assert not library.shared
+
+
+@pytest.mark.slow
 def test_the_papers_orders_come_out_of_exact_data():
     samples = conditioned_samples((400, 2500, 2500))
     found = found_on(samples, max_order=4)

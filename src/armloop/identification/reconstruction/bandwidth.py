@@ -29,8 +29,8 @@ from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.errors import LogError
 
-#: Corners tried, as parts of the highest.
-_PARTS = (1.0, 0.71, 0.5, 0.35, 0.25)
+#: Corners tried beside the highest, as parts of it.
+_PARTS = (0.71, 0.5, 0.35, 0.25)
 #: Of the corners whose error is within this factor of the least, the highest is taken: friction needs bandwidth.
 _AS_GOOD = 1.02
 #: A corner is at most so many times the sample rate; the Nyquist rate is half of it.
@@ -92,8 +92,7 @@ def choose_bandwidth(
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
     highest = highest_corner(logs, how)
-    corners = [round(part * highest, 3) for part in _PARTS]
-    corners[0] = highest
+    corners = [highest, *(round(part * highest, 3) for part in _PARTS)]
     # every corner must see the same logs: those that are long enough for the lowest
     long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
     if not any(long):
