@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from effect_arm import an_arm
+from exact_parts import STATED
 from numpy.testing import assert_allclose
 
 from armloop.data.motion import Motion
 from armloop.laws.effects import (
+    EFFECTS,
     INERTIA,
     REGISTRY,
     Context,
@@ -288,3 +290,50 @@ def test_a_law_found_belongs_to_arms_of_as_many_joints() -> None:
     with pytest.raises(ModelError, match="another number of joints than the arm, 2"):
         two = replace(arm, joints=arm.joints[:2])
         FoundLaw(2).plausible(two, found)
+
+
+#: Numbers that no arm has below zero, and such as are above zero.
+LEAST = {
+    "coulomb_friction": ("level",),
+    "external_contact": ("start",),
+    "external_torque": ("start",),
+    "friction_drift": ("level",),
+    "joint_spring": ("stiffness",),
+    "load_dependent_friction": ("coefficient",),
+    "payload": ("mass", "own_inertia"),
+    "presliding_hysteresis": ("level",),
+    "quadratic_drag": ("coefficient",),
+    "rotor_inertia": ("inertia",),
+    "stribeck_friction": ("static_excess",),
+    "torque_gain": ("gain",),
+    "transmission_coupling": ("inertia", "viscous", "coulomb"),
+    "viscous_friction": ("coefficient",),
+}
+ABOVE = {
+    "friction_drift": "time_constant",
+    "presliding_hysteresis": "width",
+    "stribeck_friction": "velocity",
+}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_a_simulated_arm_has_no_negative_inertia_stiffness_or_friction(name: str) -> None:
+    for p in EFFECTS[name].parameters:
+        some, none = ([0.5] * 3, [0.0] * 3) if p.size == 3 else (0.5, 0.0)
+        assert p.fault(some) == ""
+        assert p.fault(none) == ("must be above 0" if ABOVE.get(name) == p.name else "")
+        bounded = p.name in (*LEAST.get(name, ()), ABOVE.get(name))
+        assert bool(p.fault(np.negative(some))) == bounded
+
+
+def test_what_is_not_said_of_a_load_or_of_friction_with_memory_is_nothing() -> None:
+    rng = np.random.default_rng(1)
+    motion = Motion(0.1 * np.arange(9), *rng.uniform(-1, 1, (3, 9, 3)), np.array([0]))
+    for name, joint, said, left_out in (
+        ("payload", None, {"mass": 2.0, "com": [0.1, 0.2, 0.3]}, "own_inertia"),
+        ("presliding_hysteresis", 2, {"level": 2.0, "width": 0.1}, "level_change"),
+    ):
+        torque = effect(name, joint).torque
+        given: Any = Context(an_arm(), motion)
+        assert_allclose(torque(given, said), torque(given, {**said, left_out: 0.0}))
+        assert EFFECTS[name].parameters[-1].default == 0.0

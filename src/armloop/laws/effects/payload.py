@@ -38,7 +38,7 @@ class Payload(Effect):
     name = "payload"
     scope = "arm"
     parameters = (
-        Parameter("mass", "kg", least=0.0, positive=True),
+        Parameter("mass", "kg", least=0.0),
         Parameter("com", "m", size=3),
         Parameter("own_inertia", "kg*m^2", least=0.0, default=0.0),
     )

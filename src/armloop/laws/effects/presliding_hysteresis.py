@@ -26,7 +26,6 @@ class PreslidingHysteresis(Law):
     )
     law = "f z/w with dz = dq, |z| <= w"
     elements = ("hysteresis", "sign")
-    memory = True
 
     def shapes(self, context: Context) -> Sequence[float]:
         assert self.joint is not None
