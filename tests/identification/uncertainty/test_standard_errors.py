@@ -207,3 +207,47 @@ def test_of_no_blocks_the_sum_is_zero() -> None:
     assert standard._summed(np.zeros((0, 2, 2)), 2).tolist() == [[0, 0], [0, 0]]
     assert standard._summed(np.zeros((0, 3)), 3).tolist() == [0, 0, 0]
     assert standard._summed(np.ones((2, 3)), 3).tolist() == [2, 2, 2]
+
+
+def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of two joints: what the fitted samples do not determine has no error, or no degrees of freedom."""
+    first = SimpleNamespace(
+        unknowns=[
+            unknown("a", 0, kind="joints"),
+            unknown("b", 1, kind="joints"),
+            unknown("c", 1),
+            unknown("d", None, kind="shared"),
+        ],
+        std_error=np.array([1.0, np.inf, 2.0, 3.0]),
+        freedom=np.array([10.0, 20.0, 30.0, 40.0]),
+        covariance="covariance",
+        gram="gram",
+        undetermined=lambda: ["one"],
+    )
+    second = SimpleNamespace(**vars(first))
+    second.unknowns = [unknown("e", 0), unknown("f", 0)]
+    second.std_error, second.freedom = np.array([4.0, 5.0]), np.array([np.nan, 50.0])
+    rows = [np.array([[True, False], [False, False]]), np.array([[False, False], [False, True]])]
+    monkeypatch.setattr(standard, "covariances", lambda *_: ([first, second], 7.0, 0.5))
+    monkeypatch.setattr(standard, "_stribeck", lambda model, parts, joint: f"law {joint}")
+    monkeypatch.setattr(
+        standard, "_line", lambda model, parts, joint, samples, used: f"line {joint} {used.tolist()}"
+    )
+    monkeypatch.setattr(standard, "leading", lambda covariance, gram: (covariance, gram))
+    monkeypatch.setattr(standard, "to_dict", lambda unknowns, directions: (len(unknowns), *directions))
+    model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
+    nothing: Any = None
+    kept = standard_errors(model, nothing, [SimpleNamespace(rows=one) for one in rows])  # type: ignore[misc]
+
+    def errors(table: dict[str, Any]) -> dict[str, float]:
+        return {name: entry["std_error"] for name, entry in table.items()}
+
+    assert [errors(own) for own in kept["joints"]] == [{"a": 1.0}, {}]
+    assert [errors(own) for own in kept["friction"]] == [{"f": 5.0}, {"c": 2.0}]
+    assert errors(kept["shared"]) == {"d": 3.0} and kept["shared"]["d"]["degrees_of_freedom"] == 40.0
+    assert kept["undetermined"] == ["one", "one"] and kept["stribeck"] == ["law 0", "law 1"]
+    assert kept["friction_line"] == ["line 0 [True, False]", "line 1 [False, True]"]
+    assert kept["torque"] == [(4, "covariance", "gram"), (2, "covariance", "gram")]
+    assert (kept["block_seconds"], kept["correlation_seconds"]) == (7.0, 0.5)
