@@ -372,3 +372,11 @@ class TestPassages:
         assert not contacts._comes_back(evidence, np.arange(N), level, burst)
         q[12, 0] = 0.0
         assert contacts._comes_back(evidence, np.arange(N), level, burst)
+
+
+def test_a_tenth_of_a_second_before_and_after_an_event_is_enough() -> None:
+    given = at([-0.2, -0.1, 0.0, 0.1, 0.2])
+    rows = np.array([False, True, True, True, False])
+    for start, end, whole in ((-0.1, 0.1, True), (-0.11, 0.1, False), (-0.1, 0.11, False)):
+        contact: Any = SimpleNamespace(added=event(start, end), rows=rows)
+        assert contacts._seen_whole(given, contact) is whole
