@@ -18,6 +18,7 @@ from armloop.identification.reconstruction import Options, Reconstruction, recon
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.libraries import (
     LIBRARIES,
+    Attempt,
     Contender,
     candidates,
     check_suits,
@@ -29,6 +30,7 @@ from armloop.identification.reconstruction.libraries import (
 from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
 from armloop.identification.reconstruction.stepwise import stepwise
 from armloop.model import ReconstructedModel
+from armloop.model.components import SparseTerms
 from armloop.regression.sparse import Sparse
 from armloop.reports.tables import libraries_table
 from armloop.robot.arm import Arm
@@ -289,3 +291,50 @@ def test_what_a_library_does_not_use_is_said() -> None:
         warnings.simplefilter("error")
         check_suits(named("double-feature-set"), "stepwise", Options(max_order=2))
         check_suits(named("lagrangian"), "stepwise", Options(physical=False))
+
+
+def test_libraries_that_suit_the_arm_and_the_question_are_compared() -> None:
+    def those(n: int, method: str = "stepwise", **options: Any) -> list[str]:
+        arm: Any = SimpleNamespace(n=n)
+        return [one.name for one in candidates(arm, Options(**options), method)]
+
+    own, shared = "double-feature-set", ["rigid-body", "lagrangian"]
+    assert those(3) == [own, *shared] and those(7) == shared
+    # friction laws are of those that have none of their own, orders of the one that has
+    assert those(3, friction=("coulomb",)) == shared and those(3, max_order=2) == [own]
+    assert those(3, "sindy") == [own]
+    # where none would be left they are asked all the same
+    assert those(7, "sindy") == those(3, "sindy", friction=("coulomb",)) == [own]
+
+
+def test_a_library_says_which_others_know_a_method_or_laws() -> None:
+    with pytest.raises(
+        InputError, match="method 'sindy' works on the library double-feature-set, not on 'rigid"
+    ):
+        check_suits(named("rigid-body"), "sindy", Options())
+    with pytest.raises(InputError, match=r"chosen with --library rigid-body or lagrangian$"):
+        check_suits(named("double-feature-set"), "stepwise", Options(friction=("coulomb",)))
+
+
+def test_coefficients_of_effects_friction_and_bodies_add_up() -> None:
+    effects = [SimpleNamespace(parameters={"a": 1, "b": 2}), SimpleNamespace(parameters={"c": 3})]
+    terms = SparseTerms(1, np.array([[1], [2]]), np.array([[1.0, 0.0], [2.0, 3.0]]), ())
+    found: Any = SimpleNamespace(effects=effects, friction=[[1, 2], [], [3, 4, 5]], components=[terms, terms])
+    nothing: Any = None
+    attempt = Attempt(nothing, nothing, nothing, found)
+    assert attempt.coefficients() == 3 + 5 + 6 and attempt.margin == 0.0
+
+
+def test_what_leaves_less_but_is_no_arm_is_named() -> None:
+    def notes(*others: Contender) -> list[str]:
+        chosen = replace(entry("b", 0.02, 9, GOOD), chosen=True)
+        return comparison_notes([chosen, *others])
+
+    first, second = notes(entry("a", 0.01, 9, BAD), entry("c", 0.03, 9, BAD), entry("d", 0.01, 9, GOOD))
+    assert first.startswith(
+        "library b: it leaves 2.00% (nRMSE) on the blocks that choose the library; a 1.00%, c"
+    )
+    assert second.startswith("a leaves less but is no arm: ")
+    nothing: Any = None
+    assert len(notes(replace(entry("a", 0.01, 9, GOOD), checks=None))) == 1
+    assert Contender(nothing).coefficients == 0
