@@ -88,7 +88,13 @@ RULES = [
         (evidence, "far_outside"),
         (contacts, "far_outside"),
     ),
+    _rule(
+        "nothing is judged below the slowest trained speed",
+        lambda model, motion: np.zeros(motion.q.shape, dtype=bool),
+        (evidence, "too_slow"),
+    ),
     _rule("a joint that is shaken rests", lambda s, m: s.moving.copy(), (evidence, "_sliding")),
+    _rule("listed effects before a law", lambda self, *_: self, (account.Account, "_or_listed")),
     _rule("effects are exchanged", lambda self, found: found, (search._Search, "_exchanged")),
     _rule("one effect for several", lambda self, found: found, (search._Search, "_one_for_several")),
     _rule(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from outside.mujoco_arms import random_arm, write_log
 from outside.mujoco_run import Diverged
-from outside.references import fourier_reference, mixed_reference
+from outside.references import fourier_reference, mixed_reference, point_reference
 from outside_cases import draw_case
 
 #: What is hidden in one case after the other, and its size as a share of the joint's RMS torque.
@@ -26,8 +26,13 @@ def generate_outside(
     answers: Path,
     numbers: Sequence[int] = (2, 3, 3, 4),
     seconds: float = 30.0,
+    points: bool = False,
 ) -> None:
-    """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too."""
+    """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too.
+
+    Args:
+        points: the runs, not the training logs, go from point to point and dwell there.
+    """
     rng = np.random.default_rng([seed, 0x0575])
     joints = int(rng.choice(numbers))
     arm = random_arm(seed, joints, sliding=rng.random() < 0.15)
@@ -47,7 +52,10 @@ def generate_outside(
         write_log(arm.simulate(reference, seed=1000 + k, **how), folder / f"baseline_{k + 1}.csv")
     for case in range(cases):
         kind, size = KINDS[case % len(KINDS)], SIZES[int(rng.integers(len(SIZES)))]
-        reference = fourier_reference(arm, 1000 * seed + case, seconds, speed=float(rng.uniform(0.6, 1.0)))
+        speed = float(rng.uniform(0.6, 1.0))
+        reference = (point_reference if points else fourier_reference)(
+            arm, 1000 * seed + case, seconds, speed
+        )
         for attempt in range(_ATTEMPTS):
             try:
                 hidden = draw_case(arm, reference, 1000 * seed + case + 100 * attempt, kind, size)

@@ -8,6 +8,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --arms 20 --cases 16
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
     python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
+    python tests/blind/run.py --outside --points   … in runs that pick and place, models from sines and sweeps
     python tests/blind/run.py --measured ../shared/data   effects added to logs of three arms (--first 4, 7, …: others)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
@@ -37,7 +38,9 @@ from armloop.util.errors import InputError
 VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
-def make(seed: int, cases: int, place: Path, outside: list[int] | None, measured: Path | None) -> str:
+def make(
+    seed: int, cases: int, place: Path, outside: list[int] | None, points: bool, measured: Path | None
+) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
     try:
@@ -48,7 +51,7 @@ def make(seed: int, cases: int, place: Path, outside: list[int] | None, measured
             sys.path.insert(0, str(Path(__file__).parents[1]))
             from outside_generate import generate_outside
 
-            generate_outside(seed, cases, place / "logs", place / "answers", outside)
+            generate_outside(seed, cases, place / "logs", place / "answers", outside, points=points)
             return ""
         generate(seed, range(cases), load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
@@ -87,6 +90,11 @@ def main() -> int:
         help="arms simulated by MuJoCo instead of our own, with one of these numbers of joints (2 3 3 4)",
     )
     parser.add_argument(
+        "--points",
+        action="store_true",
+        help="with --outside: the runs go from point to point and dwell there",
+    )
+    parser.add_argument(
         "--measured",
         default=None,
         metavar="DATA",
@@ -113,7 +121,7 @@ def main() -> int:
             seeds = range(options.first, options.first + arms)
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
-                s: workers.submit(make, s, options.cases, place, outside, options.measured)
+                s: workers.submit(make, s, options.cases, place, outside, options.points, options.measured)
                 for s in seeds
                 if reasons[s] is None
             }

@@ -120,9 +120,12 @@ def test_the_search_is_made_anew_once_if_the_torque_is_late(
     monkeypatch.setattr(
         accounts, "find_law", lambda evidence, outcome, progress: (f"law of {evidence}", outcome)
     )
+    asked: list[Any] = []
+    monkeypatch.setattr(Account, "_or_listed", lambda account, first, *given: asked.append(first) or account)
     whole: Any = SimpleNamespace(unknown="known" if known else None)
     contact: Any = "contact"
     found = Account.of(whole, [contact], lambda text: None)
     final = ("later", 0.3) if searches == 2 else whole
     assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
     assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
+    assert asked == [searches]

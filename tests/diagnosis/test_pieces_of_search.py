@@ -110,19 +110,29 @@ class Named(str):
 
     other_joint = None
 
+    @property
+    def place(self) -> tuple[str, None, None]:
+        return str(self), None, None
+
 
 class TestSearch:
     @staticmethod
-    def search(trials: list[Any], monkeypatch: pytest.MonkeyPatch) -> Any:
+    def search(
+        trials: list[Any],
+        monkeypatch: pytest.MonkeyPatch,
+        explainable: tuple[float, float] = (1000.0, 10.0),
+        own: float = 50.0,
+    ) -> Any:
         monkeypatch.setattr(searching, "is_worth", lambda evidence, now, trial, joints: trial.error < 1008)
         monkeypatch.setattr(
             searching, "simplest_of_equals", lambda current, trials: int(np.argmin([t.error for t in trials]))
         )
         search: Any = object.__new__(searching._Search)
         search.evidence, search.progress = None, lambda text: None
-        search.explainable = np.array([1000.0, 10.0])
+        search.explainable, search.barred = np.array(explainable), [Named("barred").place]
+        monkeypatch.setattr(searching, "enough", lambda evidence, now: np.array([50.0, own]))
         search.panel = SimpleNamespace(tried=lambda known, progress: iter(trials))
-        return search._tried(SimpleNamespace(fit=SimpleNamespace(score=score(1000.0, 10.0))))
+        return search._tried(SimpleNamespace(fit=SimpleNamespace(score=score(1000.0, 10.0, rows=(100, 1)))))
 
     @staticmethod
     def trial(name: str, *energy: float) -> Any:
@@ -140,6 +150,7 @@ class TestSearch:
         assert found.rivals == [("a", pytest.approx(376.1 / 1010))]
         assert self.search([self.trial("a", -1000.0, 0.0)], monkeypatch).share == 1.0
         assert self.search([], monkeypatch) is None
+        assert self.search([self.trial("barred", 600.0, 10.0)], monkeypatch) is None
 
     def test_it_must_remove_a_part_of_what_could_be_explained_of_some_joint(
         self, monkeypatch: pytest.MonkeyPatch
@@ -147,6 +158,14 @@ class TestSearch:
         assert self.search([self.trial("a", 995.0, 10.0)], monkeypatch) is not None
         assert self.search([self.trial("a", 995.1, 9.96)], monkeypatch) is None
         assert self.search([self.trial("a", 995.1, 9.94)], monkeypatch) is not None
+
+    def test_or_nine_tenths_of_what_is_left_that_is_more_than_the_model_s_own(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of joint 2 ten are left, one of them the baseline's; at first a thousand could be explained of each."""
+        for left, own, much in ((1.8, 5.0, True), (2.0, 5.0, False), (1.8, 8.3, False)):
+            found = self.search([self.trial("a", 1000.0, left)], monkeypatch, (1e6, 1e6), own)
+            assert (found is not None) is much
 
     def test_effects_are_chosen_anew_beside_the_others_until_none_changes(self) -> None:
         def found(name: str, joint: int) -> Any:

@@ -234,7 +234,7 @@ class TestReasons:
     def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:
         """Three joints with baselines of 0.5 N·m of which twenty samples slide; all samples 1 N·m, 0.25 predicted."""
         evidence: Any = SimpleNamespace(
-            samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None),
+            samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None, moving=np.ones((50, 3), dtype=bool)),
             model=SimpleNamespace(history={}, baseline={"nrmse": [of.get("poor"), None]}),
             context=SimpleNamespace(load=None),
             rows=np.repeat(np.arange(50) < 20, 3).reshape(50, 3),
@@ -249,6 +249,7 @@ class TestReasons:
         monkeypatch.setattr(reasons, "parts_of", lambda of: [Parts(j) for j in (1, 2, 3)])
         monkeypatch.setattr(reasons, "outside_trained_range", lambda motion, ranges: far.mean(axis=0))
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
+        monkeypatch.setattr(reasons, "too_slow", lambda model, motion: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", j == 1))
         augmented: Any = SimpleNamespace(predict=lambda motion: np.full((50, 3), 0.25))

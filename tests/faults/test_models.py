@@ -119,6 +119,7 @@ ROWS: list[tuple[tuple[str | int, ...], list[Any], str]] = [
         [[[1.0]], [1.0] * 4, "wide", [["a"] * 3] * 4, [[-1.0] * 3] * 4, [[1.0] * 2] * 4],
         "range",
     ),
+    (("history", "slowest"), [[0.1], [0.1] * 4, [-0.1] * 3, ["a"] * 3, 0.1, [1e300] * 3], "slowest"),
     (("history", "inertial"), [[1.0], "x", [1e300] * 30, 3], "inertial"),
     (("history", "notes"), [3, [3]], "notes"),
     (

@@ -1,4 +1,4 @@
-"""References for arms from outside: sums of sines, and mixed logs of holds, sweeps and exciting motion."""
+"""References for arms from outside: sums of sines, points gone to in turn, and mixed logs of holds, sweeps and sines."""
 
 from __future__ import annotations
 
@@ -43,6 +43,47 @@ def fourier_reference(
         parts.append([scale * wave[0], scale * wave[1], scale * bend])
     q, v, vdot = (np.column_stack([part[k] for part in parts]) for k in range(3))
     return OutsideReference(step, q, v, vdot)
+
+
+def point_reference(
+    arm: Any, seed: int, seconds: float, speed: float = 1.0, step: float = 1e-3
+) -> OutsideReference:
+    """Four to seven points gone to in turn, over and over, from rest to rest, as arms do that pick and place.
+
+    All joints start and stop together, with a smooth (quintic) or a trapezoidal velocity, and dwell at each point.
+    """
+    rng = np.random.default_rng([seed, 0x9C])
+    n, reach = arm.joints, np.array([0.85 * link.reach for link in arm.links])
+    fast = speed * np.array([link.speed for link in arm.links])
+    points = [rng.uniform(-1, 1, n) * reach for _ in range(int(rng.integers(4, 8)))]
+    smooth, dwell, ramp = bool(rng.random() < 0.5), float(rng.uniform(0.1, 0.8)), 0.25
+    pieces: list[tuple[Array, Array, Array]] = []
+    k = length = 0
+    while length <= seconds / step:
+        start, way = points[k % len(points)], points[(k + 1) % len(points)] - points[k % len(points)]
+        time = max(0.3, float(((1.9 if smooth else 1 / (1 - ramp)) * np.abs(way) / fast).max()))
+        s = np.linspace(0.0, 1.0, round(time / step))
+        if smooth:
+            parts = (
+                s**3 * (10 - 15 * s + 6 * s**2),
+                30 * s**2 * (1 - s) ** 2,
+                60 * s - 180 * s**2 + 120 * s**3,
+            )
+        else:
+            most = 1 / (1 - ramp)
+            rate = most * np.clip(np.minimum(s, 1 - s) / ramp, 0.0, 1.0)
+            bend = np.where(s < ramp, most / ramp, np.where(s > 1 - ramp, -most / ramp, 0.0))
+            risen = np.minimum(s, 1 - s)
+            half = most * np.where(risen < ramp, risen**2 / (2 * ramp), risen - ramp / 2)
+            parts = np.where(s < 0.5, half, 1 - half), rate, bend
+        moved, rate, bend = (part[:, None] * way / time**order for order, part in enumerate(parts))
+        rest = np.zeros((round(dwell / step), n))
+        pieces += [(start + moved, rate, bend), (rest + start + way, rest, rest)]
+        length += len(s) + len(rest)
+        k += 1
+    q, v, vdot = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+    end = round(seconds / step) + 1
+    return OutsideReference(step, q[:end], v[:end], vdot[:end])
 
 
 def mixed_reference(arm: Any, seed: int, seconds: float = 60.0, step: float = 1e-3) -> OutsideReference:

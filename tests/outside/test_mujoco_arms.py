@@ -16,7 +16,7 @@ from armloop.robot.newton_euler import inverse_dynamics
 pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")
 
 from outside.mujoco_arms import random_arm, write_log
-from outside.references import fourier_reference, mixed_reference
+from outside.references import fourier_reference, mixed_reference, point_reference
 
 HERE = Path(__file__).parent
 
@@ -79,6 +79,21 @@ def test_a_push_asks_for_the_torque_of_its_jacobian(tmp_path: Path) -> None:
     assert np.abs(left[before]).max() < 1e-4
     assert during.sum() > 50
     np.testing.assert_allclose(left[during], needed[during], atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_points_are_gone_to_in_turn_from_rest_to_rest(seed: int) -> None:
+    """Both kinds of velocity among the seeds; the derivatives are those of the angles, which repeat."""
+    made = random_arm(3, 3)
+    r = point_reference(made, seed, 20.0, speed=0.8)
+    assert len(r.q) == len(r.v) == len(r.vdot) == 20_001 and abs(r.seconds - 20.0) < 1e-9
+    within = [np.abs(r.v[:, j]).max() <= 0.81 * link.speed for j, link in enumerate(made.links)]
+    assert all(within)
+    # a sample is half a millisecond off in the middle between two
+    np.testing.assert_allclose(np.diff(r.q, axis=0), 0.5e-3 * (r.v[1:] + r.v[:-1]), atol=2e-5)
+    rests = (r.v == 0).all(axis=1)
+    places = np.unique(np.round(r.q[rests], 6), axis=0)
+    assert 4 <= len(places) <= 7 and 0.05 < rests.mean() < 0.7
 
 
 def test_a_log_is_read(tmp_path: Path) -> None:

@@ -39,6 +39,15 @@ def folds(samples: Samples, count: int, seconds: float) -> NDArray[np.intp]:
     return block_numbers(samples.motion, seconds, samples.spans) % count
 
 
+def halves(blocks: NDArray[np.intp]) -> NDArray[np.intp]:
+    """(N,) fold, 0 or 1, of samples in numbered blocks: permuted block randomisation, of every two blocks one each.
+
+    Dealt out in turn, each of two folds would see but half of a motion that repeats itself.
+    """
+    coins = np.random.default_rng(0).random(int(blocks.max(initial=0)) // 2 + 1) < 0.5
+    return np.asarray((blocks + coins[blocks // 2]) % 2, dtype=np.intp)
+
+
 def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray[np.float64]:
     """(B,) sums of values (N,) over the blocks that occur, in order."""
     _, index = np.unique(blocks, return_inverse=True)

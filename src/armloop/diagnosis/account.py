@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import MOST
-from armloop.diagnosis.search import Outcome, search
+from armloop.diagnosis.judgement import CHANCE, MOST, SIGNIFICANCE, lead_of
+from armloop.diagnosis.reasons import MULTIPLE
+from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
-from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.diagnosis.unlisted import FAR_LESS, Unlisted, find_law
 from armloop.laws.effects.found import RANGE
 from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
@@ -53,8 +55,43 @@ class Account:
             whole = _resting_late(whole, late)
             evidence = without(whole, contacts)
             outcome = search(evidence, progress, panel)
-        unlisted, outcome = find_law(evidence, outcome, progress)
-        return Account(whole, contacts, evidence, outcome, unlisted)
+        unlisted, kept = find_law(evidence, outcome, progress)
+        account = Account(whole, contacts, evidence, kept, unlisted)
+        return account._or_listed(outcome, progress, panel)
+
+    def _or_listed(self, first: Outcome, progress: Progress, panel: Hypotheses | None) -> Account:
+        """This, or the account by listed effects alone that a search finds without the one that it began with.
+
+        One effect may lie between two that are there, and a forward search that took it cannot reach them. It is asked
+        where a law took the place of some of what was found, or was put beside it: then others must leave no more; and
+        where what was found leaves a multiple of the baseline: then they must leave far less of that.
+
+        Args:
+            first: what the search found.
+        """
+        evidence, after = self.evidence, self.outcome.after
+        j = self._least_explained() if self.unlisted is None else self.unlisted.joint - 1
+        elsewhere = without_effects_at(evidence, first, j).found
+        there = [f.effect for f in first.found if f not in elsewhere]
+        if not there or (self.unlisted is None and after.score.energy[j] < MULTIPLE**2 * after.score.rows[j]):
+            return self
+        progress(f"joint {j + 1}: whether other listed effects do better than {there[0].label()}")
+        again = search(evidence, progress, panel, barred=[there[0].place])
+        law, outcome = find_law(evidence, again, progress)
+        if law is not None:
+            return self
+        other, blocks = replace(self, outcome=outcome, unlisted=None), after.stacked.block
+        mine, others = (each._held_out() ** 2 for each in (self, other))
+        sums = [block_sums(x, blocks) for x in (mine, others, np.ones(len(blocks)))]
+        if self.unlisted is not None:
+            return other if lead_of(sums[1], sums[0], sums[2]) <= CHANCE else self
+        least = FAR_LESS * float((mine - 1).sum())
+        return other if float((mine - others).sum()) >= least and lead_of(*sums) > SIGNIFICANCE else self
+
+    def _least_explained(self) -> int:
+        """The joint (0-based) of which most is left, in baselines."""
+        score = self.outcome.after.score
+        return int(np.argmax(score.energy / np.maximum(score.rows, 1)))
 
     def remaining(self) -> Array:
         """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""

@@ -15,7 +15,7 @@ from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
-from armloop.diagnosis.innovations import innovations
+from armloop.diagnosis.innovations import at_rest, innovations
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
@@ -103,7 +103,7 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
-    turns = turning(motion, evidence.samples.moving)
+    holds = turning(motion, evidence.samples.moving) | at_rest(evidence.samples)
     length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
     total = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
     if length > _LONGEST * total:
@@ -114,9 +114,10 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         others = {
             j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints
         } - burst.joints
-        # A joint that turns round meanwhile leaves there what friction may do, and that may be far more than the event.
+        # A joint that rests or turns round meanwhile leaves there what friction may do, and that may be far more than the
+        # event.
         counted, own = tells.copy(), sorted(burst.joints)
-        counted[:, own] |= ~turns[:, own]
+        counted[:, own] |= ~holds[:, own]
         counted[:, sorted(others)] = False
         left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
         found.append(push(evidence, left, burst.rows, counted, own))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from armloop.data.blocks import block_numbers
+from armloop.data.blocks import block_numbers, halves
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
@@ -95,7 +95,7 @@ class Evidence:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
         rows = _sliding(samples, model) & independent_rows(samples)[:, None]
-        rows &= ~far_outside(samples.motion, model.history.get("range"))
+        rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
         return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
@@ -108,7 +108,7 @@ class Evidence:
     @property
     def fold(self) -> NDArray[np.intp]:
         """(N,) fold of each sample."""
-        return self.blocks % FOLDS
+        return halves(self.blocks)
 
     def residual(self, known: list[AddedEffect]) -> Array:
         """(N, n) what is left for ``known`` and further effects to explain.
@@ -223,6 +223,11 @@ def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
     half, v, vdot, centre = np.asarray(ranges, dtype=float)
     parts = [(motion.q - centre, half), (motion.v, v), (motion.vdot, vdot)]
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
+
+
+def too_slow(model: ReconstructedModel, motion: Motion) -> NDArray[np.bool_]:
+    """(N, n) samples in which a joint is slower than it slid in training: what friction is there, the model cannot know."""
+    return np.asarray(np.abs(motion.v) < np.asarray(model.history.get("slowest") or 0.0))
 
 
 def near_standstill(samples: Samples) -> NDArray[np.bool_]:

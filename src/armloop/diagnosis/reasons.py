@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside
+from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, too_slow
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
 from armloop.model import ReconstructedModel
 
@@ -54,10 +54,13 @@ def standing(
     parts = parts_of(witness(left, samples, evidence.context.load))
     outside = outside_trained_range(samples.motion, model.history.get("range"))
     far = far_outside(samples.motion, model.history.get("range")).mean(axis=0)
+    slow = (too_slow(model, samples.motion) & samples.moving).sum(axis=0) / np.maximum(
+        samples.moving.sum(axis=0), 1
+    )
     reasons: list[str] = []
     unknown = False
     for j, part in enumerate(parts):
-        reasons += _range(j, float(outside[j]), float(far[j]))
+        reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > _MOSTLY)
         if evidence.rows[:, j].sum() < _FEWEST:
             reasons.append(f"joint {j + 1} does not slide in this run: nothing can be said of it")
@@ -96,6 +99,16 @@ def _range(j: int, outside: float, far: float) -> list[str]:
         return [words]
     part = f"{far:.0%}" if far >= 0.01 else "less than 1%"
     return [f"{words}; {part} lies beyond {FAR:g} times the range and was not judged"]
+
+
+def _slow(model: ReconstructedModel, j: int, part: float) -> list[str]:
+    if part <= _WORTH_A_WORD:
+        return []
+    speed, unit = model.history["slowest"][j], "rad/s" if model.arm.revolute[j] else "m/s"
+    return [
+        f"joint {j + 1}: in {part:.0%} of the samples in which it moves it is slower than it was trained at ({speed:.2g} "
+        f"{unit}); they were not judged"
+    ]
 
 
 def _too_poor(model: ReconstructedModel, j: int) -> str:

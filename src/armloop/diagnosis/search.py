@@ -6,7 +6,7 @@ simplest of those that do equally well: the first effect named may have stood fo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +15,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     SIGNIFICANCE,
+    enough,
     gain,
     is_behind,
     is_worth,
@@ -22,16 +23,19 @@ from armloop.diagnosis.judgement import (
     simplest_of_equals,
     times_enough,
 )
+from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress, paced
 
+#: Name and joints of an effect.
+Place = tuple[str, int | None, int | None]
 #: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
 #: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for
-#: small ones.
-LEAST_SHARE = 0.005
+#: small ones. But what is left of that is of many kinds, and one law explains not this part of it.
+LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
 _MOST_EFFECTS = 4
@@ -89,32 +93,38 @@ class Outcome:
         ]
 
 
-def search(evidence: Evidence, progress: Progress, panel: Hypotheses | None = None) -> Outcome:
+def search(
+    evidence: Evidence,
+    progress: Progress,
+    panel: Hypotheses | None = None,
+    barred: Collection[Place] = (),
+) -> Outcome:
     """Greedy forward search; all effects are re-estimated together, and exchanged where another does better.
 
     Args:
         panel: who tries the hypotheses; in this process by default.
+        barred: effects that are not asked about.
     """
-    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1)).outcome()
+    return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred).outcome()
 
 
 class _Search:
     """One search: what could be explained at first, and what was the best beside the same effects before."""
 
-    def __init__(self, evidence: Evidence, progress: Progress, panel: Hypotheses) -> None:
-        self.evidence, self.progress, self.panel = evidence, progress, panel
+    def __init__(
+        self, evidence: Evidence, progress: Progress, panel: Hypotheses, barred: Collection[Place]
+    ) -> None:
+        self.evidence, self.progress, self.panel, self.barred = evidence, progress, panel, barred
         self.nothing = Known.of(evidence)
         bare = self.nothing.fit.score
         self.explainable: Array = np.maximum(bare.energy - bare.rows, 1e-9)
-        self._best_beside: dict[
-            tuple[tuple[tuple[str, int | None, int | None], Shape], ...], Found | None
-        ] = {}
+        self._best_beside: dict[tuple[tuple[Place, Shape], ...], Found | None] = {}
 
     def outcome(self) -> Outcome:
         """Effects added one by one until none is worth it."""
         found: list[Found] = []
         known = self.nothing
-        seen: set[frozenset[tuple[str, int | None, int | None]]] = {frozenset()}
+        seen: set[frozenset[Place]] = {frozenset()}
         while len(found) < _MOST_EFFECTS:
             best = self._best(found)
             if best is None:
@@ -142,8 +152,9 @@ class _Search:
         trials = [
             trial
             for trial in self.panel.tried(known, paced(self.progress))
-            if is_worth(self.evidence, current, trial.score, _tied(trial.effect))
-            and (current.energy - trial.score.energy >= LEAST_SHARE * self.explainable).any()
+            if trial.effect.place not in self.barred
+            and is_worth(self.evidence, current, trial.score, _tied(trial.effect))
+            and self._is_much(current, trial.score)
         ]
         if not trials:
             return None
@@ -155,6 +166,12 @@ class _Search:
             if trial is not best and gain(current, trial.score) >= RIVAL_SHARE * most
         ]
         return Found(best.effect, best.shape, min(most / whole, 1.0), rivals)
+
+    def _is_much(self, current: Score, trial: Score) -> bool:
+        """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""
+        removed, left = current.energy - trial.energy, current.energy - current.rows
+        of_the_rest = (removed >= MOST_OF_REST * left) & (removed > enough(self.evidence, current))
+        return bool(((removed >= LEAST_SHARE * self.explainable) | of_the_rest).any())
 
     def _exchanged(self, found: list[Found]) -> list[Found]:
         """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""

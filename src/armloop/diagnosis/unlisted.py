@@ -6,6 +6,7 @@ and directions, and the joint's own speed to the third power, and reported only 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -17,10 +18,11 @@ from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
-from armloop.diagnosis.judgement import SIGNIFICANCE, enough, lead_of
+from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, lead_of
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
+from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
-from armloop.laws.effects import Estimate, FoundLaw, found_law
+from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law
 from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
@@ -39,7 +41,7 @@ EXCESS, EVENTS = 2.0, 2
 REMAINDER = 0.03
 #: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
 FORCED = 0.3
-#: Nor are those of which a law of no more parameters, in their place, leaves but this part.
+#: Nor are those of whose remainder, beyond the baseline's, a law of no more parameters in their place removes this part.
 FAR_LESS = 0.5
 _FEWEST = 50
 _MOST_TERMS = 4
@@ -133,15 +135,33 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
             continue  # no more than the baseline's
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = _law(evidence, bare.after, j)
-        if not law.is_listed(j) and _is_simpler(law, outcome, bare, j):
+        if law.is_listed(j) or not _is_simpler(law, outcome, bare, j):
+            continue
+        if len(there) > 1 or not _does_as_well(evidence, bare, there[0].rivals, law, j):
             return _stated(evidence, bare, law, j), pruned(evidence, bare)
     return None, outcome
 
 
-def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
-    """Whether a law has no more parameters than the effects in whose place it is put, and leaves far less.
+def _does_as_well(
+    evidence: Evidence, bare: Outcome, rivals: Sequence[tuple[Effect, float]], law: _Law, j: int
+) -> bool:
+    """Whether an effect that was taken for as good as the one named, if less simple, leaves no more than a law does."""
+    after = bare.after
+    known, mine = Known.of(evidence, after.effects, after.shapes), after.stacked.joint == j
+    blocks = after.stacked.block[mine]
+    for effect, _ in rivals:
+        trial = known.trial(effect)
+        if trial is not None:
+            pair = (trial.held_out[mine] ** 2, law.left**2, np.ones(len(law.left)))
+            if lead_of(*(block_sums(x, blocks) for x in pair)) <= CHANCE:
+                return True
+    return False
 
-    With fewer parameters it need not be far less: significantly less will do.
+
+def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
+    """Whether a law has no more parameters than the effects in whose place it is put, and surely leaves far less.
+
+    With fewer parameters it need not be far less.
     """
     parameters = outcome.after.score.complexity - bare.after.score.complexity
     if not 0 < len(law.terms) <= parameters:
@@ -149,8 +169,10 @@ def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     mine = outcome.after.stacked.joint == j
     left, blocks = outcome.after.held_out[mine] ** 2, outcome.after.stacked.block[mine]
     sums = (block_sums(x, blocks) for x in (left, law.left**2, np.ones(len(left))))
-    fewer = len(law.terms) < parameters and lead_of(*sums) > SIGNIFICANCE
-    return fewer or law.energy <= FAR_LESS * _energy(outcome.after, j)
+    # what the model leaves on its baseline is left by either
+    own, energy = float(mine.sum()), _energy(outcome.after, j)
+    far_less = energy - law.energy >= max(FAR_LESS * (energy - own), own)
+    return lead_of(*sums) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:

@@ -172,6 +172,7 @@ class HistoryData(Struct):
     logs: Annotated[list[Text], Meta(max_length=100_000)] = []
     notes: Annotated[list[Text], Meta(max_length=10_000)] = []
     range: Annotated[list[Annotated[list[Finite], _Joints]], Meta(min_length=4, max_length=4)] | None = None
+    slowest: Annotated[list[NotNegative], _Joints] | None = None
     inertial: Annotated[list[_SUM], Meta(max_length=10 * MOST_JOINTS)] | None = None
     encoder_zeros: EncoderZerosData | None = None
 
@@ -272,6 +273,7 @@ def _agree(model: ModelData) -> None:
             for key in ("rmse", "rms", "nrmse", "worst", "reversals", "creeping")
         ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
+        ("history.slowest", model.history.slowest),
         *zeros,
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)

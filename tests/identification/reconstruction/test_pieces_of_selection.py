@@ -313,6 +313,13 @@ class TestSharedSamples:
         # |v| spreads evenly from 0 to 1 twice, then to 3 once: its 0.995 quantile leaves 0.005 of the samples
         assert v == pytest.approx([3 - 0.005 * 4], abs=1e-9) and vdot == pytest.approx([2 * v[0]])
 
+    def test_the_slowest_speed_of_what_is_fitted(self) -> None:
+        """Speeds from 0.02 to 1.02 evenly, forth and back; what is slower is turned round or at rest."""
+        v = np.concatenate([np.linspace(1.02, 0.02, 1001), np.zeros(200), -np.linspace(0.02, 1.02, 1001)])
+        samples = self.samples(np.column_stack([v, 0 * v]))
+        samples.moving[1001:1201], samples.moving[:, 1] = False, False
+        assert shared.slowest_sliding(samples) == pytest.approx([0.025, 0.0], abs=1e-3)
+
     def test_joints_must_move_and_terms_that_vanished_are_left_out(self) -> None:
         shared.check_moves(three_axis(), np.array([100, 100, 100]))
         with pytest.raises(ExcitationError, match=r"q2: joint .* moves in 99 samples, at least 100"):

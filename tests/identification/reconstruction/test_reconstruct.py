@@ -16,7 +16,7 @@ from armloop.identification.reconstruction.block_length import independent_block
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.reconstruct import default_library
 from armloop.identification.reconstruction.rigid_body import rigid_body
-from armloop.identification.reconstruction.shared import SHARED_CONDITIONING
+from armloop.identification.reconstruction.shared import SHARED_CONDITIONING, slowest_sliding
 from armloop.identification.scoring import score
 from armloop.util.errors import InputError, LogError
 
@@ -77,9 +77,11 @@ def test_the_model_remembers_how_it_came_about(together: Reconstruction):
         ["run1", "run2"],
     )
     half_q, half_v, half_a, centre = np.array(history["range"])
-    motion = preprocess([a_run(1), a_run(2)], Conditioning()).motion
+    samples = preprocess([a_run(1), a_run(2)], Conditioning())
+    motion = samples.motion
     assert (np.abs(motion.q - centre) <= half_q * 1.05).mean() > 0.99
     assert (np.abs(motion.v) <= half_v).mean() > 0.98 and (np.abs(motion.vdot) <= half_a).mean() > 0.98
+    assert history["slowest"] == slowest_sliding(samples)
 
 
 def test_held_out_blocks_do_not_reach_the_model():

@@ -40,7 +40,7 @@ from armloop.identification.reconstruction.library import METHODS, Library
 from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
-from armloop.identification.reconstruction.shared import motion_range
+from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
@@ -296,6 +296,7 @@ def _finished(
             "logs": list(dict.fromkeys(log.name for log in logs)),
             "steps": [report.to_dict() for report in found.reports],
             "range": motion_range(data.reference.samples.motion),
+            "slowest": slowest_sliding(data.reference.samples),
             **found.history,
         },
     )

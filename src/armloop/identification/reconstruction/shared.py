@@ -38,6 +38,8 @@ PLAIN_FRICTION = tuple(term for term in FRICTION if term.kind != "hysteresis")
 #: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion, unless it creeps steadily: so much
 #: of the largest speed must the smallest one be, over a period of the filter to both sides.
 _SLIDING, _STEADY = 0.01, 0.5
+#: Part of the samples that a model knows the arm's range by leaves out at each end.
+_TAIL = 0.005
 #: What a constraint has pressed to zero, N·m.
 _NOTHING = 1e-12
 
@@ -69,9 +71,19 @@ def _steady(samples: Samples) -> NDArray[np.bool_]:
 
 def motion_range(motion: Motion) -> list[list[float]]:
     """Half ranges of q, v, vdot, then the centre of q: where a model knows the arm."""
-    low, high = np.quantile(motion.q, 0.005, axis=0), np.quantile(motion.q, 0.995, axis=0)
-    rates = [np.quantile(np.abs(x), 0.995, axis=0).tolist() for x in (motion.v, motion.vdot)]
+    low, high = np.quantile(motion.q, _TAIL, axis=0), np.quantile(motion.q, 1 - _TAIL, axis=0)
+    rates = [np.quantile(np.abs(x), 1 - _TAIL, axis=0).tolist() for x in (motion.v, motion.vdot)]
     return [(0.5 * (high - low)).tolist(), *rates, (0.5 * (high + low)).tolist()]
+
+
+def slowest_sliding(samples: Samples) -> list[float]:
+    """(n,) slowest speed, rad/s (m/s), at which each joint's friction is known: of what is fitted, 0.5 % is slower.
+
+    Zero where a joint never slides.
+    """
+    rows = sliding_rows(samples)
+    speeds = (np.abs(v[mine]) for v, mine in zip(samples.motion.v.T, rows.T, strict=True))
+    return [float(np.quantile(v, _TAIL)) if len(v) else 0.0 for v in speeds]
 
 
 def check_moves(arm: Arm, counts: Array) -> None:
