@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 
 class Bin(NamedTuple):
-    """What was named with at least a share of what can be explained, and at least so many times the baseline: how many, and
-    how many of these were there.
+    """How many were named, and how many of these were there; of effects, with at least a share of what can be explained,
+    and at least so many times the baseline.
     """
 
-    least_share: float
-    least_times: float
     named: int
     right: int
+    least_share: float = 0.0
+    least_times: float = 0.0
 
     @property
     def probability(self) -> float:
@@ -28,9 +28,9 @@ class Bin(NamedTuple):
 
 #: Effects by the part of what can be explained that they remove, and by how many times more than the model's own
 #: shortcomings: a companion that removes little is false more often, and so is what hardly exceeds the baseline.
-EFFECTS = (Bin(0.05, 3.0, 144, 140), Bin(0.0, 0.0, 20, 18))
+EFFECTS = (Bin(144, 140, 0.05, 3.0), Bin(20, 18))
 #: Events of a run, and residuals that follow no listed effect.
-EVENT, UNLISTED = Bin(0.0, 0.0, 21, 20), Bin(0.0, 0.0, 23, 23)
+EVENT, UNLISTED = Bin(21, 20), Bin(23, 23)
 
 
 def bin_of(share: float, times: float) -> Bin:
