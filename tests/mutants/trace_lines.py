@@ -157,10 +157,17 @@ def ends_with_parent() -> None:
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)
 
 
-def _worked(process: int) -> int:
-    """Ticks of the processor's time that a process has had (Linux: proc_pid_stat(5))."""
-    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()
-    return int(fields[11]) + int(fields[12])
+def _worked(session: int) -> int:
+    """Ticks of the processor's time that the processes of a session have had (Linux: proc_pid_stat(5))."""
+    ticks = 0
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text(encoding="utf-8").rsplit(")", 1)[1].split()
+        except OSError:
+            continue  # it has ended
+        if int(fields[3]) == session:  # its workers', too: while they work, it waits
+            ticks += int(fields[11]) + int(fields[12])
+    return ticks
 
 
 def ended(child: int) -> int:
