@@ -95,6 +95,7 @@ RULES = [
     ),
     _rule("a joint that is shaken rests", lambda s, m: s.moving.copy(), (evidence, "_sliding")),
     _rule("listed effects before a law", lambda self, *_: self, (account.Account, "_or_listed")),
+    _rule("two at once", lambda self, beside: [], (search._Search, "_pair")),
     _rule("effects are exchanged", lambda self, found: found, (search._Search, "_exchanged")),
     _rule("one effect for several", lambda self, found: found, (search._Search, "_one_for_several")),
     _rule(

@@ -14,9 +14,13 @@ from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.diagnosis import account as accounts
 from armloop.diagnosis import diagnose, unlisted
+from armloop.diagnosis import search as searching
 from armloop.diagnosis.account import Account
 from armloop.diagnosis.evidence import FOLDS, Evidence, too_slow
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.score import Score
 from armloop.identification.scoring import score
+from armloop.laws.effects import effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -212,3 +216,47 @@ def test_a_law_is_not_stated_where_a_less_simple_effect_does_as_well(
     rivals: Any = [("none", 1.0), ("spring", 0.97)]
     assert unlisted._does_as_well(nothing, bare, rivals, law, 1) is as_well
     assert not unlisted._does_as_well(nothing, bare, rivals[:1], law, 1)
+
+
+class TestTwoThatHideEachOther:
+    """A torque that grows with the load and an offset, as large as each other, where the motion is the same all the time."""
+
+    @staticmethod
+    def search(monkeypatch: pytest.MonkeyPatch, left: float, leads: dict[str, float], worth: bool) -> Any:
+        """What is found at once, where ``left`` of 100 rows is left, and one of the two is asked about beside the other."""
+
+        def score(energy: float) -> Any:
+            return Score(1, np.array([[energy]]), np.array([[100]]))
+
+        trials = [
+            SimpleNamespace(effect=effect(name, 1), shape=Shape.fixed(0.0), score=score(energy))
+            for name, energy in (("coulomb_friction", 0.6 * left), ("torque_offset", 0.7 * left))
+        ]
+        of = {trial.score.error: trial.effect.name for trial in trials}
+        search: Any = object.__new__(searching._Search)
+        search.evidence, search.progress, search.barred = None, lambda text: None, []
+        search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(left)))
+        search.explainable = np.array([left])
+        search.panel = SimpleNamespace(tried=lambda known, progress: trials)
+        search._best = lambda beside: next(
+            (t for t in trials if worth and all(t.effect is not f.effect for f in beside)), None
+        )
+        known = SimpleNamespace(fit=SimpleNamespace(score=score(100.0)))
+        monkeypatch.setattr(searching, "_known", lambda evidence, found: known)
+        monkeypatch.setattr(searching, "lead", lambda current, trial: leads[of[trial.error]])
+        monkeypatch.setattr(searching, "times_enough", lambda evidence, current, trial: 9.0)
+        monkeypatch.setattr(searching, "is_worth", lambda evidence, alone, both, tied: worth)
+        monkeypatch.setattr(searching, "simplest_of_equals", lambda current, scores: 0)
+        return [found.effect.name for found in search._pair([])]
+
+    def test_are_found_together(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        doubtful = {"coulomb_friction": 2.5, "torque_offset": 2.3}
+        pair = ["coulomb_friction", "torque_offset"]
+        assert self.search(monkeypatch, 900.0, doubtful, worth=True) == pair
+        # each must be worth it beside the other
+        assert self.search(monkeypatch, 900.0, doubtful, worth=False) == []
+        # less than twice the baseline is no large residual
+        assert self.search(monkeypatch, 399.0, doubtful, worth=True) == []
+        assert self.search(monkeypatch, 401.0, doubtful, worth=True) == pair
+        # what is no better than chance begins nothing
+        assert self.search(monkeypatch, 900.0, dict.fromkeys(doubtful, 2.0), worth=True) == []

@@ -97,7 +97,7 @@ class TestSearch:
         nothing = SimpleNamespace(fit=SimpleNamespace(score=score))
         monkeypatch.setattr(search.Known, "of", staticmethod(lambda *given: nothing))
         given: Any = None
-        made = search._Search(given, given, given)
+        made = search._Search(given, given, given, given)
         assert made.explainable[0] == 5.0 and 0 < made.explainable[1] < 1e-6
 
     @pytest.mark.parametrize("worth", [2, 9])
@@ -113,6 +113,7 @@ class TestSearch:
             effect = SimpleNamespace(place=(str(k), 1, None), label=lambda: "")
             return SimpleNamespace(effect=effect, share=0.5) if k < worth else None
 
+        made._pair = lambda found: []
         made._best, made._exchanged, made._one_for_several = best, lambda found: found, lambda found: found
         monkeypatch.setattr(search, "_known", lambda evidence, found: SimpleNamespace(fit=len(found)))
         monkeypatch.setattr(search, "clear", lambda evidence, outcome: outcome)

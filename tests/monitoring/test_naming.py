@@ -8,7 +8,7 @@ from operation import healthy_model
 
 from armloop.laws.effects.listed import EFFECTS
 from armloop.monitoring.catalogue import Column, stays_nonlinear, watched
-from armloop.monitoring.naming import Normal, name_change
+from armloop.monitoring.naming import Normal, name_change, usual
 from armloop.monitoring.warmth import warms, without_warmth
 
 
@@ -64,3 +64,49 @@ def test_every_friction_follows_the_warmth_and_what_it_leaks_into() -> None:
     followed = {name for name in [*EFFECTS, "residual_energy", "of_nobody"] if warms(name)}
     assert followed == leaks | {name for name, kind in EFFECTS.items() if kind.rubs}
     assert "viscous_asymmetry" in followed and "payload" not in followed
+
+
+class TestUsual:
+    """Twenty columns and ten healthy units of a motion that hardly turns most of them."""
+
+    @staticmethod
+    def normal(level: float, units: int = 10) -> Normal:
+        """White noise, and a coefficient of the first column."""
+        rng = np.random.default_rng(2)
+        X = rng.standard_normal((units, 30, 20)) * np.geomspace(1.0, 1e-2, 20)
+        u = level * X[:, :, 0] + rng.standard_normal((units, 30))
+        return Normal(
+            np.einsum("unp,unq->upq", X, X), np.einsum("unp,un->up", X, u), np.einsum("un,un->u", u, u)
+        )
+
+    def test_noise_is_nothing_usual(self) -> None:
+        assert not usual(self.normal(0.0)).any()
+
+    def test_what_comes_back_in_every_unit_is(self) -> None:
+        found = usual(self.normal(2.0))
+        # 300 samples determine it to a twentieth; a ridge shrinks it by no more than its part
+        assert found[0] == pytest.approx(2.0, abs=0.25)
+        # what the motion hardly shows is not made up: its torque is small beside the noise
+        assert (np.abs(found[1:]) * np.geomspace(1.0, 1e-2, 20)[1:] < 0.25).all()
+
+    def test_of_one_unit_nothing_can_be_left_out(self) -> None:
+        one = self.normal(2.0, units=1)
+        assert usual(one)[0] == pytest.approx(2.0, abs=0.8)
+
+    def test_what_was_usual_is_no_change(self) -> None:
+        """A bias of the first column that was there before, and one of the second that was not."""
+        rng = np.random.default_rng(3)
+        columns = (Column("viscous_friction", 1, None, 0), Column("viscous_friction", 2, None, 0))
+        X = rng.standard_normal((16, 100, 2))
+        u = X[:, :, 0] + 0.1 * rng.standard_normal((16, 100))
+        u[8:] += 0.5 * X[8:, :, 1]
+        G, b, energy = (
+            np.einsum("unp,unq->upq", X, X),
+            np.einsum("unp,un->up", X, u),
+            np.einsum("un,un->u", u, u),
+        )
+        healthy, window = (Normal(G[part], b[part], energy[part]) for part in (slice(8), slice(8, 16)))
+        (named,) = name_change(healthy_model().arm, columns, healthy, window)
+        assert named.place[:2] == ("viscous_friction", 2)
+        both = name_change(healthy_model().arm, columns, None, window)
+        assert {one.place[1] for one in both} == {1, 2}

@@ -52,3 +52,20 @@ def test_moments_add_and_solve_like_lstsq():
     assert total(parts).squared_error(beta) == pytest.approx(float(squares[0]), rel=1e-8)
     rest = total(parts) - parts[0]
     np.testing.assert_allclose(rest.G, (parts[1] + parts[2]).G, atol=1e-8)
+
+
+def test_a_doubtful_column_pays_for_how_many_were_doubtful():
+    """Extended BIC: of 100 independent samples each term costs log 100, and 2 log k more where k were doubtful."""
+    N = 200
+
+    def kept(gain: float, doubtful: list[int]) -> list[int]:
+        """Orthogonal columns; without the second one n log(error) rises by the gain."""
+        left = 10.0
+        removed = left * np.expm1(gain / (N / 2))
+        b = np.sqrt(np.array([5000.0, removed, 5000.0]))
+        moments = Moments(np.eye(3), b, float(b @ b) + left, N)
+        return Sparse(gamma=1.0, correlation=2.0).prune(moments, np.arange(3), np.array(doubtful)).tolist()
+
+    alone, of_two = np.log(100), np.log(100) + 2 * np.log(2)
+    assert kept(alone - 0.1, [1]) == [0, 2] and kept(alone + 0.1, [1]) == [0, 1, 2]
+    assert kept(of_two - 0.1, [0, 1]) == [0, 2] and kept(of_two + 0.1, [0, 1]) == [0, 1, 2]

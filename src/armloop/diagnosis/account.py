@@ -11,8 +11,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import CHANCE, MOST, SIGNIFICANCE, lead_of
-from armloop.diagnosis.reasons import MULTIPLE
+from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, lead_of
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import FAR_LESS, Unlisted, find_law

@@ -24,6 +24,8 @@ CHANCE = 2.0
 ALIKE, NEARLY = 0.4, 0.003
 #: … while it removes at least this part of what the best removes.
 MOST = 0.75
+#: So many times the baseline is no baseline any more.
+MULTIPLE = 2.0
 
 
 def gain(current: Score, trial: Score) -> float:

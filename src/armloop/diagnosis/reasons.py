@@ -10,11 +10,10 @@ import numpy as np
 
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, too_slow
+from armloop.diagnosis.judgement import MULTIPLE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
 from armloop.model import ReconstructedModel
 
-#: So many times the baseline is no baseline any more.
-MULTIPLE = 2.0
 #: A model that leaves this part of a joint's torque, RMS, most of it predictable, judges nothing there.
 TOO_POOR = 0.5
 #: Part of the samples outside the trained range that is worth a word, and the part that leaves too little.

@@ -14,6 +14,8 @@ import numpy as np
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
+    CHANCE,
+    MULTIPLE,
     SIGNIFICANCE,
     enough,
     gain,
@@ -24,7 +26,7 @@ from armloop.diagnosis.judgement import (
     times_enough,
 )
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.trials import Hypotheses, Known
+from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array
@@ -127,10 +129,13 @@ class _Search:
         seen: set[frozenset[Place]] = {frozenset()}
         while len(found) < _MOST_EFFECTS:
             best = self._best(found)
-            if best is None:
+            more = self._pair(found) if best is None else [best]
+            if not more:
                 break
-            found.append(best)
-            self.progress(f"found {best.effect.label()}: removes {best.share:.0%} of what can be explained")
+            found += more
+            for each in more:
+                words = f"found {each.effect.label()}: removes {each.share:.0%} of what can be explained"
+                self.progress(words)
             found = self._one_for_several(self._exchanged(found))
             known = _known(self.evidence, found)
             # What is added may be taken back by an exchange: the same effects a second time are the end of it.
@@ -147,6 +152,32 @@ class _Search:
             self._best_beside[key] = self._tried(_known(self.evidence, beside) if beside else self.nothing)
         return self._best_beside[key]
 
+    def _pair(self, beside: Sequence[Found]) -> list[Found]:
+        """Two further effects of which none is sure without the other; empty where there are none.
+
+        What either leaves of a large residual is as large as what it removes, and hides it. Each must be worth it
+        beside the other.
+        """
+        known = _known(self.evidence, beside) if beside else self.nothing
+        current = known.fit.score
+        if (current.energy < MULTIPLE**2 * current.rows).all() or len(beside) + 2 > _MOST_EFFECTS:
+            return []
+        trials = [
+            trial
+            for trial in self.panel.tried(known, paced(self.progress))
+            if trial.effect.place not in self.barred
+            and lead(current, trial.score) > CHANCE
+            and times_enough(self.evidence, current, trial.score) > _tied(trial.effect)
+        ]
+        if not trials:
+            return []
+        first = self._found(current, trials)
+        second = self._best([*beside, first])
+        if second is None:
+            return []
+        alone, both = (_known(self.evidence, [*beside, *f]).fit.score for f in ([second], [first, second]))
+        return [first, second] if is_worth(self.evidence, alone, both, _tied(first.effect)) else []
+
     def _tried(self, known: Known) -> Found | None:
         current = known.fit.score
         trials = [
@@ -156,8 +187,10 @@ class _Search:
             and is_worth(self.evidence, current, trial.score, _tied(trial.effect))
             and self._is_much(current, trial.score)
         ]
-        if not trials:
-            return None
+        return self._found(current, trials) if trials else None
+
+    def _found(self, current: Score, trials: Sequence[Tried]) -> Found:
+        """The simplest of the best of some trials, with its rivals."""
         best = trials[simplest_of_equals(current, [trial.score for trial in trials])]
         most, whole = gain(current, best.score), float(self.explainable.sum())
         rivals = [

@@ -156,7 +156,7 @@ def _learned(watch: Watch, healthy: tuple[BlockSums, ...]) -> Watch:
         healthy=(),
         null=null,
         limit=limit,
-        normal=Normal(gram.sum(axis=0)[None], moment.sum(axis=0)[None], energy.sum()[None]),
+        normal=Normal(gram, moment, energy),
         up=zero,
         down=zero,
         begun=np.full((2, len(null)), watch.blocks),

@@ -19,8 +19,9 @@ from armloop.util.arrays import Array
 
 Place = tuple[str, int | None, int | None]
 
-#: Ridge on columns of unit length: of what the model leaves on healthy units only the strong directions are taken.
-_RIDGE, _HEALTHY_RIDGE = 1e-8, 1e-3
+#: Ridge on columns of unit length, and those tried of what the model leaves on healthy units: where it is no more than
+#: noise, or the motion goes on to others, its weak directions would put more into the window than they take out.
+_RIDGE, _HEALTHY_RIDGES = 1e-8, (1e-3, 1e-2, 0.1, 1.0, 10.0)
 #: An effect must explain twice its standard error over the units, a further one this part of what the others do.
 _WORTH = 0.02
 #: A column this small beside the largest, squared, is none.
@@ -77,7 +78,7 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
     """
     moment, energy = window.moment.copy(), window.energy.copy()
     if healthy is not None and len(healthy.gram):
-        old = ridge(healthy.gram.sum(axis=0), healthy.moment.sum(axis=0), _HEALTHY_RIDGE)
+        old = usual(healthy)
         explained = np.einsum("upq,q->up", window.gram, old)
         energy = energy - 2 * (moment @ old) + explained @ old
         moment = moment - explained
@@ -122,6 +123,27 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
         _named(arm, columns, rest, chosen, place, gain / whole if whole > 0 else 0.0, others)
         for place, gain, others in zip(chosen, gains, alike, strict=True)
     ]
+
+
+def usual(healthy: Normal) -> Array:
+    """(p,) what the model leaves on healthy units, in the columns: ridge regression, its strength by cross-validation.
+
+    Each unit in turn is left out; where no strength explains anything of those, there is nothing usual. Of a single unit the
+    weakest ridge is taken.
+    """
+    G, b = healthy.gram.sum(axis=0), healthy.moment.sum(axis=0)
+    if len(healthy.gram) == 1:
+        return ridge(G, b, _HEALTHY_RIDGES[0])
+
+    def explained(part: float) -> float:
+        total = 0.0
+        for own, moment in zip(healthy.gram, healthy.moment, strict=True):
+            beta = ridge(G - own, b - moment, part)
+            total += float(2 * beta @ moment - beta @ own @ beta)
+        return total
+
+    best, part = max((explained(part), part) for part in _HEALTHY_RIDGES)
+    return ridge(G, b, part) if best > 0 else np.zeros(len(b))
 
 
 def _linearised(

@@ -69,7 +69,7 @@ def test_a_change_is_named_and_supplied(scenario, model, case) -> None:
     assert found.alarmed_at < found.named_at < CHANGED + 7.0
     # what the integrator held before the change is looked up there
     assert CHANGED - 0.5 <= found.known.since <= CHANGED
-    named = found.known.effects[0]
+    (named,) = found.known.effects  # and nothing beside it
     assert named.effect.place[:2] == (change.name, change.joint)
     (key, truth) = ("mass", 0.5) if case == "load" else ("coefficient", 0.8)
     assert float(named.parameters[key].value) == pytest.approx(truth, rel=0.1)
