@@ -61,6 +61,19 @@ def test_no_false_alarms(cases: dict[str, Case]) -> None:
     assert all(verdict["verdict"] == "no_effect" for verdict in clean)
 
 
+@pytest.mark.slow
+def test_creep_into_points_is_no_friction_that_came(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clean run that goes from point to point, and a model of sines and sweeps, of an arm from an engine of its own."""
+    pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")
+    monkeypatch.syspath_prepend(str(HERE.parent))
+    from outside_generate import generate_outside
+
+    generate_outside(509, 1, tmp_path / "logs", tmp_path / "answers", points=True)
+    (verdict,) = judge(tmp_path / "logs" / "outside_509", tmp_path / "verdict.json").values()
+    assert verdict["verdict"] == "no_effect", verdict["effects"]
+    assert any("slower than it was trained at" in reason for reason in verdict["reasons"])
+
+
 def test_finished_loops_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = tmp_path / "made"
 
