@@ -239,7 +239,7 @@ class TestTwoThatHideEachOther:
         search.explainable = np.array([left])
         search.panel = SimpleNamespace(tried=lambda known, progress: trials)
         search._best = lambda beside: next(
-            (t for t in trials if worth and all(t.effect is not f.effect for f in beside)), None
+            (t for t in trials if all(t.effect is not f.effect for f in beside)), None
         )
         known = SimpleNamespace(fit=SimpleNamespace(score=score(100.0)))
         monkeypatch.setattr(searching, "_known", lambda evidence, found: known)
