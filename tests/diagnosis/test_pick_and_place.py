@@ -235,6 +235,7 @@ class TestTwoThatHideEachOther:
         of = {trial.score.error: trial.effect.name for trial in trials}
         search: Any = object.__new__(searching._Search)
         search.evidence, search.progress, search.barred = None, lambda text: None, []
+        search._beside = {}
         search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(left)))
         search.explainable = np.array([left])
         search.panel = SimpleNamespace(tried=lambda known, progress: trials)

@@ -132,7 +132,9 @@ class TestSearch:
         search.explainable, search.barred = np.array(explainable), [Named("barred").place]
         monkeypatch.setattr(searching, "enough", lambda evidence, now: np.array([50.0, own]))
         search.panel = SimpleNamespace(tried=lambda known, progress: iter(trials))
-        return search._tried(SimpleNamespace(fit=SimpleNamespace(score=score(1000.0, 10.0, rows=(100, 1)))))
+        search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(1000.0, 10.0, rows=(100, 1))))
+        search._beside = {}
+        return search._best([])
 
     @staticmethod
     def trial(name: str, *energy: float) -> Any:

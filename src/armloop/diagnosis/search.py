@@ -111,7 +111,7 @@ def search(
 
 
 class _Search:
-    """One search: what could be explained at first, and what was the best beside the same effects before."""
+    """One search: what could be explained at first, and what was tried beside the same effects before."""
 
     def __init__(
         self, evidence: Evidence, progress: Progress, panel: Hypotheses, barred: Collection[Place]
@@ -120,7 +120,7 @@ class _Search:
         self.nothing = Known.of(evidence)
         bare = self.nothing.fit.score
         self.explainable: Array = np.maximum(bare.energy - bare.rows, 1e-9)
-        self._best_beside: dict[tuple[tuple[Place, Shape], ...], Found | None] = {}
+        self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
         """Effects added one by one until none is worth it."""
@@ -147,10 +147,14 @@ class _Search:
 
     def _best(self, beside: Sequence[Found]) -> Found | None:
         """The simplest of the best further effects, with its rivals; None where none is worth it."""
-        key = tuple((f.effect.place, f.shape) for f in beside)
-        if key not in self._best_beside:
-            self._best_beside[key] = self._tried(_known(self.evidence, beside) if beside else self.nothing)
-        return self._best_beside[key]
+        current, trials = self._asked(beside)
+        worth = [
+            trial
+            for trial in trials
+            if is_worth(self.evidence, current, trial.score, _tied(trial.effect))
+            and self._is_much(current, trial.score)
+        ]
+        return self._found(current, worth) if worth else None
 
     def _pair(self, beside: Sequence[Found]) -> list[Found]:
         """Two further effects of which none is sure without the other; empty where there are none.
@@ -158,36 +162,32 @@ class _Search:
         What either leaves of a large residual is as large as what it removes, and hides it. Each must be worth it
         beside the other.
         """
-        known = _known(self.evidence, beside) if beside else self.nothing
-        current = known.fit.score
+        current, trials = self._asked(beside)
         if (current.energy < MULTIPLE**2 * current.rows).all() or len(beside) + 2 > _MOST_EFFECTS:
             return []
-        trials = [
+        doubtful = [
             trial
-            for trial in self.panel.tried(known, paced(self.progress))
-            if trial.effect.place not in self.barred
-            and lead(current, trial.score) > CHANCE
+            for trial in trials
+            if lead(current, trial.score) > CHANCE
             and times_enough(self.evidence, current, trial.score) > _tied(trial.effect)
         ]
-        if not trials:
+        if not doubtful:
             return []
-        first = self._found(current, trials)
+        first = self._found(current, doubtful)
         second = self._best([*beside, first])
         if second is None:
             return []
         alone, both = (_known(self.evidence, [*beside, *f]).fit.score for f in ([second], [first, second]))
         return [first, second] if is_worth(self.evidence, alone, both, _tied(first.effect)) else []
 
-    def _tried(self, known: Known) -> Found | None:
-        current = known.fit.score
-        trials = [
-            trial
-            for trial in self.panel.tried(known, paced(self.progress))
-            if trial.effect.place not in self.barred
-            and is_worth(self.evidence, current, trial.score, _tied(trial.effect))
-            and self._is_much(current, trial.score)
-        ]
-        return self._found(current, trials) if trials else None
+    def _asked(self, beside: Sequence[Found]) -> tuple[Score, list[Tried]]:
+        """How these effects do, and every further one beside them; tried once."""
+        key = tuple((f.effect.place, f.shape) for f in beside)
+        if key not in self._beside:
+            known = _known(self.evidence, beside) if beside else self.nothing
+            trials = self.panel.tried(known, paced(self.progress))
+            self._beside[key] = known.fit.score, [t for t in trials if t.effect.place not in self.barred]
+        return self._beside[key]
 
     def _found(self, current: Score, trials: Sequence[Tried]) -> Found:
         """The simplest of the best of some trials, with its rivals."""
