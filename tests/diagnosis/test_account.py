@@ -67,9 +67,7 @@ def test_a_joint_that_is_recorded_at_rest_tells_nothing_there() -> None:
     assert np.flatnonzero(~late.rows).tolist() == [1, 3, 4, 5]
 
 
-def test_what_remains_is_beside_effects_and_the_law_whatever_its_range(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_remains_is_beside_effects_and_the_law_whatever_its_range() -> None:
     @dataclass
     class Added:
         parameters: dict[str, float]
@@ -79,12 +77,11 @@ def test_what_remains_is_beside_effects_and_the_law_whatever_its_range(
 
     def with_effects(added: list[Any]) -> Any:
         seen.append([a.parameters for a in added])
-        return SimpleNamespace(predict=lambda motion: np.full((3, 1), 0.5))
+        return 5.0
 
-    monkeypatch.setattr(accounts, "smooth", lambda samples, x: 10 * x)
     whole: Any = SimpleNamespace(
-        samples=SimpleNamespace(tau=np.full((3, 1), 7.0), motion=None),
         model=SimpleNamespace(with_effects=with_effects),
+        left_by=lambda model: np.full((3, 1), 7.0 - model),
     )
     outcome: Any = SimpleNamespace(added=lambda: [Added({"of": 1.0})])
     nothing: Any = None

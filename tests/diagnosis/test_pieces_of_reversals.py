@@ -317,8 +317,12 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
 
     monkeypatch.setattr(_View, "of", view)
     samples = SimpleNamespace(motion=None, moving=None, period=0.05)
+    baseline: dict[str, Any] = {}
     evidence: Any = SimpleNamespace(
-        samples=samples, rows=rows, only=lambda own: SimpleNamespace(rows=own, samples=samples)
+        model=SimpleNamespace(baseline=baseline),
+        samples=samples,
+        rows=rows,
+        only=lambda own: SimpleNamespace(rows=own, samples=samples),
     )
     outcome: Any = SimpleNamespace(after=SimpleNamespace(effects=(), shapes=()))
     assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
@@ -328,3 +332,7 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     expected[[5, 15], [0, 1]] = True
     assert own.tolist() == expected.tolist()
     assert np.argwhere(judged).tolist() == [[4, 0], [5, 0], [6, 0], [13, 1], [14, 1], [15, 1]]
+    # nor one of a joint that never turned round in the training logs
+    baseline["reversals"] = [0.5, None]
+    assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
+    assert np.argwhere(asked[1][1]).tolist() == [[4, 0], [5, 0], [6, 0]]

@@ -232,11 +232,12 @@ class TestReasons:
 
     @staticmethod
     def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:
-        """Three joints with baselines of 0.5 N·m of which twenty samples slide; all samples 1 N·m, 0.25 predicted."""
+        """Three joints with baselines of 0.5 N·m of which twenty samples slide; the model leaves its own 0.75."""
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None, moving=np.ones((50, 3), dtype=bool)),
             model=SimpleNamespace(history={}, baseline={"nrmse": [of.get("poor"), None]}),
             context=SimpleNamespace(load=None),
+            left_by=lambda model: np.full((50, 3), model),
             rows=np.repeat(np.arange(50) < 20, 3).reshape(50, 3),
             scale=np.full(3, 0.5),
         )
@@ -244,7 +245,6 @@ class TestReasons:
         far = np.zeros((50, 3), dtype=bool)
         far[: of.get("far", 0), 2] = True
         seen: list[Any] = []
-        monkeypatch.setattr(reasons, "smooth", lambda samples, x: x)
         monkeypatch.setattr(reasons, "witness", lambda left, samples, load: seen.append(left))
         monkeypatch.setattr(reasons, "parts_of", lambda of: [Parts(j) for j in (1, 2, 3)])
         monkeypatch.setattr(reasons, "outside_trained_range", lambda motion, ranges: far.mean(axis=0))
@@ -252,7 +252,7 @@ class TestReasons:
         monkeypatch.setattr(reasons, "too_slow", lambda model, motion: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", j == 1))
-        augmented: Any = SimpleNamespace(predict=lambda motion: np.full((50, 3), 0.25))
+        augmented: Any = 0.75
         found = reasons.standing(evidence, augmented, after, of.get("explained", []))
         assert (seen[0] == 0.75).all()
         return found.reasons, found.unknown

@@ -75,6 +75,14 @@ def test_memory_that_the_training_logs_do_not_show_has_come_since() -> None:
     assert "all along" not in " ".join(findings(diagnosis))
 
 
+def test_of_joints_that_never_turned_round_in_the_training_logs_nothing_is_said_there() -> None:
+    model = coulomb_and_viscous(run(90, memory=True))
+    known = [*model.baseline["reversals"][:2], None]
+    model = replace(model, baseline={**model.baseline, "reversals": known})
+    effects = diagnose(model, [run(7, memory=True)]).to_dict()["effects"]
+    assert {(e["effect"], e["joint"]) for e in effects} == {("presliding_hysteresis", j) for j in (1, 2)}
+
+
 @pytest.mark.parametrize("seed", [7, 8, 9])
 def test_a_clean_run_shows_nothing_at_its_reversals(seed: int) -> None:
     model = coulomb_and_viscous(run(90, memory=False))

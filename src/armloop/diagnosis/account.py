@@ -8,7 +8,6 @@ import numpy as np
 
 from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
-from armloop.data.signals import smooth
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, lead_of
@@ -94,13 +93,13 @@ class Account:
 
     def remaining(self) -> Array:
         """(N, n) residual of the model with effects and law, N·m (N); the law is tried beyond its range, too."""
-        samples, added = self.whole.samples, self.outcome.added()
+        added = self.outcome.added()
         if self.unlisted is not None:
             for law in self.unlisted.added():
                 everywhere = {key: e for key, e in law.parameters.items() if key not in RANGE}
                 added.append(replace(law, parameters=everywhere))
         model = self.whole.model.with_effects(added)
-        return np.asarray(samples.tau - smooth(samples, model.predict(samples.motion)))
+        return self.whole.left_by(model)
 
     def left(self, residual: Array) -> float:
         """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples.

@@ -120,7 +120,24 @@ class Evidence:
         if known:
             context = model.context(self.samples.motion, [*(a.effect for a in known)])
             predicted = predicted - sum(added.torque(context) for added in known)
-        return self.samples.tau - smooth(self.samples, predicted)
+        return self.samples.tau - self._filtered(predicted)
+
+    def left_by(self, model: ReconstructedModel) -> Array:
+        """(N, n) what a model leaves, which is the run's with effects or without."""
+        return self.samples.tau - self._filtered(model.predict(self.samples.motion))
+
+    def _filtered(self, predicted: Array) -> Array:
+        """(N, n) predicted torque, filtered as often as the measured torque is: once.
+
+        Links move as filtered torques move them where the motion is filtered; once more would take from the jumps of an
+        acceleration what they hold near the corner. Friction steps however smooth the motion is.
+        """
+        key = (("the links", None, None), 0.0)
+        if key not in self._of_motion:
+            self._of_motion.keep(key, self.model.rigid_body(self.samples.motion))
+        links = self._of_motion.get(key)
+        links = self.model.rigid_body(self.samples.motion) if links is None else links
+        return np.asarray(links + smooth(self.samples, predicted - links))
 
     @cached_property
     def _cells(self) -> NDArray[np.intp]:

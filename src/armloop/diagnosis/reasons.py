@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, too_slow
 from armloop.diagnosis.judgement import MULTIPLE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
@@ -49,7 +48,7 @@ def standing(
         explained: joints (1-based) whose residual the verdict names already.
     """
     samples, model = evidence.samples, evidence.model
-    left = samples.tau - smooth(samples, augmented.predict(samples.motion))
+    left = evidence.left_by(augmented)
     parts = parts_of(witness(left, samples, evidence.context.load))
     outside = outside_trained_range(samples.motion, model.history.get("range"))
     far = far_outside(samples.motion, model.history.get("range")).mean(axis=0)

@@ -8,7 +8,8 @@ direction: among samples that slide it can hardly be seen, and no model's baseli
 So they are judged after the search, as a condition of their own. As no fit has seen them, what is named must be plain: it
 at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
 drives of an arm are alike: what is plain at one joint needs less at the others. What the model leaves at the reversals of
-its training logs, too, it has lacked all along; the rest has changed since.
+its training logs, too, it has lacked all along; the rest has changed since. Of a joint that never turned round in them
+nothing is said: a program that goes from point to point may rest at each.
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ def judge_reversals(
     """
     samples = evidence.samples
     turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
+    turns &= ~_never_seen(evidence)
     own = evidence.only(evidence.rows | turns)
     judged = at_reversals(samples, turns, own.rows & kept)
     start = known = Known.of(own, outcome.after.effects, outcome.after.shapes)
@@ -111,6 +113,12 @@ def judge_reversals(
         return None
     before, left = (np.sqrt(view.mean_squares(fit)) * own.scale for fit in (start.fit, whole.after))
     return AtReversals(found, whole, own, before, left)
+
+
+def _never_seen(evidence: Evidence) -> NDArray[np.bool_]:
+    """(n,) joints that turned round nowhere in the training logs: how the model errs there, nobody knows."""
+    left = evidence.model.baseline.get("reversals")
+    return np.array([x is None for x in left]) if left else np.zeros(evidence.rows.shape[1], dtype=bool)
 
 
 def _joints(effect: Effect) -> set[int]:
