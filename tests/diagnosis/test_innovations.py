@@ -9,7 +9,10 @@ import pytest
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import innovations
 from armloop.diagnosis.innovations import CREEP, at_rest
+from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.robot.arm import load_arm
 from armloop.util.errors import ModelError
 
 
@@ -94,10 +97,12 @@ class TestInnovations:
         given = {key: of[key] for key in ("history", "unknown", "baseline") if key in of}
         evidence = at_speeds(v, friction=friction, **given)
         evidence.rows[:, 0] = of.get("rows", True)
-        monkeypatch.setattr(innovations, "dry_level", lambda evidence: np.ones((len(v), 1)))
+        known = of.get("known", ())
+        level = 1.0 + len(known)
+        monkeypatch.setattr(innovations, "dry_level", lambda e, known: np.full((len(v), 1), level))
         monkeypatch.setattr(innovations, "at_rest", lambda samples: np.array(rest)[:, None])
         monkeypatch.setattr(innovations, "deviations", lambda evidence, residual: 0 * residual + 2.0)
-        values, rests = innovations.innovations(evidence, np.array(residual)[:, None])
+        values, rests = innovations.innovations(evidence, np.array(residual)[:, None], known)
         assert rests[:, 0].tolist() == rest
         return values[:, 0].tolist()
 
@@ -161,6 +166,18 @@ class TestInnovations:
         found = self.found(monkeypatch, [0.0] * 4, residual, [True] * 4, held=held, rows=none)
         # the smaller of 3 - 1 and |residual + friction| - 1.2, with the sign of the latter
         np.testing.assert_allclose(found, [0.9, 0.4, 1.0, -0.9])
+        # of what is known beside the model, what rubs is held, too: as much more, and with its torque there or without
+        rubs, pulls = (
+            SimpleNamespace(
+                effect=SimpleNamespace(rubs=is_friction), torque=lambda context: np.full((4, 1), -2.0)
+            )
+            for is_friction in (True, False)
+        )
+        one = {"residual": [9.0] * 4, "rest": [True] * 4, "held": [0.0] * 4, "rows": none}
+        found = self.found(monkeypatch, [0.0] * 4, known=[pulls], **one)
+        np.testing.assert_allclose(found, (9 - 1.2 * 2) / 2)
+        found = self.found(monkeypatch, [0.0] * 4, known=[rubs], **one)
+        np.testing.assert_allclose(found, (9 - 2 - 1.2 * 2) / 2)
         # what is within friction is nothing
         found = self.found(
             monkeypatch, [0.0] * 4, [0.9, -0.9, 1.1, 0.0], [True] * 4, held=[0.0] * 4, rows=none
@@ -265,12 +282,29 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
         FrictionTerm("hysteresis", 0.5, 0.1),
         FrictionTerm("load_hysteresis", 0.25, 0.1),
     )
-    evidence = at_speeds([0.0, 0.0], friction=FrictionLaw((terms,)), load=np.array([[4.0], [-8.0]]))
-    np.testing.assert_allclose(
-        innovations.dry_level(evidence)[:, 0], [2 + 30 * CREEP + 0.5 + 1.0, 2 + 30 * CREEP + 0.5 + 2.0]
-    )
-    evidence = at_speeds([0.0], friction=FrictionLaw((terms[3:],)))
-    assert innovations.dry_level(evidence)[0, 0] == pytest.approx(0.75)
+    arm = load_arm("three_axis")
+
+    def level(terms: tuple[FrictionTerm, ...], *known: AddedEffect, load: float = 0.0) -> float:
+        model = ReconstructedModel(arm, (), FrictionLaw((terms, (), ())))
+        still = np.zeros((2, 3))
+        motion = Motion(np.array([0.0, 0.1]), still, still, still, np.array([0]))
+        samples, context = SimpleNamespace(motion=motion), SimpleNamespace(load=still + load)
+        evidence: Any = SimpleNamespace(samples=samples, model=model, context=context)
+        found = innovations.dry_level(evidence, known)
+        assert found.shape == (2, 3) and not found[:, 1:].any()
+        return float(found[1, 0])
+
+    for load in (4.0, -8.0):
+        assert level(terms, load=load) == pytest.approx(2 + 30 * CREEP + 0.5 + 0.25 * abs(load))
+    assert level(terms[3:4]) == pytest.approx(0.5)
+    # what is known of it beside the model counts, too; what no direction changes does not
+    stribeck = {"static_excess": Estimate(3.0, 0.1, "N*m"), "velocity": Estimate(0.2, 0.1, "rad/s")}
+    spring = {"stiffness": Estimate(9.0, 0.1, "N*m/rad"), "rest": Estimate(0.5, 0.1, "rad")}
+    known = [
+        AddedEffect(effect("stribeck_friction", 1), stribeck),
+        AddedEffect(effect("joint_spring", 1), spring),
+    ]
+    assert level(terms[3:4], *known) == pytest.approx(0.5 + 3 * np.exp(-((CREEP / 0.2) ** 2)))
 
 
 def test_a_window_is_a_fifth_of_a_second_and_at_least_a_sample() -> None:

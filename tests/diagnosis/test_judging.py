@@ -93,7 +93,7 @@ def accounted(
     monkeypatch.setattr(
         accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
     )
-    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [again])
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual, found: [again])
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: tau)
     return accounts.best_account(whole, [first], True, lambda text: None)
@@ -227,7 +227,7 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
 
     def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
-        outcome: Any = SimpleNamespace()
+        outcome: Any = SimpleNamespace(added=list)
         return accounts.Account(whole, contacts, evidence, outcome, law if contacts else None)  # type: ignore[arg-type]
 
     monkeypatch.setattr(accounts.Account, "of", staticmethod(of))
@@ -235,7 +235,7 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
         accounts.Account, "left", lambda self, residual: 50.0 if self.unlisted else without_it
     )
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: np.zeros((4, 1)))
-    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual: [])
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual, found: [])
     every: Any = SimpleNamespace(rows=np.ones((4, 1), dtype=bool))
     beside: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: beside if contacts else every)

@@ -132,7 +132,8 @@ class TestTrials:
         rows = np.zeros((4, 2), dtype=bool)
         rows[2, 0] = True
         evidence: Any = SimpleNamespace(rows=rows, context=None, model=SimpleNamespace(arm=None))
-        other: Any = SimpleNamespace(plausible=lambda arm, parameters: True)
+        # what was known before is nothing beside it, and may be of either sign
+        other: Any = SimpleNamespace(plausible=lambda arm, parameters: False)
         current: Any = SimpleNamespace(effects=(other,), shapes=(Shape.fixed(0.0),))
         trial = Known(evidence, np.zeros((4, 2)), current).trial(effect)
         assert (trial is not None) == made
@@ -161,7 +162,8 @@ class TestTrials:
             fold=fold,
         )
         known = Known(evidence, np.zeros((80, 2)), current)
-        effect: Any = SimpleNamespace(joint=2, other_joint=None)
+        linear = {"start": lambda beta: beta, "embed": lambda x: (x, np.eye(len(x)))}
+        effect: Any = SimpleNamespace(joint=2, other_joint=None, **linear)
         assert trials._best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
         effect.joint = 1
         assert trials._best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
@@ -169,6 +171,33 @@ class TestTrials:
         current.outside[0] = np.concatenate([first, np.sin(t)])
         effect.joint = 2
         assert trials._best_shape(known, effect, shapes) == Shape(2.0, (1.0, 2.0))
+
+    def test_a_shape_is_chosen_with_the_coefficients_that_are_given(self) -> None:
+        """The first column's is one, as of a delay's secant: minus that of the first shape would leave nothing at all."""
+        t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+        y, fold = np.sin(t), np.repeat([0, 1], 40)
+        columns = {
+            1.0: np.column_stack([-y, np.cos(5 * t)]),
+            2.0: np.column_stack([0.5 * y, 0.2 * y + np.cos(5 * t)]),
+        }
+        current: Any = SimpleNamespace(
+            stacked=SimpleNamespace(joint=np.zeros(80, dtype=int)), held_out=y, outside=np.tile(y, (2, 1))
+        )
+        evidence: Any = SimpleNamespace(
+            smoothed=lambda effect, shape: columns[shape],
+            rows=np.ones((80, 1), dtype=bool),
+            independent=slice(None),
+            scale=np.ones(1),
+            fold=fold,
+        )
+        effect: Any = SimpleNamespace(
+            joint=1,
+            other_joint=None,
+            start=lambda beta: beta[-1:],
+            embed=lambda x: (np.array([1.0, x[0]]), np.array([[0.0], [1.0]])),
+        )
+        known = Known(evidence, np.zeros((80, 1)), current)
+        assert trials._best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
 
 
 def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:

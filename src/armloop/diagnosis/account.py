@@ -175,7 +175,7 @@ def best_account(
     whole = account.whole
     # What effects and law leave shows events that they covered, and takes back those that they explain.
     residual = account.remaining()
-    again = find_contacts(whole, residual)
+    again = find_contacts(whole, residual, account.outcome.added())
     looked = replace(account, contacts=again)
     if (without(whole, again).rows == without(whole, contacts).rows).all():
         account = looked  # in the same samples, without what the effects do there

@@ -6,6 +6,7 @@ It belongs to one log and would spoil the search for what is there all the time;
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,11 +65,12 @@ def known_contacts(evidence: Evidence) -> Mask:
     return rows
 
 
-def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
+def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffect] = ()) -> list[Contact]:
     """Events in a run.
 
     Args:
         residual: (N, n) what the model, with the effects found so far, leaves; N·m (N).
+        found: those effects.
 
     Returns:
         Events in order of time; none where the residual is what it is in like motion, or is unlike it too long.
@@ -76,7 +78,7 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     motion = evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
-        innovation, rest = innovations(evidence, residual)
+        innovation, rest = innovations(evidence, residual, found)
         far = far_outside(motion, evidence.model.history.get("range"))
         tells = innovation != 0.0
         rows, new = novelty(evidence, innovation, rest)
@@ -108,7 +110,7 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
     total = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
     if length > _LONGEST * total:
         return []  # what is there that long is no event
-    found = []
+    contacts = []
     for burst in bursts:
         # What happens to another joint at the same time, but not together with this, is an event of its own.
         others = {
@@ -120,8 +122,8 @@ def find_contacts(evidence: Evidence, residual: Array) -> list[Contact]:
         counted[:, own] |= ~holds[:, own]
         counted[:, sorted(others)] = False
         left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
-        found.append(push(evidence, left, burst.rows, counted, own))
-    return _distinct(motion, [contact for contact in found if contact and _seen_whole(motion, contact)])
+        contacts.append(push(evidence, left, burst.rows, counted, own))
+    return _distinct(motion, [contact for contact in contacts if contact and _seen_whole(motion, contact)])
 
 
 def _seen_whole(motion: Motion, contact: Contact) -> bool:

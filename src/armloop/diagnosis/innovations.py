@@ -7,6 +7,9 @@ known only in part; what lies within that is none.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, uniform_filter1d
@@ -17,8 +20,7 @@ from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import NEARLY
 from armloop.dynamics import Dynamics
-from armloop.laws.friction import FrictionLaw
-from armloop.model import ReconstructedModel
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array
 from armloop.util.errors import ModelError
 
@@ -35,11 +37,14 @@ _STICTION = 1.2
 _APART = 0.5
 
 
-def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.bool_]]:
+def innovations(
+    evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()
+) -> tuple[Array, NDArray[np.bool_]]:
     """(N, n) signed innovations in standard deviations, and (N, n) whether a joint rests.
 
     Args:
         residual: (N, n) what the model, with the effects found so far, leaves; N·m (N).
+        known: the effects found so far; what they rub, a joint at rest may hold, too.
     """
     samples, model = evidence.samples, evidence.model
     motion = samples.motion
@@ -52,7 +57,7 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
         for j in range(motion.joints)
     ]
     more = np.abs(sliding_more)
-    dry = dry_level(evidence) + more
+    dry = dry_level(evidence, known) + more
     ranges = model.history.get("range")
     slow = CREEPING * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
@@ -61,7 +66,10 @@ def innovations(evidence: Evidence, residual: Array) -> tuple[Array, NDArray[np.
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)
     # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
-    bare = residual + smooth(samples, model.friction.torque(motion, load=evidence.context.load))
+    friction = model.friction.torque(motion, load=evidence.context.load)
+    for added in (a for a in known if a.effect.rubs):
+        friction = friction + added.torque(evidence.context)
+    bare = residual + smooth(samples, friction)
     size = np.abs(residual) - unsure
     size = np.maximum(np.where(rest, np.minimum(size, np.abs(bare) - _STICTION * unsure), size), 0.0)
     if evidence.unknown is not None:
@@ -131,27 +139,13 @@ def contradiction(model: ReconstructedModel, motion: Motion) -> Array:
     return np.einsum("kij,kj->ki", (M - M.transpose(0, 2, 1)) / 2, motion.vdot)
 
 
-def dry_level(evidence: Evidence) -> Array:
-    """(N, n) dry friction of the model at creeping speed: half of what the direction changes."""
+def dry_level(evidence: Evidence, known: Sequence[AddedEffect] = ()) -> Array:
+    """(N, n) dry friction of the model and of known effects at creeping speed: half of what the direction changes."""
     motion, model = evidence.samples.motion, evidence.model
-    load = evidence.context.load
-    sides = []
-    for direction in (1.0, -1.0):
-        v = np.full_like(motion.v, direction * CREEP)
-        creeping = Motion(motion.time, motion.q, v, np.zeros_like(v), np.arange(motion.samples))
-        sides.append(_slid(model.friction, creeping, direction, load))
-    return np.abs(sides[0] - sides[1]) / 2
-
-
-def _slid(friction: FrictionLaw, motion: Motion, direction: float, load: Array | None) -> Array:
-    """(N, n) friction torque with elasto-plastic elements fully stretched."""
-    tau = np.zeros_like(motion.q)
-    for j, terms in enumerate(friction.terms):
-        for term in terms:
-            if term.kind in ("hysteresis", "load_hysteresis"):
-                column = np.full(motion.samples, direction)
-                weight = np.abs(load[:, j]) if term.by_load and load is not None else 1.0
-                tau[:, j] += term.coefficient * column * weight
-            else:
-                tau[:, j] += term.coefficient * term.column(motion, j, load)
-    return tau
+    try:
+        rubbing = Dynamics(model.with_effects(known)).friction
+    except ModelError:  # an effect of one's own that is no law of the state
+        rubbing = Dynamics(replace(model, effects=())).friction
+    forth = np.full_like(motion.v, CREEP)
+    one, other = (rubbing(v, evidence.context.load, motion.q) for v in (forth, -forth))
+    return np.abs(one - other) / 2

@@ -83,10 +83,10 @@ class Known:
         one = len(shapes) == 1
         shape = Shape.fixed(shapes[0]) if one else _best_shape(self, effect, shapes)
         trial = fit(evidence, self.residual, [*current.effects, effect], [*current.shapes, shape])
-        arm = evidence.model.arm
-        if not all(e.plausible(arm, p) for e, p in zip(trial.effects, trial.parameters, strict=True)):
-            return None
-        return trial if effect.resolved(trial.parameters[-1], shapes) else None
+        # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
+        mine = trial.parameters[-1]
+        there = effect.plausible(evidence.model.arm, mine) and effect.resolved(mine, shapes)
+        return trial if there else None
 
 
 class Tried(NamedTuple):
@@ -172,15 +172,20 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     joints = range(n) if effect.other_joint or effect.joint is None else [effect.joint - 1]
     columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
     every = list(range(FOLDS))
-    ridge = 1e-12 * len(columns) * np.eye(columns.shape[2])
-    X = [columns[fold == k] for k in every]
+    # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
+    given, free = effect.embed(effect.start(np.zeros(columns.shape[2])))
+    ridge = 1e-12 * len(columns) * np.eye(free.shape[1])
+    taken, fitted = columns @ given, columns @ free
+    X, taken_in = ([each[fold == k] for k in every] for each in (fitted, taken))
     G = [np.einsum("ksp,ksr->spr", x, x) for x in X]
 
     def best(folds: list[int], y: Array) -> float:
+        left = [y[fold == k, None] - taken_in[k] for k in every]
         A = sum((G[k] for k in folds), ridge)
-        c = np.sum([np.einsum("ksp,k->sp", X[k], y[fold == k]) for k in folds], axis=0)
+        c = np.sum([np.einsum("ksp,ks->sp", X[k], left[k]) for k in folds], axis=0)
         explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
-        return shapes[int(np.argmax(explained))]
+        energy = np.sum([(left[k] ** 2).sum(axis=0) for k in folds], axis=0)
+        return shapes[int(np.argmin(energy - explained))]
 
     without = (best([other for other in every if other != k], outside[k]) for k in every)
     return Shape(best(every, held_out), tuple(without))
