@@ -120,7 +120,7 @@ class TestFinding:
         self.left: list[float] = []
         by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
         following = iter(by_joint)
-        monkeypatch.setattr(contacts, "innovations", lambda evidence, residual: (innovation, None))
+        monkeypatch.setattr(contacts, "innovations", lambda evidence, residual, known: (innovation, None))
         monkeypatch.setattr(contacts, "novelty", lambda *_: (np.arange(100), np.ones((100, 2))))
         monkeypatch.setattr(contacts, "known_contacts", lambda evidence: np.arange(100) < of.get("known", 0))
         monkeypatch.setattr(contacts, "_bursts", lambda *_: next(following))
