@@ -120,7 +120,9 @@ class TestFinding:
         self.left: list[float] = []
         by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
         following = iter(by_joint)
-        monkeypatch.setattr(contacts, "innovations", lambda evidence, residual, known: (innovation, None))
+        friction: Any = ["friction"]  # what was found so far, and holds a joint at rest
+        told = {"friction": (innovation, None)}
+        monkeypatch.setattr(contacts, "innovations", lambda evidence, residual, known: told[known[0]])
         monkeypatch.setattr(contacts, "novelty", lambda *_: (np.arange(100), np.ones((100, 2))))
         monkeypatch.setattr(contacts, "known_contacts", lambda evidence: np.arange(100) < of.get("known", 0))
         monkeypatch.setattr(contacts, "_bursts", lambda *_: next(following))
@@ -161,7 +163,7 @@ class TestFinding:
         monkeypatch.setattr(
             contacts, "_strays", lambda far, b: far.shape == (100, 2) and b.rows.start in of.get("strays", ())
         )
-        assert contacts.find_contacts(evidence, np.zeros((100, 2))) == []
+        assert contacts.find_contacts(evidence, np.zeros((100, 2)), friction) == []
         return asked
 
     def test_each_is_explained_with_the_samples_that_tell_of_it(

@@ -76,7 +76,7 @@ def accounted(
 
     def of(whole: Any, contacts: list[Any], *rest: object) -> accounts.Account:
         evidence: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
-        outcome: Any = SimpleNamespace(added=list)
+        outcome: Any = SimpleNamespace(added=lambda: ["friction"])
         return accounts.Account(whole, contacts, evidence, outcome, law)
 
     tau = np.zeros((4, 1))
@@ -93,7 +93,8 @@ def accounted(
     monkeypatch.setattr(
         accounts.Account, "left", lambda self, residual: 100.0 if self.contacts else by_effects
     )
-    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual, found: [again])
+    looked = {"friction": [again]}  # with what was found so far: it holds a joint at rest
+    monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual, found: looked[found[0]])
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: tau)
     return accounts.best_account(whole, [first], True, lambda text: None)
