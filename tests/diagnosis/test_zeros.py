@@ -49,7 +49,8 @@ def test_a_model_of_one_zero_leaves_logs_alone(plain: ReconstructedModel) -> Non
 def test_zeros_are_taken_off_log_by_log(model: ReconstructedModel) -> None:
     logs = [run(3, (0.0, 0.04, -0.02)), run(4)]
     own, zeros = settled(model, logs)
-    np.testing.assert_allclose(zeros, [[0.0, 0.04, -0.02], [0.0, 0.0, 0.0]], atol=2e-3)
+    # Over the seeds 3 to 8 the zeros found scatter by 2 mrad about the true ones: three times that.
+    np.testing.assert_allclose(zeros, [[0.0, 0.04, -0.02], [0.0, 0.0, 0.0]], atol=6e-3)
     np.testing.assert_allclose(own[0].q, logs[0].q - zeros[0])
     (first, *_) = sentences(model, [log.name for log in logs], zeros)
     assert first.startswith("run 3: the encoder zeros of this log, joint 2 +0.0")
