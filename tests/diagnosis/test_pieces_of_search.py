@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +13,8 @@ from armloop.diagnosis import judgement
 from armloop.diagnosis import search as searching
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import effect
+
+ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
 
 def score(*energy: float, rows: tuple[int, ...] = (), blocks: int = 1, complexity: int = 1) -> Score:
@@ -304,15 +306,23 @@ class TestOutcomes:
         """Errors are those of what is fitted together: without the least, another may be clear."""
         errors = {"abc": (4.0, 2.0, 2.9), "ac": (3.0, 3.1), "ab": (2.9, 5.0), "a": (1.0,), "": ()}
 
-        def known(evidence: Any, found: Any) -> Any:
-            return SimpleNamespace(fit=SimpleNamespace(clear=errors["".join(f.shape for f in found)]))
+        impossible: set[str] = set()
 
-        monkeypatch.setattr(searching, "_known", known)
+        def fitted(names: str) -> Any:
+            effects = [SimpleNamespace(plausible=lambda arm, own: own not in impossible) for _ in names]
+            return SimpleNamespace(
+                clear=errors[names], effects=effects, parameters=[n + names for n in names]
+            )
+
+        monkeypatch.setattr(
+            searching,
+            "_known",
+            lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
+        )
 
         def kept(*names: str, settled: int = 0) -> tuple[str, Any]:
-            given = self.outcome(*names)
-            fitted: Any = SimpleNamespace(clear=errors["".join(names)])
-            made = searching.clear(cast(Any, None), replace(given, after=fitted), settled)
+            given = replace(self.outcome(*names), after=fitted("".join(names)))
+            made = searching.clear(ANY_ARM, given, settled)
             return "".join(f.shape for f in made.found), made.after.clear
 
         assert kept("a", "b", "c") == ("ac", (3.0, 3.1))
@@ -325,6 +335,11 @@ class TestOutcomes:
         assert kept("a", "b", "c", settled=1) == ("ac", (3.0, 3.1))
         errors["a"], errors["ac"] = (1.0,), (3.0, 2.0)
         assert kept("a", "b", "c", settled=1) == ("a", (1.0,))
+        # significant and impossible beside the others: it goes; if it is settled, what made it so does
+        errors["a"], errors["ab"] = (9.0,), (9.0, 9.0)
+        assert kept("a", "b") == ("ab", (9.0, 9.0))
+        impossible.add("aab")
+        assert kept("a", "b") == ("b", (3.5,)) and kept("a", "b", settled=1) == ("a", (9.0,))
 
     def test_at_reversals_coefficients_count_together_and_with_those_of_their_kind(
         self, monkeypatch: pytest.MonkeyPatch
@@ -334,7 +349,9 @@ class TestOutcomes:
         wald = {"a": (9.01, 1), "b": (1.0, 1), "c": (9.01, 2)}
 
         def fitted(names: str) -> Any:
-            return SimpleNamespace(clear=(0.5,) * len(names), wald=tuple(wald[name] for name in names))
+            effects = [SimpleNamespace(plausible=lambda arm, own: True) for _ in names]
+            chi = tuple(wald[name] for name in names)
+            return SimpleNamespace(clear=(0.5,) * len(names), wald=chi, effects=effects, parameters=names)
 
         monkeypatch.setattr(
             searching,
@@ -347,7 +364,7 @@ class TestOutcomes:
                 SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
             ]
             given: Any = SimpleNamespace(found=found, before=None, after=fitted(names), residual=None)
-            return "".join(f.shape for f in searching.clear(cast(Any, None), given, settled, alike).found)
+            return "".join(f.shape for f in searching.clear(ANY_ARM, given, settled, alike).found)
 
         assert kept("a") == "a" and kept("c") == "" and kept("b") == ""
         assert kept("a", alike=False) == ""

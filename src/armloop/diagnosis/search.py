@@ -276,7 +276,8 @@ def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
 def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = False) -> Outcome:
     """The outcome without effects no coefficient of which is significant by its stated error (Wald test), the least first.
 
-    What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that.
+    What a model gets wrong comes back with the motion, on held-out blocks too; the errors count that. An effect
+    whose parameters are impossible beside those found later is not significant: no model file may hold it.
 
     Args:
         settled: so many, the first, are not asked again.
@@ -287,7 +288,12 @@ def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = 
         errors = list(fitted.clear[settled:])
         if alike:
             errors = [max(pair) for pair in zip(errors, _together(found, fitted, settled), strict=True)]
-        if min(errors) >= SIGNIFICANCE:
+        possible = [
+            effect.plausible(evidence.model.arm, own)
+            for effect, own in zip(fitted.effects, fitted.parameters, strict=True)
+        ]
+        errors = [own * fits for own, fits in zip(errors, possible[settled:], strict=True)]
+        if min(errors) >= SIGNIFICANCE and all(possible):
             break
         least = settled + int(np.argmin(errors))
         found = [f for k, f in enumerate(found) if k != least]
