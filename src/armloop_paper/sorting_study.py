@@ -13,7 +13,7 @@ from sklearn.metrics import adjusted_rand_score
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.regimes.sorting import Condition, sort_samples
-from armloop.data.signals import Conditioning, preprocess
+from armloop.data.signals import Conditioning, as_torque, preprocess
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress, silent
 
@@ -135,7 +135,8 @@ def _measured(rng: np.random.Generator, level: float) -> tuple[Motion, Labels, N
     truth = np.array([1, 3, 2, 3])[np.searchsorted(knots[:-1], phase, side="right")]
     q = np.cumsum(v, axis=0) / _RATE
     noisy = np.round(_noisy(v, level, rng) / _ROUNDING) * _ROUNDING
-    samples = preprocess([MotionLog(time, q, noisy, np.ones_like(q), name="moves")], Conditioning())
+    log = MotionLog(time, q, noisy, np.ones_like(q), name="moves")
+    samples = as_torque(preprocess([log], Conditioning()))
     index = np.clip(np.rint(samples.motion.time * _RATE).astype(int), 0, len(time) - 1)
     reach = int(0.15 * _RATE)
     changes = np.flatnonzero(np.diff(truth))

@@ -11,6 +11,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import (
     Conditioning,
     ShortRunError,
+    as_torque,
     derivative,
     preprocess,
     smooth,
@@ -71,10 +72,30 @@ def test_how_far_the_filter_reaches_is_asked_of_the_filter(monkeypatch):
 
 def test_what_is_slow_passes_and_what_is_fast_does_not():
     time = np.arange(0, 8, 0.004)
-    motion = preprocess([sines(time, (1.0, 40.0))], TEN_HZ).motion
+    samples = preprocess([sines(time, (1.0, 40.0))], TEN_HZ)
+    motion = samples.motion
     inside = np.abs(motion.time - 4) < 3.4  # the ends know one side of the motion only
     np.testing.assert_allclose(motion.q[inside, 0], np.sin(2 * np.pi * motion.time[inside]), atol=1e-5)
-    assert np.abs(motion.q[inside, 1]).max() < 1e-4
+    # forth and back at four times the torque's corner, and twice the motion's
+    gain = {
+        corner: 1 / (1 + (np.tan(np.pi * 40 * 0.004) / np.tan(np.pi * corner * 0.004)) ** 8)
+        for corner in (10, 20)
+    }
+    size = np.abs(samples.tau[inside, 1]).max() / (80 * np.pi)
+    assert size == pytest.approx(gain[10], rel=0.05) and gain[10] < 1e-4
+    assert np.abs(motion.q[inside, 1]).max() == pytest.approx(gain[20], rel=0.05)
+
+
+def test_filtered_like_the_torque_the_motion_loses_what_the_torque_has_lost():
+    samples = preprocess([sines(np.arange(0, 8, 0.004), (1.0, 12.0))], TEN_HZ)
+    alike, inside = as_torque(samples), np.abs(samples.motion.time - 4) < 3.4
+    # the record's torque is its velocity
+    np.testing.assert_allclose(alike.motion.v[inside, 0], samples.tau[inside, 0], atol=1e-4)
+    lost = np.abs(samples.motion.v - samples.tau)[inside, 1].max()
+    assert np.abs(alike.motion.v - samples.tau)[inside, 1].max() < 0.05 * lost
+    assert as_torque(alike) is alike
+    as_drawn = replace(samples, cutoff_hz=0.0)
+    assert as_torque(as_drawn) is as_drawn
 
 
 def test_the_acceleration_is_that_of_the_motion():

@@ -311,18 +311,12 @@ class TestWhatIsKnownOfARun:
         model: Any = SimpleNamespace(context=lambda motion, effects: len(effects))
         model.predict = lambda motion: np.array([[10.0, 20.0]])
         model.with_effects = lambda known: model
-        model.rigid_body = lambda motion: np.array([[3.0, 5.0]])
-        samples: Any = SimpleNamespace(motion=motion(1), tau=np.array([[100.0, 200.0]]))
-        each, nothing = np.ones(2), np.zeros((1, 2), dtype=bool)
-        context: Any = None
-        own = Evidence(model, samples, each, each, nothing, np.zeros(1, dtype=np.intp), context)
+        samples = SimpleNamespace(motion=motion(1), tau=np.array([[100.0, 200.0]]))
+        own: Any = SimpleNamespace(model=model, samples=samples)
         known: Any = [SimpleNamespace(effect=k, torque=lambda context, k=k: k * context) for k in (1.0, 2.0)]
-        for _ in range(2):  # the second time what is kept of the links
-            # less the links, and twice of what is predicted beside them but for 2 and 4 of the two
-            np.testing.assert_array_equal(
-                own.residual(known), [[100.0 - 3.0 - 2 * 1.0, 200.0 - 5.0 - 2 * 9.0]]
-            )
-            np.testing.assert_array_equal(own.residual([]), [[100.0 - 3.0 - 2 * 7.0, 200.0 - 5.0 - 2 * 15.0]])
+        # less twice of what is predicted but for 2 and 4 of the two
+        np.testing.assert_array_equal(Evidence.residual(own, known), [[100.0 - 8.0, 200.0 - 28.0]])
+        np.testing.assert_array_equal(Evidence.residual(own, []), [[80.0, 160.0]])
 
     def test_samples_are_no_finer_than_the_filter_has_left_them(
         self, monkeypatch: pytest.MonkeyPatch
@@ -340,7 +334,7 @@ class TestWhatIsKnownOfARun:
             (1e3, 0.25),
             (0.0, 0.25),
         ):
-            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff)
+            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, unknown=None)
             made = Evidence.of(model, samples, [])
             assert made.context.period == pytest.approx(max(period, 0.25))
             # of a model without a baseline a hundredth of the torque; of no torque at all not nothing

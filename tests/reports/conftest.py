@@ -17,7 +17,7 @@ from synthetic import (
 
 from armloop.data.log import MotionLog
 from armloop.data.regimes import sort_samples
-from armloop.data.signals import preprocess
+from armloop.data.signals import as_torque, preprocess
 from armloop.diagnosis import diagnose
 from armloop.drake.experiments.tracking import TrackingResult
 from armloop.identification.reconstruction import Reconstruction, StepReport
@@ -91,7 +91,7 @@ def loop() -> SimpleNamespace:
         seed=7,
         arm=three_axis(),
         logs=logs,
-        clusters=sort_samples(preprocess(list(logs.values()), made.model.conditioning).motion),
+        clusters=sort_samples(as_torque(preprocess(list(logs.values()), made.model.conditioning)).motion),
         reconstruction=made,
         reference=made,
         tracking={name: tracked(name, size) for name, size in sizes.items()},

@@ -25,7 +25,7 @@ def run(options: Cluster) -> None:
     from armloop.commands.shared import TORQUE, print_json, read_logs
     from armloop.data.regimes import sort_samples
     from armloop.data.repeats import require_different
-    from armloop.data.signals import Conditioning, preprocess
+    from armloop.data.signals import Conditioning, as_torque, preprocess
     from armloop.reports.tables import table
     from armloop.reports.words import percent
     from armloop.util.errors import InputError
@@ -36,7 +36,7 @@ def run(options: Cluster) -> None:
         raise InputError(f"the logs have {sorted(widths)} joints; give logs of one arm")
     require_different(logs)
     samples = preprocess(logs, Conditioning())
-    clusters = sort_samples(samples.motion, options.indicator, options.seed)
+    clusters = sort_samples(as_torque(samples).motion, options.indicator, options.seed)
     if options.json:
         print_json(
             {

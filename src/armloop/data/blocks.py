@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,4 +80,6 @@ def stretch(samples: Samples, low: int, high: int) -> Samples:
     part = Motion(
         motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
     )
-    return Samples(part, samples.tau[cut], samples.moving[cut], samples.period, samples.cutoff_hz)
+    return replace(
+        samples, motion=part, tau=samples.tau[cut], moving=samples.moving[cut], spans=None, unknown=None
+    )

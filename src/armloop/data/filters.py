@@ -17,6 +17,9 @@ from armloop.util.arrays import Array
 INDEPENDENT = 4
 #: Periods of the corner to either side over which a step is smeared.
 SMEAR = 0.5
+#: Corner of the motion's low-pass over that of the torque's (parallel filtering): wide enough that the motion keeps what the
+#: torque keeps, for a column of the motion passes the torque's filter itself.
+WIDER = 2.0
 
 
 def filter_reach(cutoff_hz: float) -> float:

@@ -124,9 +124,11 @@ class Samples:
     tau : (N, n) N*m (N for a prismatic joint)
     moving : (N, n) true where joint j slides, that is |v_j| is above the dead zone of its velocity noise
     period : the sample period in seconds
-    cutoff_hz : corner of the low-pass that tau and the motion have passed; 0 where there was none
+    cutoff_hz : corner of the low-pass that tau has passed; 0 where there was none
     spans : (R, 2) first and last instant of the recorded run that each run of the motion was cut from; None where
         the runs are as they were recorded
+    wider : corner of the low-pass that the motion has passed, as a multiple of tau's
+    unknown : (N, n) true where tau is no measurement of the joint's torque (it counts as not moving); None where all are
 
     Raises `InputError` when the shapes do not agree.
     """
@@ -137,6 +139,8 @@ class Samples:
     period: float
     cutoff_hz: float = 0.0
     spans: NDArray[np.float64] | None = None
+    wider: float = 1.0
+    unknown: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from armloop.data.dropouts import dropouts
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import (
     accelerations,
@@ -33,9 +34,6 @@ _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
 _JUMP, _UNUSUAL = 0.1, 30.0
 # Rows that tell whether a log is a time series.
 _SERIES_ROWS = 20_000
-# Torque is cut off where so many of the rows hold its extreme, so many times as many as any of so many values beside it; a
-# sensor that knows fewer values than the last rounds.
-_CUT, _PILED, _BESIDE, _LEVELS = 0.01, 10, 5, 50
 
 
 def faults(log: Recorded) -> Iterator[Finding]:
@@ -57,10 +55,10 @@ def faults(log: Recorded) -> Iterator[Finding]:
 
 
 def doubts(log: Recorded) -> Iterator[Finding]:
-    """Yield what may be right and should be known: a torque that is cut off, v that lags or disagrees, few samples."""
-    yield from _saturated(log)
+    """Yield what may be right and should be known: spikes, a torque that is stuck or cut off, v that lags, few samples."""
     if not is_time_series(log.q, log.runs):
         return
+    yield from dropouts(log)
     if log.derived:
         yield Finding("columns v", "are missing; v is the derivative of q")
     else:
@@ -172,21 +170,4 @@ def _jumps(log: Recorded) -> Iterator[Finding]:
                         else "; leave a gap in time between runs"
                     ),
                     run.start + row + 2,
-                )
-
-
-def _saturated(log: Recorded) -> Iterator[Finding]:
-    """A torque that is cut off: while the arm moves, far more rows hold its extreme than any other value near it."""
-    moves = np.append(False, (np.diff(log.q, axis=0) != 0).any(axis=1))
-    for j, x in enumerate(log.tau[moves].T):
-        values, counts = np.unique(x, return_counts=True)
-        if len(values) < _LEVELS:
-            continue  # a coarse sensor, or none
-        for end, beside in ((0, slice(1, _BESIDE + 1)), (-1, slice(-1 - _BESIDE, -1))):
-            share = counts[end] / len(x)
-            if values[end] != 0 and share > _CUT and counts[end] > _PILED * counts[beside].max():
-                yield Finding(
-                    f"column tau{j + 1}",
-                    f"is {values[end]:.6g} to the last digit in {share:.0%} of the rows, as where a sensor or a drive "
-                    "saturates; leave out those parts",
                 )

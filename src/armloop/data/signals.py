@@ -1,22 +1,26 @@
 """Preprocessing of motion logs: resampling to one uniform grid, one low-pass filter (:mod:`armloop.data.filters`), one
 differentiation.
 
-Every signal that enters a regression passes the same zero-phase low-pass, so that the torque and the
-motion it belongs to stay together in time; runs are treated one by one, never across a gap.
+Parallel filtering (Gautier 1997): a column is computed of the motion and passes the same zero-phase low-pass as the
+torque (:func:`smooth`), so that both stay together in time and lose the same. The motion itself passes one of twice the
+corner first, which keeps noise out of products and derivatives and takes next to nothing away below the torque's corner.
+Runs are treated one by one, never across a gap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.filters import INDEPENDENT, SMEAR, LowPass, at_least, filter_reach
+from armloop.data.dropouts import Repaired, repaired
+from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion, Samples
+from armloop.data.recorded import Recorded
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
@@ -31,7 +35,7 @@ class Conditioning:
     """How a log is prepared; kept in the model file, so that later logs are prepared alike.
 
     Attributes:
-        cutoff_hz: corner of the :class:`armloop.data.filters.LowPass`; 0 leaves the samples as they are (for
+        cutoff_hz: corner of the torque's :class:`armloop.data.filters.LowPass`; 0 leaves the samples as they are (for
             inverse-dynamics samples that are no time series).
         oversampling: samples kept per period of the corner frequency; where a direction reverses, friction
             steps, and on a coarse grid the step would lie up to half a sample off.
@@ -94,7 +98,8 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
 
     Returns:
         The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
-        the corner of any instant at which the joint is inside its dead zone.
+        the corner of any instant at which the joint is inside its dead zone, or its torque is no measurement
+        (:mod:`armloop.data.dropouts`).
 
     Raises:
         ShortRunError: no run is long enough for the filter.
@@ -105,8 +110,9 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
     parts, spans = [], []
     for log in logs:
+        fresh = repaired(Recorded(log.time, log.q, log.v, log.tau, log.vdot, log.runs(), log.v_derived))
         for run in log.runs():
-            part = _condition_run(log.select(run), how, how.dead_zone * noise)
+            part = _condition_run(log.select(run), fresh.part(run), how, how.dead_zone * noise)
             if part is not None:
                 parts.append(part)
                 spans.append(log.time[[run.start, run.stop - 1]])
@@ -117,10 +123,19 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
             f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
         )
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
-    time, q, v, vdot, tau, moving = (np.concatenate(column) for column in zip(*parts, strict=True))
+    time, q, v, vdot, tau, moving, lost = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
     motion = Motion(time, q, v, vdot, starts, np.array(spans)[:, 0])
-    return Samples(motion, tau, moving.astype(bool), period, how.cutoff_hz, np.array(spans))
+    return Samples(
+        motion,
+        tau,
+        moving & ~lost,
+        period,
+        how.cutoff_hz,
+        np.array(spans),
+        WIDER,
+        lost if lost.any() else None,
+    )
 
 
 condition = preprocess  # the name before November 2026
@@ -160,10 +175,23 @@ def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
 def smooth(samples: Samples, x: Array) -> Array:
     """Pass x (N, ...) through the filter that the samples' torque has passed, run by run.
 
-    What has steps in it (friction, and every prediction that contains it) must be smeared like the
-    measured torque before the two are compared; smooth columns are hardly changed.
+    Whatever is computed of the motion must lose what the measured torque has lost before the two are compared.
     """
     return LowPass(samples.cutoff_hz, samples.period).each(x, samples.motion.runs())
+
+
+def as_torque(samples: Samples) -> Samples:
+    """The samples with the motion filtered like the torque.
+
+    For columns that are too many, or no columns, to be filtered: sums of products of the motion's functions, motion regimes.
+    Steps in them are not smeared.
+    """
+    if samples.cutoff_hz <= 0 or samples.wider <= 1:
+        return samples
+    motion = samples.motion
+    together = smooth(samples, np.hstack([motion.q, motion.v, motion.vdot]))
+    q, v, vdot = np.split(together, 3, axis=1)
+    return replace(samples, motion=replace(motion, q=q, v=v, vdot=vdot), wider=1.0)
 
 
 def independent_rows(samples: Samples) -> NDArray[np.bool_]:
@@ -179,7 +207,9 @@ def independent_rows(samples: Samples) -> NDArray[np.bool_]:
     return rows
 
 
-def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple[Array, ...] | None:
+def _condition_run(
+    log: MotionLog, fresh: Repaired, how: Conditioning, dead_zone: Array
+) -> tuple[Any, ...] | None:
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import binary_dilation
 
@@ -195,16 +225,23 @@ def _condition_run(log: MotionLog, how: Conditioning, dead_zone: Array) -> tuple
     def on_grid(x: Array) -> Array:
         return x if even else CubicSpline(elapsed, x)(grid)
 
-    low_pass = LowPass(how.cutoff_hz, period)
-    q, v, tau = np.split(low_pass(on_grid(np.hstack([log.q, log.v, log.tau]))), 3, axis=1)
+    low_pass = LowPass(WIDER * how.cutoff_hz, period)
+    q, v, tau = (on_grid(x) for x in (fresh.q, fresh.v, fresh.tau))
+    slow, tau = np.split(LowPass(how.cutoff_hz, period)(np.hstack([v, tau])), 2, axis=1)
+    q, v = np.split(low_pass(np.hstack([q, v])), 2, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
-    still = np.abs(v) <= dead_zone
-    turned = v[1:] * v[:-1] < 0  # between two samples, however fast
+    still = np.abs(slow) <= dead_zone
+    turned = slow[1:] * slow[:-1] < 0  # between two samples, however fast
     still[1:] |= turned
     still[:-1] |= turned
     reach = at_least(how.smear / (how.cutoff_hz * period))
-    smeared = binary_dilation(still, np.ones((2 * reach + 1, 1)))
-    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep]
+    around = np.ones((2 * reach + 1, 1))
+    smeared = binary_dilation(still, around)
+    lost = np.zeros_like(still)
+    if fresh.lost is not None:
+        nearest = np.clip(np.searchsorted(elapsed, grid - 0.5 * period), 0, len(grid) - 1)
+        lost = binary_dilation(fresh.lost[nearest], around)
+    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
 
 
 def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:

@@ -19,6 +19,7 @@ from armloop.data.blocks import block_numbers, halves
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
+from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.found import FAR
@@ -96,7 +97,8 @@ class Evidence:
             context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
         rows = _sliding(samples, model) & independent_rows(samples)[:, None]
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
-        return Evidence(model, samples, scale, variation, rows, blocks, context, tuple(effects))
+        asked, unknown = tuple(effects), samples.unknown
+        return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
 
     def knowing(self, known: list[AddedEffect]) -> Evidence:
         """The same run with columns as a model sees them that has ``known`` effects."""
@@ -120,24 +122,11 @@ class Evidence:
         if known:
             context = model.context(self.samples.motion, [*(a.effect for a in known)])
             predicted = predicted - sum(added.torque(context) for added in known)
-        return self.samples.tau - self._filtered(predicted)
+        return self.samples.tau - smooth(self.samples, predicted)
 
     def left_by(self, model: ReconstructedModel) -> Array:
         """(N, n) what a model leaves, which is the run's with effects or without."""
-        return self.samples.tau - self._filtered(model.predict(self.samples.motion))
-
-    def _filtered(self, predicted: Array) -> Array:
-        """(N, n) predicted torque, filtered as often as the measured torque is: once.
-
-        Links move as filtered torques move them where the motion is filtered; once more would take from the jumps of an
-        acceleration what they hold near the corner. Friction steps however smooth the motion is.
-        """
-        key = (("the links", None, None), 0.0)
-        if key not in self._of_motion:
-            self._of_motion.keep(key, self.model.rigid_body(self.samples.motion))
-        links = self._of_motion.get(key)
-        links = self.model.rigid_body(self.samples.motion) if links is None else links
-        return np.asarray(links + smooth(self.samples, predicted - links))
+        return residual(model, self.samples)
 
     @cached_property
     def _cells(self) -> NDArray[np.intp]:

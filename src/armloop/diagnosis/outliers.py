@@ -33,6 +33,8 @@ def outlying(evidence: Evidence, residual: Array) -> list[slice]:
     motion = evidence.samples.motion
     rest = ~evidence.samples.moving | (np.abs(motion.v) < CREEP)
     held = np.where(rest, dry_level(evidence), 0.0)
+    if evidence.unknown is not None:
+        held = np.where(evidence.unknown, np.inf, held)
     level = _level(motion, np.maximum(np.abs(residual) - held, 0.0) / evidence.scale)
     highest = float(level.max(initial=0.0))
     if highest < _RISE:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.data.regimes import Clusters, sort_samples
-from armloop.data.signals import preprocess
+from armloop.data.signals import as_torque, preprocess
 from armloop.identification.reconstruction import Reconstruction, StepReport
 from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
@@ -55,7 +56,7 @@ def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionL
     samples = preprocess(logs, model.conditioning)
     sections = reconstruction_sections(reconstruction, _longest_run(samples))
     if reconstruction.reports[0].orders is not None:
-        sections.insert(0, conditions_section(sort_samples(samples.motion)))
+        sections.insert(0, conditions_section(sort_samples(as_torque(samples).motion)))
     error = percent(mean_nrmse(reconstruction.held_out))
     lead = Prose("reconstruction", warnings=reconstruction.warnings)["lead"]
     cards = [Card(error, "Prediction error", "nRMSE on data that no step has seen, mean of the joints")]
@@ -78,7 +79,9 @@ def _longest_run(samples: Samples) -> Samples:
     run = max(samples.motion.runs(), key=lambda run: run.stop - run.start)
     motion = samples.motion
     part = Motion(motion.time[run], motion.q[run], motion.v[run], motion.vdot[run], np.array([0]))
-    return Samples(part, samples.tau[run], samples.moving[run], samples.period, samples.cutoff_hz)
+    return replace(
+        samples, motion=part, tau=samples.tau[run], moving=samples.moving[run], spans=None, unknown=None
+    )
 
 
 def reconstruction_sections(

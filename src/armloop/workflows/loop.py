@@ -12,7 +12,7 @@ import numpy as np
 
 from armloop.data.log import MotionLog, read_log, write_log
 from armloop.data.regimes import Clusters, sort_samples
-from armloop.data.signals import preprocess
+from armloop.data.signals import as_torque, preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan, load_tracking
@@ -119,7 +119,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             model = reconstruction.model
             model.save(folder / "model.json")
             samples = preprocess(list(logs.values()), model.conditioning)
-            clusters = sort_samples(samples.motion)
+            clusters = sort_samples(as_torque(samples).motion)
         print(steps_table(reconstruction.reports), end="\n\n")
         print(score_table(reconstruction.held_out, plant.arm), end="\n\n", flush=True)
         with _Clock(seconds, "track", progress, "3/7 control: tracking with three controllers"):

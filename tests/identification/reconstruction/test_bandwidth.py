@@ -13,7 +13,7 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, standing
 from armloop.cli import main
 from armloop.data.filters import LowPass, filter_reach
 from armloop.data.log import MotionLog, read_log, write_log
-from armloop.data.signals import Conditioning, preprocess
+from armloop.data.signals import Conditioning, as_torque, preprocess
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import bandwidth, reconstruct
 from armloop.identification.reconstruction.bandwidth import Bandwidth, Table, choose_bandwidth
@@ -76,7 +76,8 @@ def test_the_model_keeps_the_corner_that_was_chosen(tmp_path: Path) -> None:
     found.model.save(tmp_path / "model.json")
     model = load_model(tmp_path / "model.json")
     chosen = model.history["bandwidth"]
-    assert model.conditioning.cutoff_hz == chosen["cutoff_hz"] <= 5.0
+    assert model.conditioning.cutoff_hz == pytest.approx(0.9 * chosen["cutoff_hz"])
+    assert chosen["cutoff_hz"] <= 5.0
     assert any("chosen by cross-validation" in note for note in found.notes)
 
 
@@ -283,7 +284,8 @@ class TestPieces:
         named = [replace(log, name=f"log {k}") for k, log in enumerate(logs)]
         how = replace(TEN_HZ, cutoff_hz=9.999)
         corners = [9.999, 7.099, 5.0, 3.5, 2.5]
-        for libraries, filters in (((), corners), ((replace(how, cutoff_hz=4.0),), [4.0, 3.5, 2.5])):
+        below = [0.9 * corner for corner in corners]  # what is regressed then
+        for libraries, filters in (((), below), ((replace(how, cutoff_hz=4.0),), [4.0, *below[3:]])):
             asked.clear()
             choose_bandwidth(named, three_axis(), how, libraries=libraries)
             assert sorted(asked[0], reverse=True) == filters
@@ -314,7 +316,7 @@ class TestPieces:
         assert bandwidth.highest_corner([log], replace(TEN_HZ, cutoff_hz=100.0)) == 51.48
 
     def test_a_library_keeps_a_lower_corner_of_its_own(self) -> None:
-        assert Bandwidth(5.0).suited(TEN_HZ).cutoff_hz == 5.0
+        assert Bandwidth(5.0).suited(TEN_HZ).cutoff_hz == 4.5
         assert Bandwidth(5.0).suited(replace(TEN_HZ, cutoff_hz=4.0)).cutoff_hz == 4.0
         assert Bandwidth(5.0).notes() == []
 
@@ -362,7 +364,7 @@ def test_what_is_regressed_at_a_corner() -> None:
     base = BaseParameters.of_arm(arm, rotors=True)
     aside = [np.array([[4.0, 5.0]])]
     table = bandwidth.table_at([log], arm, base, TEN_HZ, 10.0, [10.0, 2.5], aside)
-    samples = preprocess([log], replace(TEN_HZ, oversampling=1e9))
+    samples = as_torque(preprocess([log], replace(TEN_HZ, oversampling=1e9)))
     motion = samples.motion
     # from where the lowest corner smears nothing in that is not there, by a sample more
     margin = filter_reach(2.5) + 0.01

@@ -14,7 +14,7 @@ from synthetic import LOWER, UPPER, fourier_motion, friction, measured, rigid_to
 from armloop.data.log import MotionLog, write_log
 from armloop.data.pieces import log_sources
 from armloop.data.regimes.indicators import size
-from armloop.data.signals import Conditioning, ShortRunError, preprocess
+from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess
 from armloop.experiment.excitation import MotionRanges
 from armloop.experiment.sampling import inverse_dynamics_samples
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
@@ -235,12 +235,13 @@ def test_a_log_too_short_for_the_filter_is_left_out_unless_all_are(logs: list[Mo
 
 
 def test_unsorted_samples_take_the_condition_of_their_neighbours(logs: list[MotionLog]) -> None:
-    motion = preprocess(logs, Conditioning()).motion
-    speed = size(motion.v)
+    samples = preprocess(logs, Conditioning())
+    speed = size(as_torque(samples).motion.v)
     labels = np.digitize(speed, np.quantile(speed, [0.3, 0.6]))
-    sorter = Sorter(motion, labels)
-    assert sorter(motion) is labels
-    half = Chunk.of(preprocess(logs, Conditioning()), Options()).take(np.arange(0, len(labels), 2))
-    learnt = Sorter(half.samples.motion, labels[::2])
-    assert (learnt(motion)[::2] == labels[::2]).all()
-    assert (learnt(motion) == labels).mean() > 0.97  # all but those near a border
+    sorter = Sorter(samples, labels)
+    assert sorter(samples) is labels
+    other = as_torque(samples)
+    half = Chunk.of(other, Options()).take(np.arange(0, len(labels), 2))
+    learnt = Sorter(half.samples, labels[::2])
+    assert (learnt(samples)[::2] == labels[::2]).all()
+    assert (learnt(samples) == labels).mean() > 0.97  # all but those near a border

@@ -77,7 +77,7 @@ def test_the_model_remembers_how_it_came_about(together: Reconstruction):
         ["run1", "run2"],
     )
     half_q, half_v, half_a, centre = np.array(history["range"])
-    samples = preprocess([a_run(1), a_run(2)], Conditioning())
+    samples = preprocess([a_run(1), a_run(2)], together.model.conditioning)
     motion = samples.motion
     assert (np.abs(motion.q - centre) <= half_q * 1.05).mean() > 0.99
     assert (np.abs(motion.v) <= half_v).mean() > 0.98 and (np.abs(motion.vdot) <= half_a).mean() > 0.98

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armloop.data.regimes import sort_samples
-from armloop.data.signals import preprocess
+from armloop.data.signals import as_torque, preprocess
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.fitted import fitted_rows
 from armloop.identification.reconstruction.found import Found
@@ -34,13 +34,13 @@ def data() -> Data:
 @pytest.fixture(scope="module")
 def steps(data: Data) -> Found:
     """What faultless steps would find."""
-    truth, motion = true_model(), data.reference.samples.motion
+    truth, samples = true_model(), data.reference.samples
     return Found(
         truth.arm,
         list(truth.components),
         [list(law) for law in truth.friction.terms],
         [StepReport(k, orders, 1, 1, [1] * 3, [1] * 3) for k, orders in enumerate(ORDERS, 1)],
-        sorter=Sorter(motion, sort_samples(motion).condition),
+        sorter=Sorter(samples, sort_samples(as_torque(samples).motion).condition),
     )
 
 

@@ -21,7 +21,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, ShortRunError, preprocess, uniform_period
+from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, uniform_period
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -33,6 +33,9 @@ from armloop.util.errors import LogError
 _PARTS = (0.71, 0.5, 0.35, 0.25)
 #: Of the corners whose error is within this factor of the least, the highest is taken: friction needs bandwidth.
 _AS_GOOD = 1.02
+#: What is regressed passes a filter of so much less: of the corners that do as well the highest was taken, and a corner too
+#: high lets in noise of the acceleration, which grows with its power of 3/2, sooner than one too low takes away motion.
+_BELOW = 0.9
 #: A corner is at most so many times the sample rate; the Nyquist rate is half of it.
 _OF_RATE = 0.4
 #: Samples read, rows regressed (one a joint and instant), length of the blocks, s, and rows from which on a joint counts.
@@ -55,8 +58,8 @@ class Bandwidth:
         return {"cutoff_hz": self.cutoff_hz, "trials": [list(trial) for trial in self.trials]}
 
     def suited(self, how: Conditioning) -> Conditioning:
-        """A library's usual filter, with this corner where it is lower."""
-        return replace(how, cutoff_hz=min(how.cutoff_hz, self.cutoff_hz))
+        """A library's usual filter, or one a little below this corner where that is lower."""
+        return replace(how, cutoff_hz=min(how.cutoff_hz, _BELOW * self.cutoff_hz))
 
     def notes(self) -> list[str]:
         """What was chosen, and against what, where it is not the highest that was tried."""
@@ -208,7 +211,7 @@ def table_at(
     stride = max(1, sum(log.samples for log in logs) * arm.n // _ROWS)
     for k, log in enumerate(logs):
         try:
-            samples = preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9))
+            samples = as_torque(preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9)))
         except ShortRunError:
             continue
         motion, period = samples.motion, uniform_period(log.time)

@@ -109,7 +109,7 @@ class Chunk:
         old, motion = self.samples, self.samples.motion
         starts = np.searchsorted(rows, motion.starts).astype(np.intp)
         taken = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
-        samples = Samples(taken, old.tau[rows], old.moving[rows], old.period, old.cutoff_hz, old.spans)
+        samples = replace(old, motion=taken, tau=old.tau[rows], moving=old.moving[rows], unknown=None)
         return Chunk(
             samples,
             self.blocks[rows],
@@ -344,13 +344,13 @@ def _joined(chunks: Sequence[Chunk]) -> Chunk:
     tau, moving = (np.concatenate([getattr(s, key) for s in samples]) for key in ("tau", "moving"))
     first = samples[0]
     spans = [s.spans for s in samples if s.spans is not None]
-    whole = Samples(
-        Motion.joined([s.motion for s in samples]),
-        tau,
-        moving,
-        first.period,
-        first.cutoff_hz,
-        np.concatenate(spans) if len(spans) == len(samples) else None,
+    whole = replace(
+        first,
+        motion=Motion.joined([s.motion for s in samples]),
+        tau=tau,
+        moving=moving,
+        spans=np.concatenate(spans) if len(spans) == len(samples) else None,
+        unknown=None,
     )
     return Chunk(
         whole,

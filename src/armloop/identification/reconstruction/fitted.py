@@ -55,5 +55,5 @@ def step_rows(chunk: Chunk, sorter: Sorter | None) -> list[Fitted]:
     rows = chunk.samples.moving & (chunk.independent & ~chunk.held_out)[:, None]
     if sorter is None:
         return [Fitted((1, 2, 3), rows)]
-    condition = sorter(chunk.samples.motion)
+    condition = sorter(chunk.samples)
     return [Fitted((step,), rows & (condition == step)[:, None]) for step in (1, 2, 3)]

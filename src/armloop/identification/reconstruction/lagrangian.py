@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
-from armloop.data.signals import smooth
+from armloop.data.signals import as_torque, smooth
 from armloop.dynamics.physics import joint_limits
 from armloop.features.lagrangian import EnergyTerms, candidates, constant_weights
 from armloop.features.rigid_body import BaseParameters
@@ -240,14 +240,14 @@ def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Inde
 
 
 def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
-    motion, acts, p, f = samples.motion, library.acts, library.count, len(FRICTION)
+    motion, acts, p, f = as_torque(samples).motion, library.acts, library.count, len(FRICTION)
     wheres = [
         np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
         for j in range(motion.joints)
     ]
     sums = [Moments.none(len(w)) for w in wheres]
     friction = [
-        smooth(samples, np.column_stack([term.column(motion, j) for term in FRICTION]))
+        smooth(samples, np.column_stack([term.column(samples.motion, j) for term in FRICTION]))
         for j in range(motion.joints)
     ]
     used = np.flatnonzero(rows.any(axis=1))

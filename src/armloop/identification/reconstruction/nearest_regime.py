@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from armloop.data.motion import Motion
+from armloop.data.motion import Motion, Samples
 from armloop.data.regimes.indicators import units
+from armloop.data.signals import as_torque
 from armloop.util.arrays import TINY, Array
 
 #: Of the largest speed or acceleration: less counts as none.
@@ -20,13 +21,14 @@ class Sorter:
     Near means near in log‖v‖ and log‖v̇‖, each joint in units of its noise, of which the indicators are functions.
 
     Args:
-        motion: the sorted samples.
+        samples: the sorted samples; their motion is taken with the torque's filter.
         condition: (N,) the condition of each.
     """
 
-    def __init__(self, motion: Motion, condition: NDArray[np.int_]) -> None:
-        self._known = motion
+    def __init__(self, samples: Samples, condition: NDArray[np.int_]) -> None:
+        self._known = samples
         self._condition = condition
+        motion = as_torque(samples).motion
         self._units = [units(a) for a in (motion.v, motion.vdot)]
         sizes = self._sizes(motion)
         self._floor = _NONE * np.maximum(sizes.max(axis=0, initial=0.0), TINY)
@@ -41,13 +43,13 @@ class Sorter:
     def _place(self, motion: Motion) -> Array:
         return np.log10(np.maximum(self._sizes(motion), self._floor))
 
-    def __call__(self, motion: Motion) -> NDArray[np.int_]:
-        """(N,) condition of each sample; the sorted motion itself gets its own back."""
-        if motion is self._known:
+    def __call__(self, samples: Samples) -> NDArray[np.int_]:
+        """(N,) condition of each sample; the sorted samples themselves get their own back."""
+        if samples is self._known:
             return self._condition
-        _, nearest = self._tree.query(self._place(motion))
+        _, nearest = self._tree.query(self._place(as_torque(samples).motion))
         return self._labels[nearest]
 
-    def __reduce__(self) -> tuple[type[Sorter], tuple[Motion, NDArray[np.int_]]]:
+    def __reduce__(self) -> tuple[type[Sorter], tuple[Samples, NDArray[np.int_]]]:
         # A tree is quicker to plant than to send.
         return Sorter, (self._known, self._condition)

@@ -172,9 +172,12 @@ class Projected:
         bread = np.linalg.inv(S)
         return self._judged(left, beta, bread @ (sums @ sums.T) @ bread)
 
-    def _judged(self, after: Array, beta: Array, covariance: Array) -> Trial:
+    def _judged(self, after: Array, beta: Array, covariance: Array) -> Trial | None:
+        """None where no row that was left out tells of the columns."""
         rows = self._rows
         judge = np.isfinite(after) & rows.inside
+        if not judge.any():
+            return None
         a, b = self._left[judge] ** 2, after[judge] ** 2
         joint, block, fold = rows.joint[judge], rows.block[judge], rows.fold[judge]
         before, left = (np.bincount(joint, weights=x) for x in (a, b))

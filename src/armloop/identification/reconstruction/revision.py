@@ -124,7 +124,7 @@ class Leftover:
         samples, motion = chunk.samples, chunk.samples.motion
         r = residual(model, samples)
         usable = samples.moving & ~chunk.held_out[:, None]
-        condition = sorter(motion)
+        condition = sorter(samples)
         lag = max(1, round(1 / (samples.cutoff_hz * samples.period)))
         run = np.searchsorted(motion.starts, np.arange(len(r)), side="right")
         same = (run[lag:] == run[:-lag]) & (condition[lag:] == condition[:-lag])

@@ -21,7 +21,7 @@ from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
 
 #: Friction with memory needs every sample.
-SHARED_CONDITIONING = Conditioning(cutoff_hz=9.5)
+SHARED_CONDITIONING = Conditioning(cutoff_hz=8.5)
 
 #: Presliding widths, rad, and the speed below which the direction fades in, rad/s. Held-out errors on
 #: measured arms are flat around these values.

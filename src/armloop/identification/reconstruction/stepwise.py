@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.regimes import Clusters, Condition, sort_samples
-from armloop.data.signals import Conditioning
+from armloop.data.signals import Conditioning, as_torque
 from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.excitation import check_excitation
@@ -53,9 +53,10 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
     """
     samples = data.reference.samples
     check_excitation(arm, samples)
-    clusters = sort_samples(samples.motion, seed=options.seed)
-    note = _impure(samples.motion, clusters)
-    sorter = Sorter(samples.motion, clusters.condition)
+    motion = as_torque(samples).motion
+    clusters = sort_samples(motion, seed=options.seed)
+    note = _impure(motion, clusters)
+    sorter = Sorter(samples, clusters.condition)
     revolute = tuple(bool(r) for r in arm.revolute)
     if not note:
         try:
@@ -149,7 +150,7 @@ def _impure(motion: Motion, clusters: Clusters) -> str:
 
 
 def _one_shot(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
-    return sindy(arm, data.reference.samples, data.reference.held_out, options, progress)
+    return sindy(arm, as_torque(data.reference.samples), data.reference.held_out, options, progress)
 
 
 class DoubleFeatureSetLibrary(Library):
@@ -157,7 +158,7 @@ class DoubleFeatureSetLibrary(Library):
 
     name = "double-feature-set"
     methods: ClassVar[Mapping[str, Find]] = {"stepwise": stepwise_on, "sindy": _one_shot}
-    conditioning = Conditioning()
+    conditioning = Conditioning(cutoff_hz=9.0)
     shared = False
     own_friction = (
         "the double feature set has friction of its own (Coulomb, Stribeck, terms of the velocities)"

@@ -15,6 +15,7 @@ import numpy as np
 
 from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
+from armloop.data.signals import as_torque
 from armloop.features.wave_moments import WaveProducts, WaveSums
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.found import Found
@@ -36,7 +37,7 @@ class Usable:
     Attributes:
         whole: all samples of the chunk, which a filter needs.
         places: (M,) where the usable ones stand among them.
-        motion: M samples as one run; only for columns without memory.
+        motion: M samples as one run, filtered like the torque; only for columns without memory.
         tau, rest: (M, n) the torque, and what earlier steps have left of it.
         moving: (M, n).
         validation: (M,) samples that choose orders.
@@ -97,10 +98,10 @@ class Choice:
 
     def __call__(self, chunk: Chunk) -> Usable:
         """The usable samples of a chunk."""
-        samples, motion = chunk.samples, chunk.samples.motion
+        samples, motion = chunk.samples, as_torque(chunk.samples).motion
         rows = chunk.independent & ~chunk.held_out & samples.moving.any(axis=1)
         if self.sorter is not None:
-            rows &= np.isin(self.sorter(motion), self.conditions)
+            rows &= np.isin(self.sorter(samples), self.conditions)
         places = np.flatnonzero(rows).astype(np.intp)
         part, tau = _rows(motion, places), samples.tau[places]
         usable = Usable(
@@ -116,7 +117,7 @@ class Choice:
         # A chunk may have no sample of a condition, and an empty motion has no first instant.
         if len(tau) == 0:
             return usable
-        friction = usable.filtered(self.inherited.law.torque(motion))
+        friction = usable.filtered(self.inherited.law.torque(samples.motion))
         return replace(usable, rest=tau - self.inherited.rigid(part) - friction)
 
 

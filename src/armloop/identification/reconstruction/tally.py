@@ -75,7 +75,7 @@ class Tally:
         every = residual(model, samples) ** 2
         squares = every[held]
         torques, moving = samples.tau[held] ** 2, samples.moving[held]
-        labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples.motion)
+        labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
         sums = {}
         for label in np.unique(labels[held]):
             rows = labels[held] == label

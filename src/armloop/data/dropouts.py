@@ -1,0 +1,267 @@
+"""Sensor faults of single samples: impulse noise, stuck values, repeated rows and saturation.
+
+Spikes of one or two samples are replaced by what lies beside them (a median filter would touch every sample), and so are
+rows that repeat the positions and speeds before them, as where a bus loses packets or a log is written faster than it is
+measured. A torque that stands still to the last digit, or is cut off, is left out: nothing is fitted to it, and nothing is
+judged by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armloop.data.recorded import Finding, Recorded
+from armloop.util.arrays import TINY, Array, Index, Mask
+
+#: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
+_SPIKE, _BACK = 15.0, 0.3
+#: Steps to either side that say what is usual there, and the part of a column's samples that spikes are at most.
+_BESIDE, _RARE = 15, 0.01
+#: Steps away that no spike at this one reaches.
+_AWAY = 3
+#: Spikes of a column from which on they are said, and of a speed (rad/s, m/s) that are none.
+_SAID, _NO_SPEED = 3, 0.02
+#: Chance of as many equal values in a row somewhere in a column, from which on they are none; and the fewest of them.
+_CHANCE, _FEWEST = 1e-6, 5
+#: Where a stuck value is let go it jumps by so many deviations of the usual step, if values are repeated more often than
+#: this.
+_JUMP, _NEVER = 5.0, 0.02
+#: Position and speed of all joints may be repeated for so long, s.
+_HELD = 0.1
+#: Torque is cut off where so many of the rows hold its extreme, so many times as many as any of so many values beside it; a
+#: sensor that knows fewer values than the last rounds.
+_CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """A record without spikes.
+
+    Attributes:
+        q, v, tau: (N, n).
+        lost: (N, n) samples whose torque is no measurement; None where there are none.
+    """
+
+    q: Array
+    v: Array
+    tau: Array
+    lost: Mask | None
+
+    def part(self, rows: slice) -> Repaired:
+        """Some of its rows."""
+        lost = None if self.lost is None else self.lost[rows]
+        return Repaired(self.q[rows], self.v[rows], self.tau[rows], lost)
+
+
+def repaired(log: Recorded) -> Repaired:
+    """The record without spikes, and which torques are none."""
+    clean = _without_spikes(_moving_on(log))
+    lost = np.zeros(log.tau.shape, dtype=bool)
+    for j in range(log.tau.shape[1]):
+        for first, last in _stuck(clean, j):
+            lost[first : last + 1, j] = True
+        for value, _ in cut_off(clean, j):
+            lost[:, j] |= clean.tau[:, j] == value
+    return Repaired(clean.q, clean.v, clean.tau, lost if lost.any() else None)
+
+
+def dropouts(log: Recorded) -> Iterator[Finding]:
+    """What is replaced or left out, a sentence for each column; of one or two spikes none."""
+    held = _held(log)
+    if len(held):
+        yield Finding(
+            "columns q, v",
+            f"repeat the row before in {len(held)} rows while the arm moves; what lies beside them takes their place",
+        )
+    log = _moving_on(log)
+    for (kind, j), rows in spikes(log).items():
+        if len(rows) >= _SAID:
+            x = getattr(log, kind)[:, j]
+            size = np.abs(x - _bridged(x, rows)).max()
+            yield Finding(
+                f"column {kind}{j + 1}",
+                f"has spikes of one or two samples, {len(rows)} in all, of up to {size:.3g}; what lies beside them takes "
+                "their place",
+            )
+    for j in range(log.tau.shape[1]):
+        stuck = _stuck(log, j)
+        if stuck:
+            seconds = sum(float(log.time[last] - log.time[first]) for first, last in stuck)
+            yield Finding(
+                f"column tau{j + 1}",
+                f"stands still to the last digit while the joint moves {len(stuck)} times, {seconds:.2g} s "
+                "in all; these parts are left out",
+            )
+        for value, share in cut_off(log, j):
+            yield Finding(
+                f"column tau{j + 1}",
+                f"is {value:.6g} to the last digit in {share:.0%} of the rows, as where a sensor or a drive saturates; "
+                "these parts are left out",
+            )
+
+
+def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
+    """Rows of the spikes of each column that has any, by kind and joint (0-based).
+
+    Where single samples are many they are no faults but noise. What several speeds or torques do at once, and no position,
+    is a jerk of the arm, as of brakes that fall in, and no fault; nor is what a speed does if its position moves as fast.
+    """
+    kinds = {"q": log.q, **({} if log.derived else {"v": log.v}), "tau": log.tau}
+    found = {(kind, j): _spikes(x[:, j], log) for kind, x in kinds.items() for j in range(x.shape[1])}
+    for j in range(0 if log.derived else log.v.shape[1]):
+        rows, x = found["v", j], log.v[:, j]
+        later, before = np.minimum(rows + 1, len(x) - 1), np.maximum(rows - 1, 0)
+        rate = (log.q[later, j] - log.q[before, j]) / (log.time[later] - log.time[before])
+        height = np.abs(x - _bridged(x, rows))[rows]
+        found["v", j] = rows[(np.abs(x[rows] - rate) > 0.5 * height) & (height > _NO_SPEED)]
+    count = np.zeros(len(log.time), dtype=int)
+    for (kind, _), rows in found.items():
+        near = np.unique(np.clip(rows[:, None] + np.arange(-1, 2), 0, len(count) - 1))
+        count[near] += -len(found) if kind == "q" else 1
+    alone = {place: rows[count[rows] < 2] for place, rows in found.items()}
+    return {place: rows for place, rows in alone.items() if len(rows)}
+
+
+def _without_spikes(log: Recorded) -> Recorded:
+    columns = {"q": log.q, "v": log.v, "tau": log.tau}
+    for (kind, j), rows in spikes(log).items():
+        if columns[kind] is getattr(log, kind):
+            columns[kind] = np.array(columns[kind])
+        columns[kind][:, j] = _bridged(columns[kind][:, j], rows)
+    if log.derived and columns["q"] is not log.q:
+        columns["v"] = np.concatenate([np.gradient(columns["q"][r], log.time[r], axis=0) for r in log.runs])
+    return replace(log, q=columns["q"], v=columns["v"], tau=columns["tau"])
+
+
+def _moving_on(log: Recorded) -> Recorded:
+    """The record with lines through what lies beside rows that repeat the position and speed before them.
+
+    So with a torque that is repeated as well, unless the rows are so many that it may be stuck.
+    """
+    rows = _held(log)
+    if len(rows) == 0:
+        return log
+    stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    short = [own for own in stretches if len(own) < _FEWEST and (log.tau[own] == log.tau[own - 1]).all()]
+    q, v, tau = (np.array(x) for x in (log.q, log.v, log.tau))
+    for x, own in ((q, rows), (v, rows), (tau, np.concatenate([rows[:0], *short]))):
+        for column in x.T:
+            column[:] = _bridged(column, own)
+    return replace(log, q=q, v=v, tau=tau)
+
+
+def _held(log: Recorded) -> Index:
+    """Rows in which all positions and speeds, which are not zero, are those of the row before, for a while."""
+    if log.derived:
+        return np.zeros(0, dtype=np.intp)
+    same = (np.diff(log.q, axis=0) == 0).all(axis=1) & (np.diff(log.v, axis=0) == 0).all(axis=1)
+    same &= np.abs(log.v[1:]).max(axis=1) > _NO_SPEED
+    for run in log.runs[1:]:
+        same[run.start - 1] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        # what stands still to the end of a run, or too long, is another fault
+        if (
+            log.time[last] - log.time[first] > _HELD
+            or last == len(same)
+            or not _in_one_run(log, first, last + 1)
+        ):
+            same[first:last] = False
+    return np.flatnonzero(same) + 1
+
+
+def cut_off(log: Recorded, j: int) -> list[tuple[float, float]]:
+    """Extremes at which a joint's torque is cut off, each with its part of the rows.
+
+    While the arm moves, far more rows hold such a value than any other near it.
+    """
+    moves = np.append(False, (np.diff(log.q, axis=0) != 0).any(axis=1))
+    x = log.tau[moves, j]
+    values, counts = np.unique(x, return_counts=True)
+    found: list[tuple[float, float]] = []
+    if len(values) < _LEVELS:
+        return found  # a coarse sensor, or none
+    for end, beside in ((0, slice(1, _LEVELS_BESIDE + 1)), (-1, slice(-1 - _LEVELS_BESIDE, -1))):
+        share = counts[end] / len(x)
+        if values[end] != 0 and share > _CUT and counts[end] > _PILED * counts[beside].max():
+            found.append((float(values[end]), float(share)))
+    return found
+
+
+def _bridged(x: Array, rows: Index) -> Array:
+    """x (N,) with lines through what lies beside some rows."""
+    others = np.delete(np.arange(len(x)), rows)
+    bridged = np.array(x)
+    bridged[rows] = np.interp(rows, others, x[others])
+    return bridged
+
+
+def _spikes(x: Array, log: Recorded) -> Index:
+    """Rows of the spikes of one column (N,): one or two samples far from both neighbours, which agree."""
+    none = np.zeros(0, dtype=np.intp)
+    steps = np.diff(x)
+    resolution = float(np.min(np.abs(steps)[steps != 0], initial=np.inf))
+    if len(steps) < 2 * _BESIDE or not np.isfinite(resolution):
+        return none  # it never changes, or there is too little of it
+    # what a step is beside the steps around it: a joint that moves fast makes large ones
+    trend = np.concatenate([steps[:_AWAY], 0.5 * (steps[: -2 * _AWAY] + steps[2 * _AWAY :]), steps[-_AWAY:]])
+    size = np.abs(steps - trend)
+    usual = max(float(np.median(size)) / 0.6745, 0.5 * resolution)
+    large = np.flatnonzero(size > 0.5 * _SPIKE * usual)
+    if len(large) == 0 or len(large) > 8 * _RARE * len(x):
+        return none
+    found: list[int] = []
+    for width in (1, 2):
+        # up at step k, down at step k + width: samples k + 1 … k + width
+        for k in large[np.isin(large + width, large)].tolist():
+            near = np.r_[steps[max(0, k - _BESIDE) : k], steps[k + width + 1 : k + width + 1 + _BESIDE]]
+            slope = float(np.median(near))
+            least = max(usual, float(np.median(np.abs(near - slope))) / 0.6745)
+            up, down = steps[k] - slope, steps[k + width] - slope
+            height = min(abs(up), abs(down))
+            away = abs(x[k + width + 1] - x[k] - (width + 1) * slope)
+            back = up * down < 0 and away < _BACK * height
+            if back and height > _SPIKE * least and _in_one_run(log, k, k + width + 1):
+                found += range(k + 1, k + width + 1)
+    rows = np.unique(np.array(found, dtype=np.intp))
+    return rows if len(rows) <= _RARE * len(x) else none
+
+
+def _in_one_run(log: Recorded, first: int, last: int) -> bool:
+    return any(run.start <= first and last < run.stop for run in log.runs)
+
+
+def _stuck(log: Recorded, j: int) -> list[tuple[int, int]]:
+    """First and last samples of stretches in which a joint's torque stands still by a fault, while the joint moves.
+
+    Zero is no stuck value: a drive may be off.
+    """
+    x, v = log.tau[:, j], log.v[:, j]
+    steps = np.diff(x)
+    same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut_off(log, j)])
+    for run in log.runs[1:]:
+        same[run.start - 1] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    if len(edges) == 0 or same.all():
+        return []
+    # the chance that a value is followed by the same: of the values that end a stretch, how many begin another
+    part = min(len(edges) / 2 / float((~same).sum()), 1 - 1e-9)
+    # so many equal steps one after the other come about by chance nowhere in the column
+    fewest = max(_FEWEST, int(np.ceil(np.log(_CHANCE / len(x)) / np.log(part))))
+    jump = 0.0 if part < _NEVER else _JUMP * float(np.median(np.abs(steps[~same]))) / 0.6745
+    found = []
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if last - first < fewest:
+            continue
+        let_go = x[first] != 0 and last < len(steps) and abs(steps[last]) > max(jump, TINY)
+        if (
+            let_go
+            and len(np.unique(x)) >= _LEVELS
+            and np.ptp(v[first : last + 1]) > 0
+            and np.abs(v[first : last + 1]).min() > 0
+        ):
+            found.append((first, last))
+    return found
