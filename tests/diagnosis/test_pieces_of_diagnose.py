@@ -50,6 +50,7 @@ class Answers:
             "found": [],
             "unlisted": None,
             "turned": False,
+            "carried": False,
             "unknown": False,
         }
         self.given = given | {"known": False, "moving": False} | of
@@ -74,6 +75,8 @@ class Answers:
             "Hypotheses": lambda evidence, jobs: nullcontext((evidence.name, jobs)),
             "best_account": self.best,
             "judge_reversals": self.reversals,
+            "account_with_load": self.loaded,
+            "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
         for name, part in parts.items():
@@ -108,6 +111,14 @@ class Answers:
             outcome=self.outcome("account"),
             unlisted=self.given["unlisted"],
         )
+
+    def loaded(self, whole: Evidence, account: Any, progress: Any, jobs: int | None) -> Any:
+        self.asked["carried"] = (whole.name, account.outcome.name, jobs)
+        if not self.given["carried"]:
+            return None
+        evidence = Evidence(name="loaded", rows=ROWS.copy())
+        other = SimpleNamespace(contacts=[], unlisted=None, evidence=None, outcome=None)
+        return evidence, other, self.outcome("with the load")
 
     def reversals(self, evidence: Evidence, outcome: Any, kept: Any, progress: Any) -> Any:
         self.asked["kept"] = kept
@@ -182,11 +193,21 @@ def test_a_run_that_moves_is_searched(
     assert answers.asked["kept"].tolist() == [[j + 1 != unlisted for j in range(3)]] * 4
     name = "turned" if turned else "account"
     assert (made.outcome.name, made.evidence.name) == (name, name) and made.strengths[0] == name
-    assert (made.reversals is not None) == turned
+    assert (made.reversals is not None) == turned and answers.asked["useful"] == (name, name)
+    assert answers.asked["carried"] == ("whole", "account", 2)
     model = ("with", *found, *(["push"] if contacts else []))
     assert made.model == model
     assert answers.asked["standing"] == (name, model, "errors", [] if unlisted is None else [unlisted])
     assert made.reasons == ["stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
+
+
+def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = SimpleNamespace(joint=1)
+    answers = Answers(monkeypatch, carried=True, found=["load"], contacts=[CONTACT], unlisted=law)
+    made = judged()
+    assert (made.outcome.name, made.evidence.name) == ("with the load", "loaded")
+    assert made.verdict == "effects_found" and made.unlisted is None and made.contacts == []
+    assert made.model == ("with", "load") and answers.asked["kept"].all()
 
 
 def test_what_moves_only_beside_its_events_is_told_to_the_search(monkeypatch: pytest.MonkeyPatch) -> None:

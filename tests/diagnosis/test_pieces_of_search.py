@@ -388,6 +388,23 @@ class TestOutcomes:
             ("ab all", "all ab"),
         ]
 
+    def test_effects_beside_which_the_others_leave_no_more_go_the_worst_first(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(searching, "lead", lambda others, after: 0.0)
+        nothing: Any = None
+
+        def kept(times: dict[tuple[str, str], float], *names: str) -> str:
+            monkeypatch.setattr(
+                searching, "times_enough", lambda e, others, after: times.get((others, after), 1.0)
+            )
+            return "".join(f.shape for f in searching.useful(nothing, self.outcome(*names)).found)
+
+        assert kept({}, "a", "b", "c") == "abc" and kept({}) == ""
+        assert kept({("bc", "all"): -1.0, ("ac", "all"): -2.0}, "a", "b", "c") == "ac"
+        assert kept({("ac", "all"): 0.0, ("c", "ac"): -1.0}, "a", "b", "c") == "c"
+        assert kept({("", "all"): -1.0}, "a") == ""
+
     def test_effects_at_a_joint_are_taken_away_and_the_others_fitted_again(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -24,7 +24,7 @@ def test_a_companion_that_removes_little_and_what_hardly_exceeds_the_baseline_ar
 
 def test_what_has_no_bounds_of_its_own_counts_always() -> None:
     assert (Bin(8, 6).least_share, Bin(8, 6).least_times) == (0.0, 0.0)
-    assert probability.bin_of(0.0, 0.0) == probability.EFFECTS[-1]
+    assert probability.bin_of(0.0, 0.0) == probability.bin_of(0.1, -0.5) == probability.EFFECTS[-1]
 
 
 def test_what_was_named_is_counted_as_right_only_if_it_was_there(monkeypatch: pytest.MonkeyPatch) -> None:

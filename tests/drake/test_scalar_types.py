@@ -43,7 +43,7 @@ ARM, SCARA = load_arm("three_axis"), load_arm("scara")
 PARAMETERS = {
     name: values
     for name, values in EFFECT_PARAMETERS.items()
-    if not EFFECTS[name].sensor and name != "external_torque"
+    if not EFFECTS[name].sensor and EFFECTS[name].simulated
 }
 PARAMETERS["transmission_coupling"] = PARAMETERS["transmission_coupling"] | {"coulomb": 0.0}
 WHOLE = ("payload", "gravity_tilt", "external_contact")
@@ -161,7 +161,7 @@ def test_a_diagram_with_it_can_be_cloned(name):
 
 
 def test_every_effect_but_the_sensors_has_a_system():
-    acting = {name for name, kind in EFFECTS.items() if not kind.sensor and name != "external_torque"}
+    acting = {name for name, kind in EFFECTS.items() if not kind.sensor and kind.simulated}
     assert acting <= set(PARAMETERS)
     with pytest.raises(ModelError, match="effect torque_offset: falsifies the record"):
         EffectTorque(ARM, "torque_offset", 1, {"offset": 0.1})

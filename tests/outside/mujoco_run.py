@@ -5,6 +5,7 @@ Effects are plain dictionaries, named as in ``diagnosis.json``, joints from 1:
     {"name": "coulomb_friction", "joint": 2, "level": 0.8}
     {"name": "external_contact", "body": 2, "start": 3.0, "end": 4.5, "force": [0, 20, 0], "smooth": True}
     {"name": "external_torque", "joint": 1, "start": 3.0, "end": 3.4, "torque": 2.0, "smooth": True}
+    {"name": "carried_load", "mass": 1.0, "com": [0, 0, 0.1], "intervals": [(3.0, 8.0), (12.0, 15.0)]}
     {"name": "unlisted", "joint": 2, "law": lambda t, q, v: 0.5 * np.cos(2 * q[0]) * v[1]}
 
 MuJoCo's own where it has one (``frictionloss``, ``damping``, ``armature``, ``stiffness``, tendons, ``xfrc_applied``);
@@ -170,6 +171,12 @@ def _load(model: Any, mass: float, com: Array, radius: float) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
+def _last_body(model: Any) -> tuple[Any, ...]:
+    """Mass, centre, principal inertia and axes of the last link."""
+    fields = (model.body_mass, model.body_ipos, model.body_inertia, model.body_iquat)
+    return tuple(np.array(field[-1]) for field in fields)
+
+
 class _Acting:
     """An effect that acts step by step."""
 
@@ -178,6 +185,19 @@ class _Acting:
         self.j = (e.get("joint") or 1) - 1
         self.dry = float(model.dof_frictionloss[self.j])
         self.z, self.last = 0.0, None
+        self.loaded = False
+        if e["name"] == "carried_load":
+            self.bodies = [_last_body(model)]
+            _load(model, e["mass"], np.asarray(e["com"], dtype=float), float(e.get("radius", 0.03)))
+            self.bodies.append(_last_body(model))
+            self._carry(False)
+
+    def _carry(self, loaded: bool) -> None:
+        fields = ("body_mass", "body_ipos", "body_inertia", "body_iquat")
+        for field, value in zip(fields, self.bodies[loaded], strict=True):
+            getattr(self.model, field)[-1] = value
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self.loaded = loaded
 
     def apply(self, data: Any, t: float) -> None:
         e, j, v = self.e, self.j, float(data.qvel[self.j])
@@ -208,6 +228,10 @@ class _Acting:
             moved = 0.0 if self.last is None else q - self.last
             self.z, self.last = float(np.clip(self.z + moved, -e["width"], e["width"])), q
             data.qfrc_applied[j] -= e["level"] * self.z / e["width"]
+        elif name == "carried_load":
+            loaded = any(a <= t < b for a, b in e["intervals"])
+            if loaded != self.loaded:
+                self._carry(loaded)
         elif name == "unlisted":
             data.qfrc_applied[j] -= float(e["law"](t, data.qpos, data.qvel))
 

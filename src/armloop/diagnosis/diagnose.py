@@ -16,13 +16,14 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import best_account
 from armloop.diagnosis.alternatives import why_alike
+from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
 from armloop.diagnosis.reasons import Standing, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome, Strength, strengths
+from armloop.diagnosis.search import Found, Outcome, Strength, strengths, useful
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
@@ -144,7 +145,7 @@ class Diagnosis:
                 {
                     **added.to_dict(),
                     "share": found.share,
-                    "when": "always" if found.always else "changed",
+                    "when": "event" if added.effect.event else "always" if found.always else "changed",
                     "probability": probability.of_effect(found.share, strength.times),
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
@@ -264,14 +265,18 @@ def diagnose(
     progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
     with Hypotheses(whole, jobs) as panel:
         account = best_account(whole, contacts, not too_still(whole), progress, panel)
-    contacts, evidence = account.contacts, account.evidence
-    outcome, unlisted = account.outcome, account.unlisted
+    evidence, outcome = account.evidence, account.outcome
+    loaded = account_with_load(whole, account, progress, jobs)
+    if loaded is not None:
+        evidence, account, outcome = loaded
+    contacts, unlisted = account.contacts, account.unlisted
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
     if unlisted is not None:
         kept[:, unlisted.joint - 1] = False
     turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
+    outcome = useful(evidence, outcome)
     named = bool(outcome.found or contacts)
     verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
     added = [*outcome.added(), *(contact.added for contact in contacts)]

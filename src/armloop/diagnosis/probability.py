@@ -35,7 +35,7 @@ EVENT, UNLISTED = Bin(21, 20), Bin(23, 23)
 
 def bin_of(share: float, times: float) -> Bin:
     """What is counted together with an effect that removes this share, and so many times the baseline."""
-    return next(each for each in EFFECTS if share >= each.least_share and times >= each.least_times)
+    return next((b for b in EFFECTS if share >= b.least_share and times >= b.least_times), EFFECTS[-1])
 
 
 def of_effect(share: float, times: float) -> float:

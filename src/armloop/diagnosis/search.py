@@ -255,6 +255,17 @@ def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
     return found
 
 
+def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
+    """The outcome without effects that, beside the others, remove no held-out error; the worst first."""
+    given = strengths(evidence, outcome)
+    worst = min(range(len(given)), key=lambda k: given[k].times, default=None)
+    if worst is None or given[worst].times > 0:
+        return outcome
+    others = [f for k, f in enumerate(outcome.found) if k != worst]
+    fitted = _known(evidence, others).fit
+    return useful(evidence, Outcome(others, outcome.before, fitted, outcome.residual))
+
+
 def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outcome:
     """The outcome without the effects that act on a joint (0-based) above all; the others are fitted again."""
     kept = [f for f in outcome.found if not _acts_mainly_on(evidence, f.effect, f.shape, joint)]

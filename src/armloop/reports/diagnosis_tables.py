@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from armloop.robot.arm import Arm
 
 _WIDTH = 110
+#: Parameters that say when something was, which the sentences tell.
+_WHEN = ("picked_up", "put_down", "posture")
 
 
 def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
@@ -26,7 +28,8 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
     every = zip(diagnosis.outcome.found, diagnosis.outcome.added(), diagnosis.strengths, strict=True)
     for found, added, strength in every:
         chance = probability.of_effect(found.share, strength.times)
-        for k, (key, e) in enumerate(added.parameters.items()):
+        known = {key: e for key, e in added.parameters.items() if key not in _WHEN}
+        for k, (key, e) in enumerate(known.items()):
             first = [effect_label(found.effect), "sensor" if found.effect.sensor else "arm"]
             label, where = first if k == 0 else ["", ""]
             share, likely = (percent(found.share), percent(chance)) if k == 0 else ("", "")

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pydrake.multibody.plant import MultibodyPlant
 
+from armloop.drake import EffectTorque
 from armloop.drake.experiments.speed_mode import SpeedModeArm
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import EFFECTS, UndeclaredEffect, realise
@@ -14,7 +15,7 @@ from armloop.experiment.excitation import FourierReference
 from armloop.laws.effects import EFFECTS as LISTED
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor, tool_jacobian
-from armloop.util.errors import ScenarioError
+from armloop.util.errors import ModelError, ScenarioError
 
 FRICTION = tuple(JointFriction(1.3 * f, f, 0.1, 1.0) for f in (0.5, 0.7, 0.6))
 IDEAL = Instruments(encoder_counts=0, torque_noise=0.0)
@@ -269,6 +270,12 @@ def test_refuses_a_joint_the_arm_does_not_have(arm):
 
 
 def test_every_effect_of_the_table_is_here_but_a_torque_from_outside_on_one_joint():
-    assert set(LISTED) - set(EFFECTS) == {"external_torque"}
+    assert set(LISTED) - set(EFFECTS) == {"carried_load", "external_torque"}
     with pytest.raises(ScenarioError, match="the plant cannot have it"):
         UndeclaredEffect("external_torque", 1, {"start": 1.0, "end": 2.0, "torque": 1.0})
+
+
+@pytest.mark.parametrize(("name", "joint"), [("carried_load", None), ("external_torque", 1)])
+def test_what_is_found_in_logs_alone_is_no_system(name: str, joint: int | None) -> None:
+    with pytest.raises(ModelError, match=f"effect {name} is found in logs alone; no system can have it"):
+        EffectTorque(load_arm("three_axis"), name, joint, {"start": 1.0, "end": 2.0, "torque": 1.0})

@@ -89,6 +89,7 @@ OTHERS = {
     "encoder_offset": SHIFT,
     "external_contact": CONTACT,
     "external_torque": {"start": 3.0, "end": 4.5, "torque": -2.0},
+    "carried_load": {**PAYLOAD, "picked_up": [1.0, 3.0], "put_down": [2.0, 4.5], "posture": [0.0] * 6},
 }
 #: Effects whose columns are a slope: their torque is columns times coefficients for small parameters only.
 REFINED = tuple(n for n, kind in EFFECTS.items() if any(p.shape == "continuous" for p in kind.parameters))
@@ -102,9 +103,9 @@ def build(name: str) -> Effect:
 
 def test_the_published_effects_are_there():
     known = {*LAWS, *OTHERS}
-    assert known <= set(EFFECTS) and len(known) == 21
+    assert known <= set(EFFECTS) and len(known) == 22
     assert all(EFFECTS[name].joint_wise for name in LAWS)
-    whole = {"payload", "gravity_tilt", "time_delay", "external_contact"}
+    whole = {"payload", "gravity_tilt", "time_delay", "external_contact", "carried_load"}
     assert {name for name in known if not EFFECTS[name].joint_wise} == whole
     sensors = {"torque_offset", "torque_gain", "encoder_offset", "time_delay"}
     assert {name for name in known if EFFECTS[name].sensor} == sensors
@@ -291,7 +292,8 @@ def test_what_a_motion_does_not_determine_has_no_standard_error(context):
 def test_standard_errors_follow_from_the_covariance(name, context):
     kind = build(name)
     rng = np.random.default_rng(6)
-    x = {"payload": np.array([0.8, 0.1, -0.05, 0.07, 0.01])}.get(name, rng.uniform(0.5, 1.0, kind.complexity))
+    body = np.array([0.8, 0.1, -0.05, 0.07, 0.01])
+    x = body if name in ("payload", "carried_load") else rng.uniform(0.5, 1.0, kind.complexity)
     shape = 7.0
     if name in ("torque_ripple", "transmission_coupling"):
         x = x[:-1]  # the order and the ratio are chosen from a list

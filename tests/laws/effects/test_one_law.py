@@ -38,8 +38,8 @@ WARMING = [name for name in ACTING if EFFECTS[name].of_time]
 LASTING = [name for name in ACTING if name not in (*EVENTS, *WARMING)]
 REMEMBERING = ["presliding_hysteresis"]
 
-#: A torque from outside on one joint is found in logs; Drake's systems have none.
-REALISED = [name for name in ACTING if name != "external_torque"]
+#: A torque from outside on one joint and a load in intervals are found in logs; Drake's systems have none.
+REALISED = [name for name in ACTING if EFFECTS[name].simulated]
 
 BARE = model_of(ARM)
 
@@ -101,7 +101,8 @@ def check(found: np.ndarray, name: str, atol: float = 1e-9) -> None:
 
 
 def test_every_effect_is_here():
-    assert sorted(EVENTS) == ["external_contact", "external_torque"]
+    assert sorted(EVENTS) == ["carried_load", "external_contact", "external_torque"]
+    assert sorted({*ACTING} - {*REALISED}) == ["carried_load", "external_torque"]
     assert "friction_drift" in WARMING and not {*LASTING, *EVENTS} - {*ACTING}
     memory = {name for name in ACTING if EFFECTS[name].memory}
     assert memory == {*EVENTS, *WARMING, *REMEMBERING}

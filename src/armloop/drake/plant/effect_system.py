@@ -18,7 +18,7 @@ from armloop.laws.effects import Value, effect_kind
 from armloop.laws.effects.base import number
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, ModelError
 from armloop.util.given import require
 
 
@@ -71,6 +71,8 @@ def EffectTorque_(T: type) -> Any:
             self._arguments = arm, name, joint, dict(parameters)
             self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
             self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
+            if not effect_kind(name).simulated:
+                raise ModelError(f"effect {name} is found in logs alone; no system can have it")
             event = effect_kind(name).role == "event"
             self._interval = (number(parameters["start"]), number(parameters["end"])) if event else None
             n = self._n = arm.n

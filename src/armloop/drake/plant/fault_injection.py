@@ -29,7 +29,7 @@ from armloop.util.errors import ModelError, ScenarioError
 Fault = Callable[[Array, Array, Array], tuple[Array, Array]]
 """What a sensor makes of q and tau (N, n), recorded at times (N,)."""
 
-EFFECTS: tuple[str, ...] = tuple(name for name in LISTED if name != "external_torque")
+EFFECTS: tuple[str, ...] = tuple(name for name, kind in LISTED.items() if kind.simulated)
 """The listed effects that can be put into a plant; a user's own can, too. A torque from outside on one joint cannot."""
 
 

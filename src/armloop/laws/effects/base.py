@@ -143,6 +143,7 @@ class Effect(ABC):
         load: whether its torque passes the joint's bearings and gears, so that friction grows with it.
         memory: whether it depends on the path or the time, not only on q, v and vdot.
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
+        simulated: whether Drake's systems can have it; else it is found in logs alone.
         rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
         fault_order: of sensors: a record is falsified by the lower ones first.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
@@ -164,6 +165,7 @@ class Effect(ABC):
     searched: ClassVar[bool] = True
     memory: ClassVar[bool] = False
     of_time: ClassVar[bool] = False
+    simulated: ClassVar[bool] = True
     rubs: ClassVar[bool] = False
     fault_order: ClassVar[int] = 9
     alike: ClassVar[Mapping[str, str]] = {}

@@ -21,6 +21,7 @@ class ExternalTorque(Effect):
 
     name = "external_torque"
     role = "event"
+    simulated = False
     parameters = (
         Parameter("start", "s", least=0.0),
         Parameter("end", "s"),

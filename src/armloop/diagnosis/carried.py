@@ -1,0 +1,212 @@
+"""Carried loads: a payload that is there in parts of a run only, as a hidden process of two states.
+
+Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
+and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
+regressed. It is looked for where the effects found leave more than the model's own shortcomings, and taken if what is then
+left is far less: what comes and goes is no law of the motion, and a search for laws would find the nearest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from armloop.data.signals import smooth
+from armloop.diagnosis.account import Account, best_account
+from armloop.diagnosis.contacts import find_contacts, without
+from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.fit import Shape
+from armloop.diagnosis.judgement import MULTIPLE, gain
+from armloop.diagnosis.reasons import too_still
+from armloop.diagnosis.search import Found, Outcome, clear, pruned
+from armloop.diagnosis.trials import Hypotheses, Known
+from armloop.diagnosis.unlisted import FAR_LESS
+from armloop.laws.effects.carried_load import CarriedLoad, Interval
+from armloop.laws.effects.payload import Payload
+from armloop.regression.embedded import solve
+from armloop.regression.moments import Moments
+from armloop.util.arrays import Array, Index, Mask
+from armloop.util.progress import Progress
+
+#: Price of a change, as log-likelihood: some ten samples of a torque three times the model's shortcomings.
+_PRICE = 40.0
+#: A load that is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
+_LEAST, _SHORTEST = 0.05, 0.4
+_ROUNDS = 30
+#: Load and what is beside it are found in turn so many times more.
+_TURNS = 2
+#: Seconds over which the residual's size is averaged to begin with.
+_WINDOW = 0.5
+
+
+def account_with_load(
+    whole: Evidence, account: Account, progress: Progress, jobs: int | None
+) -> tuple[Evidence, Account, Outcome] | None:
+    """The account of a run in which a load is carried at times; None where that leaves no far less.
+
+    Args:
+        account: that without such a load.
+
+    Returns:
+        The run's samples that count, what happened beside the load, and the outcome with it.
+    """
+    if not _much_is_left(account):
+        return None
+    progress("whether a load was carried in parts of the run")
+    found = find_carried(without(whole, []))
+    if found is None:
+        return None
+    load, unknown = found
+    plain = without(whole.only(whole.rows & ~unknown), [])
+    known = Known.of(plain, [load], [Shape.fixed(0.0)])
+    if not load.plausible(whole.model.arm, known.fit.parameters[0]):
+        return None
+    other = _beside(whole, known, unknown, progress, jobs)
+    for _ in range(_TURNS if other.outcome.found else 0):
+        # what was found beside the load had a part in it; the load is regressed with that, and the search made anew
+        before = {effect.place for effect in other.outcome.after.effects}
+        effects, shapes = (
+            [load, *other.outcome.after.effects],
+            [Shape.fixed(0.0), *other.outcome.after.shapes],
+        )
+        known = Known.of(plain.only(other.evidence.rows), effects, shapes)
+        other = _beside(whole, known, unknown, progress, jobs)
+        if before == {effect.place for effect in other.outcome.after.effects}:
+            break
+    left, left_so = (each.left(each.remaining()) - float(each.whole.rows.sum()) for each in (account, other))
+    if left_so > (1 - FAR_LESS) * left:
+        return None
+    evidence = whole.only(other.evidence.rows)
+    nothing, alone = Known.of(evidence), Known.of(evidence, [load], [Shape.fixed(0.0)])
+    effects, shapes = [load, *other.outcome.after.effects], [Shape.fixed(0.0), *other.outcome.after.shapes]
+    bare = nothing.fit.score
+    share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
+    every = [Found(load, Shape.fixed(0.0), min(share, 1.0)), *other.outcome.found]
+    together = Outcome(every, nothing.fit, Known.of(evidence, effects, shapes).fit, nothing.residual)
+    return evidence, other, clear(evidence, pruned(evidence, together))
+
+
+def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
+    """The account of a run by a model that has the load, the first of what is known."""
+    again = Evidence.of(whole.model.with_effects(known.added()[:1]), whole.samples, list(whole.asked))
+    if again.unknown is not None:
+        unknown = unknown | again.unknown
+    again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
+    with Hypotheses(again, jobs) as panel:
+        contacts = find_contacts(again, again.residual([]))
+        return best_account(again, contacts, not too_still(again), progress, panel)
+
+
+def _much_is_left(account: Account) -> bool:
+    """Whether a law was stated, or some joint's error is a multiple of the baseline."""
+    score = account.outcome.after.score
+    return account.unlisted is not None or bool((score.energy >= MULTIPLE**2 * score.rows).any())
+
+
+def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
+    """The load that is carried at times, and (N, n) samples of which its coming and going leaves nothing to be said.
+
+    None where no load explains anything, or it is there all the time.
+    """
+    load, motion = Payload(), evidence.samples.motion
+    # what the model leaves on the worst of its own data is no load's
+    weight = evidence.rows[evidence.kept] / (evidence.scale * np.sqrt(evidence.variation))
+    X = evidence.columns(load, 0.0) * weight[:, :, None]
+    y = evidence.residual([])[evidence.kept] * weight
+    run = np.searchsorted(motion.starts, evidence.kept, side="right")
+    time = motion.time[evidence.kept]
+    best: Mask | None = None
+    theta, most = np.zeros(X.shape[2]), 0.0
+    for start in _starts(y, time, run):
+        carried = start
+        for _ in range(_ROUNDS):
+            if carried.sum() < 2 * X.shape[2]:
+                break
+            beta, _, _ = solve(
+                Moments.of(X[carried].reshape(-1, X.shape[2]), y[carried].ravel()), [load], [X.shape[2]]
+            )
+            gains = 0.5 * (y**2 - (y - X @ beta) ** 2).sum(axis=1)
+            before, carried = carried, _likeliest(gains, run)
+            if (before == carried).all():
+                break
+        if carried.any() and (total := _worth(gains, carried, run)) > most:
+            best, theta, most = carried, beta, total
+    if best is None or not _LEAST < best.mean() < 1 - _LEAST:
+        return None
+    left = evidence.residual([])
+    with_load = left - smooth(evidence.samples, load.columns(evidence.context, 0.0) @ theta)
+    better = ((left**2 - with_load**2) / evidence.scale**2).sum(axis=1)
+    intervals, unknown = _intervals(evidence, best, run, better)
+    edge = max(evidence.samples.period, evidence.samples.reach)
+    return CarriedLoad(intervals=intervals, error=edge), np.broadcast_to(unknown[:, None], left.shape)
+
+
+def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
+    """(K,) samples that may carry the load: all, and those where the averaged residual is large, or is not."""
+    size = (y**2).sum(axis=1)
+    sums = np.concatenate([[0.0], np.cumsum(size)])
+    first = np.maximum(np.searchsorted(time + 1e9 * run, time + 1e9 * run - _WINDOW), 0)
+    last = np.searchsorted(time + 1e9 * run, time + 1e9 * run + _WINDOW, side="right")
+    mean = (sums[last] - sums[first]) / (last - first)
+    large = mean > np.median(mean)
+    return [np.ones(len(y), dtype=bool), large, ~large]
+
+
+def _likeliest(gains: Array, run: Index) -> Mask:
+    """(K,) the sequence of the largest total gain, less the price of each change within a run (Viterbi)."""
+    came_from = np.zeros((len(gains), 2), dtype=bool)
+    without_load, with_load = 0.0, 0.0
+    fresh = np.diff(run, prepend=-1) != 0
+    for k, (own, first) in enumerate(zip(gains.tolist(), fresh.tolist(), strict=True)):
+        price = 0.0 if first else _PRICE
+        put_down, picked_up = with_load - price > without_load, without_load - price > with_load
+        came_from[k] = put_down, not picked_up
+        without_load, with_load = (
+            with_load - price if put_down else without_load,
+            (without_load - price if picked_up else with_load) + own,
+        )
+    carried = np.zeros(len(gains), dtype=bool)
+    state = with_load > without_load
+    for k in range(len(gains) - 1, -1, -1):
+        carried[k] = state
+        state = bool(came_from[k, int(state)])
+    return carried
+
+
+def _worth(gains: Array, carried: Mask, run: Index) -> float:
+    """What a sequence explains, less the price of its changes."""
+    changes = (np.diff(carried.astype(np.int8)) != 0) & (np.diff(run) == 0)
+    return float(gains[carried].sum()) - _PRICE * float(changes.sum())
+
+
+def _intervals(evidence: Evidence, carried: Mask, run: Index, better: Array) -> tuple[list[Interval], Mask]:
+    """When the load is carried, and (N,) samples around its coming and going.
+
+    Between two samples that count, where the arm may rest for a while, it changes where that explains most of all samples.
+
+    Args:
+        better: (N,) squared error that the load removes of each sample.
+    """
+    motion, kept, found = evidence.samples.motion, evidence.kept, []
+    unknown = np.zeros(motion.samples, dtype=bool)
+    reach = max(1, round(evidence.samples.reach / evidence.samples.period))
+    for number, rows in enumerate(motion.runs(), 1):
+        mine = np.flatnonzero(run == number)
+        ends = []
+        for edge in np.flatnonzero(
+            np.diff(np.concatenate([[0], carried[mine].astype(np.int8), [0]]))
+        ).tolist():
+            if edge in (0, len(mine)):  # it is carried from the run's start, or to its end
+                ends.append(rows.start if edge == 0 else rows.stop - 1)
+                continue
+            low, high = int(kept[mine[edge - 1]]), int(kept[mine[edge]])
+            # before it is put down, and after it is picked up, the load explains what is left
+            sums = np.cumsum(better[low : high + 1]) * (-1 if carried[mine[edge]] else 1)
+            ends.append(low + int(np.argmax(sums)))
+            unknown[max(rows.start, low - reach) : min(rows.stop, high + reach + 1)] = True
+        for begin, end in zip(ends[::2], ends[1::2], strict=True):
+            start, stop = float(motion.time[begin]), float(motion.time[end])
+            if stop - start >= _SHORTEST:
+                found.append(Interval(start, stop, tuple(motion.q[begin].tolist())))
+    return found, unknown

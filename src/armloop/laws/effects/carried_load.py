@@ -1,0 +1,117 @@
+"""Carried load: a payload that the arm picks up and puts down within a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from armloop.data.motion import Motion
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.laws.effects.events import during
+from armloop.laws.effects.payload import Payload
+from armloop.robot.arm import Arm
+from armloop.util.arrays import Mask
+
+_LOAD = Payload()
+
+
+@dataclass(frozen=True)
+class Interval:
+    """When a load is carried, s; ``posture`` (n,) of the joints at its start says in which log."""
+
+    start: float
+    end: float
+    posture: tuple[float, ...]
+
+
+class CarriedLoad(Effect):
+    """tau += the torque of a :class:`Payload` in each interval from ``picked_up`` to ``put_down``, none outside of them.
+
+    What is carried is a fact of one run, and when is known from its record alone: no controller supplies it. The
+    intervals are found by :mod:`armloop.diagnosis.carried`.
+
+    Args:
+        intervals: when it is carried.
+        error: of their ends, s.
+    """
+
+    name = "carried_load"
+    scope = "arm"
+    role = "event"
+    parameters = Payload.parameters
+    needs_model = False
+    complexity = Payload.complexity
+    simulated = False
+    load = True
+    memory = True
+
+    def __init__(
+        self,
+        joint: int | None = None,
+        other_joint: int | None = None,
+        intervals: Sequence[Interval] = (),
+        error: float = 0.0,
+    ) -> None:
+        super().__init__(joint, other_joint)
+        self.intervals, self.error = tuple(intervals), error
+
+    def columns(self, context: Context, shape: float) -> Array:
+        return _LOAD.columns(context, shape) * _during(context.motion, self.intervals)[:, None, None]
+
+    def start(self, beta: Array) -> Array:
+        return _LOAD.start(beta)
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        return _LOAD.embed(x)
+
+    def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
+        carried = _during(context.motion, _intervals(parameters, context.arm.n))
+        return _LOAD.torque(context, parameters) * carried[:, None]
+
+    @classmethod
+    def fault(cls, parameters: Mapping[str, Any]) -> str:
+        first, last = (np.atleast_1d(parameters.get(key, [])) for key in ("picked_up", "put_down"))
+        late = len(first) != len(last) or len(first) == 0 or (last <= first).any()
+        return "each put_down must come after its picked_up, as many of them" if late else ""
+
+    def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
+        ends = {"picked_up": [i.start for i in self.intervals], "put_down": [i.end for i in self.intervals]}
+        posture = [q for i in self.intervals for q in i.posture]
+        unit = arm.joints[0].position_unit if len({j.position_unit for j in arm.joints}) == 1 else "rad or m"
+        return {
+            **_LOAD.estimates(arm, x, covariance, shape),
+            **{key: Estimate(times, [self.error] * len(times), "s") for key, times in ends.items()},
+            "posture": Estimate(posture, [0.0] * len(posture), unit),
+        }
+
+    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
+        return _LOAD.plausible(arm, parameters)
+
+    def sentence(self, parameters: dict[str, Estimate]) -> str:
+        first, last = (np.atleast_1d(np.asarray(parameters[key].value)) for key in ("picked_up", "put_down"))
+        mass, com = parameters["mass"], np.asarray(parameters["com"].value)
+        at = ", ".join(f"{x:.3f}" for x in com)
+        when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(first, last, strict=True))
+        return (
+            f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m, "
+            f"carried from {when} s"
+        )
+
+
+def _during(motion: Motion, intervals: Sequence[Interval]) -> Mask:
+    """(N,) samples in which the load is carried."""
+    rows = np.zeros(motion.samples, dtype=bool)
+    for own in intervals:
+        rows |= during(motion, {"start": own.start, "end": own.end, "posture": list(own.posture)})
+    return rows
+
+
+def _intervals(parameters: Mapping[str, Value], n: int) -> list[Interval]:
+    first, last = (np.atleast_1d(np.asarray(parameters[key])) for key in ("picked_up", "put_down"))
+    posture = np.asarray(parameters["posture"], dtype=float).reshape(-1, n)
+    return [
+        Interval(float(a), float(b), tuple(q)) for a, b, q in zip(first, last, posture.tolist(), strict=True)
+    ]

@@ -1,0 +1,175 @@
+"""A load that is picked up and put down: its mass, where its centre is, and when; and what is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess
+from armloop.diagnosis import carried as carrying
+from armloop.diagnosis import diagnose
+from armloop.diagnosis.carried import find_carried
+from armloop.diagnosis.evidence import Evidence
+from armloop.identification.scoring import score
+from armloop.laws.effects import Context, effect, hypotheses
+from armloop.laws.effects.payload import Payload
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.reports.findings import findings
+from armloop.robot.kinematics import nominal_parameters
+
+COULOMB, VISCOUS = (0.3, 0.4, 0.2), (0.8, 1.0, 0.5)
+LOAD = {"mass": 0.4, "com": [0.03, -0.02, 0.05], "own_inertia": 0.0}
+TIMES = [(2.5, 7.0), (11.0, 16.0), (21.0, 24.5)]
+
+
+def run(
+    seed: int, loads: list[tuple[float, float]], seconds: float = 30.0, load: dict[str, Any] | None = None
+) -> MotionLog:
+    """A measured run in which the load is carried in intervals."""
+    motion, arm = fourier_motion(seconds, 125.0, seed), three_axis()
+    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + motion.v * VISCOUS
+    tau = tau + np.tanh(motion.v / 1e-4) * COULOMB
+    extra = Payload().torque(Context(arm, motion), load or LOAD)
+    for first, last in loads:
+        inside = (motion.time >= first) & (motion.time < last)
+        tau[inside] += extra[inside]
+    return replace(measured(motion, tau, seed, 0.01), name=f"run{seed}")
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    terms = tuple(
+        (FrictionTerm("sign", f), FrictionTerm("viscous", c)) for f, c in zip(COULOMB, VISCOUS, strict=True)
+    )
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
+    samples = preprocess([run(90, [])], bare.conditioning)
+    return replace(bare, baseline=score(bare, samples).moving)
+
+
+def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
+    return Evidence.of(model, preprocess(list(logs), model.conditioning), hypotheses(model.arm))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_load_carried_at_times_is_found_with_its_mass_and_when(
+    model: ReconstructedModel, seed: int
+) -> None:
+    found = diagnose(model, [run(seed, TIMES)], jobs=1)
+    assert found.verdict == "effects_found" and found.named == [("carried_load", None)]
+    (entry,) = found.to_dict()["effects"]
+    p = entry["parameters"]
+    assert entry["when"] == "event" and entry["share"] > 0.95 and entry["alternatives"] == []
+    assert abs(p["mass"]["value"] - 0.4) < max(4 * p["mass"]["std_error"], 0.01)
+    com = np.abs(np.array(p["com"]["value"]) - LOAD["com"])
+    assert (com < np.maximum(4 * np.array(p["com"]["std_error"]), 0.005)).all()
+    np.testing.assert_allclose(
+        np.column_stack([p["picked_up"]["value"], p["put_down"]["value"]]), TIMES, atol=0.1
+    )
+    error = found.errors()
+    assert max(np.divide(error["after"], error["noise_floor"])) < 2
+    assert max(np.divide(error["before"], error["noise_floor"])) > 3
+    (words,) = findings(found)
+    assert "kg on the last link" in words and "carried from 2.5 to 7.0, 11.0 to 16.0, 21.0 to 24.5 s" in words
+
+
+def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_supplies_it(
+    model: ReconstructedModel,
+) -> None:
+    log, other = run(1, TIMES), run(2, [])
+    augmented = diagnose(model, [log], jobs=1).model
+    motions = [preprocess([one], model.conditioning).motion for one in (log, other)]
+    added = [augmented.predict(motion) - model.predict(motion) for motion in motions]
+    inside = np.logical_or.reduce(
+        [(motions[0].time > a + 0.1) & (motions[0].time < b - 0.1) for a, b in TIMES]
+    )
+    assert np.abs(added[0][inside]).max() > 0.5 and not added[1].any()
+    q, v, vdot = motions[0].q[200], motions[0].v[200], motions[0].vdot[200]
+    np.testing.assert_array_equal(augmented.feedforward(q, v, vdot), model.feedforward(q, v, vdot))
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int) -> None:
+    """The load that is found first has soaked up some of it."""
+    log = run(seed, TIMES)
+    more = np.tanh(fourier_motion(30.0, 125.0, seed).v / 1e-4) * [0.0, 0.5, 0.0]
+    found = diagnose(model, [replace(log, tau=log.tau + more)], jobs=1)
+    assert found.named == [("carried_load", None), ("coulomb_friction", 2)]
+    mass, level = (found.outcome.added()[k].parameters[key] for k, key in enumerate(("mass", "level")))
+    assert abs(float(np.asarray(mass.value)) - 0.4) < 0.01
+    assert abs(float(np.asarray(level.value)) - 0.5) < 0.01
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_load_that_is_there_all_the_time_or_never_is_not_carried(
+    model: ReconstructedModel, seed: int
+) -> None:
+    assert diagnose(model, [run(seed, [(0.0, 99.0)])], jobs=1).named == [("payload", None)]
+    assert diagnose(model, [run(seed, [])], jobs=1).verdict == "no_effect"
+    assert find_carried(evidence(model, run(seed, []))) is None
+    assert find_carried(evidence(model, run(seed, [(0.0, 99.0)]))) is None
+
+
+def test_a_load_in_one_of_two_logs_is_carried_in_that(model: ReconstructedModel) -> None:
+    found = find_carried(evidence(model, run(5, [], 20.0), run(6, [(0.0, 99.0)], 20.0)))
+    assert found is not None
+    load, unknown = found
+    (interval,) = load.intervals
+    assert interval.end - interval.start > 19.5 and not unknown.any()
+    samples = preprocess([run(5, [], 20.0), run(6, [], 20.0)], model.conditioning)
+    columns = load.columns(Context(model.arm, samples.motion), 0.0)
+    second = samples.motion.starts[1]
+    assert not columns[:second].any() and columns[second:].any(axis=(1, 2)).all()
+
+
+def test_the_likeliest_sequence_is_that_of_the_largest_total(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against every sequence there is, in two runs."""
+    monkeypatch.setattr(carrying, "_PRICE", 2.0)
+    rng = np.random.default_rng(8)
+    run = np.array([1] * 5 + [2] * 4)
+    for _ in range(50):
+        gains = 2 * rng.normal(size=9)
+        every = [np.array(states, dtype=bool) for states in product((False, True), repeat=9)]
+        most = max(carrying._worth(gains, states, run) for states in every)
+        found = carrying._likeliest(gains, run)
+        assert carrying._worth(gains, found, run) == pytest.approx(most)
+    # a change between two runs costs nothing
+    np.testing.assert_array_equal(carrying._likeliest(np.array([-0.1] * 5 + [0.1] * 4), run), run == 2)
+
+
+def test_what_is_short_is_none_and_a_change_within_rest_is_where_it_explains_most(
+    model: ReconstructedModel,
+) -> None:
+    own = evidence(model, run(1, []))
+    kept, motion = own.kept, own.samples.motion
+    # no sample counts from 10 to 12 s, as where the arm rests
+    count = (motion.time[kept] < 10) | (motion.time[kept] > 12)
+    rows = own.rows.copy()
+    rows[kept[~count]] = False
+    own = own.only(rows)
+    time = motion.time[own.kept]
+    run_of = np.ones(len(time), dtype=np.intp)
+    loaded = (time > 10) | ((time > 4) & (time < 4.3))
+    better = np.where(motion.time > 11.3, 1.0, -1.0)
+    (interval,), unknown = carrying._intervals(own, loaded, run_of, better)
+    assert interval.start == pytest.approx(11.3, abs=0.05) and interval.end == motion.time[-1]
+    assert unknown[(motion.time > 10) & (motion.time < 12)].all()
+    assert not unknown[(motion.time > 13) | ((motion.time > 5) & (motion.time < 9))].any()
+    (interval,), _ = carrying._intervals(own, time < 10, run_of, -better)
+    assert interval.start == motion.time[0] and interval.end == pytest.approx(11.3, abs=0.05)
+
+
+def test_parameters_are_as_many_and_in_order() -> None:
+    kind = type(effect("carried_load", None))
+    good = {"picked_up": [1.0, 4.0], "put_down": [2.0, 5.0]}
+    assert kind.fault(good) == ""
+    for bad in ({"put_down": [2.0]}, {"put_down": [2.0, 4.0]}, {"picked_up": [], "put_down": []}):
+        assert "put_down must come after" in kind.fault({**good, **bad})
