@@ -48,6 +48,8 @@ def is_right(hidden: dict[str, Any], verdict: dict[str, Any]) -> bool:
     if unlisted or len(found) != len(hidden["effects"]):
         return False
     truths = [place(effect) for effect in hidden["effects"]]
+    if hidden["kind"] == "carried" and not _carried_then(hidden["effects"][0], found[0]):
+        return False
     return all(any(truth in _readings(effect) for effect in found) for truth in truths)
 
 
@@ -60,6 +62,19 @@ def _meets(event: dict[str, Any], found: dict[str, Any]) -> bool:
     # What a force on one link does to few joints is a torque at one of them, or a force elsewhere, just as well.
     at = event["name"] == "external_contact" or found["joint"] in (None, event["joint"])
     return bool(at and common >= 0.5 * min(end - start, event["end"] - event["start"]))
+
+
+def _carried_then(load: dict[str, Any], found: dict[str, Any]) -> bool:
+    """Whether a load was carried when it was found to be, but for a tenth of that time; seen ten times a second."""
+    if "picked_up" not in found["parameters"]:
+        return False
+    ends = [np.atleast_1d(found["parameters"][key]["value"]) for key in ("picked_up", "put_down")]
+    times = np.arange(0.0, max(b for _, b in load["intervals"]) + 10.0, 0.1)
+    truth, stated = (
+        np.logical_or.reduce([(times >= a) & (times < b) for a, b in pairs])
+        for pairs in (load["intervals"], zip(*ends, strict=True))
+    )
+    return bool((truth != stated).sum() <= 0.1 * truth.sum())
 
 
 def is_named(hidden: dict[str, Any], effect: dict[str, Any]) -> bool:
@@ -124,8 +139,11 @@ def print_verdicts(cases: dict[str, Case]) -> int:
             wrong.append([name, truth, sizes, got])
     print(table(["case", "hidden", "size", "verdict"], wrong, "Not judged rightly"))
     met = True
-    for kind, target in (("one", 0.95), ("two", 0.85), ("unlisted", 0.9), ("event", 0.8), ("clean", 0.95)):
+    targets = {"one": 0.95, "two": 0.85, "unlisted": 0.9, "event": 0.8, "carried": 0.8, "clean": 0.95}
+    for kind, target in targets.items():
         mine = [case for case in cases.values() if case[0]["kind"] == kind]
+        if not mine:
+            continue
         large = [case for case in mine if min(case[0]["sizes"], default=1.0) >= LARGE]
         right, right_large = (sum(is_right(*case) for case in some) for some in (mine, large))
         share = right_large / len(large) if large else 1.0
@@ -196,7 +214,7 @@ def _by_effect(cases: dict[str, Case]) -> str:
 def _parameters(cases: dict[str, Case]) -> str:
     found: dict[str, list[tuple[float, float]]] = {}
     for hidden, verdict in cases.values():
-        if hidden["kind"] in ("one", "two") and min(hidden["sizes"]) >= LARGE:
+        if hidden["kind"] in ("one", "two", "carried") and min(hidden["sizes"]) >= LARGE:
             for key, relative, standard in deviations(hidden, verdict):
                 found.setdefault(key, []).append((relative, standard))
     rows = []

@@ -72,7 +72,7 @@ _LAWS: dict[str, Callable[[float, np.ndarray, np.ndarray, int, int], float]] = {
 
 @dataclass(frozen=True)
 class HiddenCase:
-    """What is hidden: kind ``one``, ``two``, ``clean``, ``unlisted`` or ``event``, effects, sizes, and words."""
+    """What is hidden: ``one``, ``two``, ``clean``, ``unlisted``, ``event`` or ``carried``, effects, sizes, and words."""
 
     kind: str
     effects: list[Effect] = field(default_factory=list)
@@ -105,6 +105,12 @@ def draw_case(arm: Any, reference: OutsideReference, seed: int, kind: str, size:
         return HiddenCase(
             kind, [made(scale)], [size], words.replace("_j", str(j + 1)).replace("_k", str(k + 1))
         )
+    if kind == "carried":
+        load = None
+        while load is None:
+            load = _sized(arm, short, bare, _draw(arm, "payload", reference.seconds, rng) or {}, size)
+        intervals = _cycles(reference.seconds, rng)
+        return HiddenCase(kind, [{**load, "name": "carried_load", "intervals": intervals}], [size])
     names = ("external_contact", "external_torque") if kind == "event" else KINDS[:-2]
     effects: list[Effect] = []
     while len(effects) < (2 if kind == "two" else 1):
@@ -115,6 +121,14 @@ def draw_case(arm: Any, reference: OutsideReference, seed: int, kind: str, size:
         if sized is not None:
             effects.append(sized)
     return HiddenCase(kind, effects, [size] * len(effects))
+
+
+def _cycles(seconds: float, rng: Any) -> list[tuple[float, float]]:
+    """Intervals of equal length, over and over, in which a load is carried; a run may begin and end with it."""
+    period, duty = float(rng.uniform(4.0, 9.0)), float(rng.uniform(0.3, 0.7))
+    first = float(rng.uniform(0.0, period)) - period
+    each = [(first + k * period, first + (k + duty) * period) for k in range(int(seconds / period) + 2)]
+    return [(max(a, 0.0), min(b, seconds)) for a, b in each if b > 0.5 and a < seconds - 0.5]
 
 
 def _parts(reference: OutsideReference) -> tuple[np.ndarray, ...]:

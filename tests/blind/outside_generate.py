@@ -15,6 +15,8 @@ from outside_cases import draw_case
 #: What is hidden in one case after the other, and its size as a share of the joint's RMS torque.
 KINDS = ("clean", "one", "event", "one", "two", "one", "unlisted", "one")
 SIZES = (0.04, 0.08, 0.2)
+#: The same of runs in which a load is picked up and put down.
+LOADS = ("carried", "carried", "clean", "carried")
 #: So often another effect is drawn where one throws the arm off its path.
 _ATTEMPTS = 5
 
@@ -27,11 +29,13 @@ def generate_outside(
     numbers: Sequence[int] = (2, 3, 3, 4),
     seconds: float = 30.0,
     points: bool = False,
+    loads: bool = False,
 ) -> None:
     """Write one arm's cases; joints (one of the numbers), sample rate, noise and controller are drawn from the seed, too.
 
     Args:
         points: the runs, not the training logs, go from point to point and dwell there.
+        loads: what is hidden is a load that is carried in parts of a run.
     """
     rng = np.random.default_rng([seed, 0x0575])
     joints = int(rng.choice(numbers))
@@ -51,7 +55,8 @@ def generate_outside(
     for k, reference in enumerate(training):
         write_log(arm.simulate(reference, seed=1000 + k, **how), folder / f"baseline_{k + 1}.csv")
     for case in range(cases):
-        kind, size = KINDS[case % len(KINDS)], SIZES[int(rng.integers(len(SIZES)))]
+        kinds = LOADS if loads else KINDS
+        kind, size = kinds[case % len(kinds)], SIZES[int(rng.integers(len(SIZES)))]
         speed = float(rng.uniform(0.6, 1.0))
         reference = (point_reference if points else fourier_reference)(
             arm, 1000 * seed + case, seconds, speed

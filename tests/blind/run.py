@@ -9,6 +9,7 @@ that is handed the path of the logs alone, and the answers are opened when all v
     python tests/blind/run.py --arms 20 --keep DIR     keep logs, models, answers and verdicts, and go on with the rest
     python tests/blind/run.py --outside --arms 6       arms, engine and controllers from outside (MuJoCo)
     python tests/blind/run.py --outside --points   … in runs that pick and place, models from sines and sweeps
+    python tests/blind/run.py --outside --loads    … in which a load is carried in parts of the runs
     python tests/blind/run.py --measured ../shared/data   effects added to logs of three arms (--first 4, 7, …: others)
     python tests/blind/run.py --again DIR              diagnose kept logs once more
 """
@@ -39,7 +40,7 @@ VERDICTS = Path(__file__).with_name("verdicts.py")
 
 
 def make(
-    seed: int, cases: int, place: Path, outside: list[int] | None, points: bool, measured: Path | None
+    seed: int, cases: int, place: Path, outside: list[int] | None, how: dict[str, bool], measured: Path | None
 ) -> str:
     """Generate one arm's cases; the reason where such an arm cannot be had."""
     threadpool_limits(1)
@@ -51,7 +52,7 @@ def make(
             sys.path.insert(0, str(Path(__file__).parents[1]))
             from outside_generate import generate_outside
 
-            generate_outside(seed, cases, place / "logs", place / "answers", outside, points=points)
+            generate_outside(seed, cases, place / "logs", place / "answers", outside, **how)
             return ""
         generate(seed, range(cases), load_plan("paper"), place / "logs", place / "answers")
     except InputError as error:
@@ -95,6 +96,9 @@ def main() -> int:
         help="with --outside: the runs go from point to point and dwell there",
     )
     parser.add_argument(
+        "--loads", action="store_true", help="with --outside: a load is carried in parts of the runs"
+    )
+    parser.add_argument(
         "--measured",
         default=None,
         metavar="DATA",
@@ -119,9 +123,10 @@ def main() -> int:
         if not options.again:
             arms = options.arms if options.measured is None else min(options.arms, len(SOURCES))
             seeds = range(options.first, options.first + arms)
+            how = {"points": options.points, "loads": options.loads}
             reasons = {seed: kept.get(["made", seed, options.cases]) for seed in seeds}
             made = {
-                s: workers.submit(make, s, options.cases, place, outside, options.points, options.measured)
+                s: workers.submit(make, s, options.cases, place, outside, how, options.measured)
                 for s in seeds
                 if reasons[s] is None
             }
