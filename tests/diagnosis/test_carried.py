@@ -16,6 +16,7 @@ from armloop.diagnosis import carried as carrying
 from armloop.diagnosis import diagnose
 from armloop.diagnosis.carried import find_carried
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.next_run import next_run
 from armloop.identification.scoring import score
 from armloop.laws.effects import Context, effect, hypotheses
 from armloop.laws.effects.payload import Payload
@@ -94,6 +95,10 @@ def test_the_augmented_model_knows_it_in_that_log_alone_and_no_controller_suppli
     assert np.abs(added[0][inside]).max() > 0.5 and not added[1].any()
     q, v, vdot = motions[0].q[200], motions[0].v[200], motions[0].vdot[200]
     np.testing.assert_array_equal(augmented.feedforward(q, v, vdot), model.feedforward(q, v, vdot))
+
+
+def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedModel) -> None:
+    assert next_run(diagnose(model, [run(1, TIMES)], jobs=1)) is None
 
 
 @pytest.mark.parametrize("seed", [4, 5])

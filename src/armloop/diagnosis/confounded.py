@@ -81,16 +81,16 @@ class Pair:
 
 
 def found_laws(diagnosis: Diagnosis) -> list[Law]:
-    """The effects that were found."""
+    """The effects that were found, but for what was carried in that run alone."""
     outcome = diagnosis.outcome
     pairs = zip(outcome.found, outcome.added(), strict=True)
-    return [Law(added, found.shape.final) for found, added in pairs]
+    return [Law(added, found.shape.final) for found, added in pairs if not added.effect.event]
 
 
 def pairs(diagnosis: Diagnosis, laws: Sequence[Law], run: Stage) -> list[Pair]:
     """Every effect found with each of its alternatives, as each would explain the run."""
     made = []
-    for k, found in enumerate(diagnosis.outcome.found):
+    for k, found in enumerate(f for f in diagnosis.outcome.found if not f.effect.event):
         others = tuple(law for i, law in enumerate(laws) if i != k)
         for rival, _ in found.rivals:
             law = _as_fitted(diagnosis, run, laws[k], rival, others)

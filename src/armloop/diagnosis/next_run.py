@@ -86,10 +86,10 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
     """
     wish = wish or Wish()
     wish.check()
-    if not diagnosis.outcome.found and diagnosis.unlisted is None:
+    laws = found_laws(diagnosis)
+    if not laws and diagnosis.unlisted is None:
         return None
-    planner = Planner.of(diagnosis, wish, progress)
-    laws, run = found_laws(diagnosis), Stage.of_run(diagnosis.evidence)
+    planner, run = Planner.of(diagnosis, wish, progress), Stage.of_run(diagnosis.evidence)
     rivals = pairs(diagnosis, laws, run)
     ways = {id(pair): planner.possible(pair.rivalries()) for pair in rivals}
     joint = None
