@@ -58,5 +58,22 @@ def test_only_a_log_too_short_for_held_out_blocks_is_weighed_by_all_of_it(short,
     )
     options = Options(parts=False, standard_errors=False)
     model = reconstruct([log], three_axis(), library="rigid-body", options=options).model
-    assert (model.baseline["rmse"] == [9.9] * 3) == short
+    assert (model.baseline["rmse"] == [9.9] * 3) == short and None not in model.baseline["reversals"]
     assert not short or asked[0].samples > 5 * model.baseline["samples"]
+
+
+def test_of_a_joint_that_turns_round_in_fitted_blocks_alone_it_is_known_from_these(monkeypatch):
+    motion = fourier_motion(15.0, 125.0, 3)
+    log = measured(motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v, 3, 0.01)
+    baseline = Tally.baseline
+
+    def without(self):
+        return {**baseline(self), "reversals": [0.5, None, 0.5]}
+
+    monkeypatch.setattr(Tally, "baseline", without)
+    monkeypatch.setattr(Tally, "yardsticks", lambda self: {"reversals": [7.0] * 3, "creeping": [8.0] * 3})
+    room = sys.modules["armloop.identification.reconstruction.reconstruct"]
+    monkeypatch.setattr(room.Attempt, "yardsticks", lambda self, sorter, seconds: {})
+    options = Options(parts=False, standard_errors=False)
+    model = reconstruct([log], three_axis(), library="rigid-body", options=options).model
+    assert model.baseline["reversals"] == [0.5, 7.0, 0.5]

@@ -182,6 +182,18 @@ def _root(total: float, count: float) -> float | None:
     return float(np.sqrt(total / count)) if count else None
 
 
+def lacks_places(baseline: dict[str, Any]) -> bool:
+    """Whether no held-out sample shows some joint turn round, or creep."""
+    return any(x is None for key in PLACES for x in baseline.get(key) or ())
+
+
+def with_places(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
+    """A baseline that takes from all samples what no held-out one shows: how a joint turns round, and how it creeps."""
+    of_all = fitted.yardsticks()
+    both = {key: zip(baseline[key], of_all[key], strict=True) for key in PLACES if baseline.get(key)}
+    return {**baseline, **{key: [b if a is None else a for a, b in pairs] for key, pairs in both.items()}}
+
+
 def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
     """A baseline, joint by joint no better than what the model leaves of all its data.
 
