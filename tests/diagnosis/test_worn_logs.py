@@ -1,0 +1,91 @@
+"""What a sensor or a bus did not measure changes no verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, measured, rigid_torque, three_axis
+
+from armloop.data import signals
+from armloop.data.dropouts import Repaired
+from armloop.data.log import MotionLog
+from armloop.data.signals import preprocess
+from armloop.diagnosis import diagnose
+from armloop.identification.scoring import score
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import ReconstructedModel
+from armloop.model.components import RigidBody
+from armloop.robot.kinematics import nominal_parameters
+
+COULOMB, VISCOUS = np.array([0.3, 0.4, 0.2]), np.array([0.8, 1.0, 0.5])
+
+
+def run(seed: int, more: float = 0.0) -> MotionLog:
+    """Twenty seconds, with more dry friction at joint 2."""
+    motion = fourier_motion(20.0, 125.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v * VISCOUS
+    tau = tau + np.tanh(motion.v / 1e-4) * (COULOMB + more * np.eye(3)[1])
+    return measured(motion, tau, seed, 0.01)
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    terms = tuple(
+        (FrictionTerm("sign", f), FrictionTerm("viscous", c)) for f, c in zip(COULOMB, VISCOUS, strict=True)
+    )
+    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
+    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
+    return replace(bare, baseline=score(bare, preprocess([run(90)], bare.conditioning)).moving)
+
+
+def spikes(log: MotionLog) -> MotionLog:
+    rng, tau = np.random.default_rng(1), log.tau.copy()
+    hit = rng.random(tau.shape) < 0.003
+    return replace(log, tau=tau + hit * rng.choice([-0.5, 0.5], tau.shape) * np.abs(tau).max(axis=0))
+
+
+def stuck(log: MotionLog) -> MotionLog:
+    rng, tau = np.random.default_rng(2), log.tau.copy()
+    for first in rng.integers(50, log.samples - 100, 6).tolist():
+        joint = int(rng.integers(3))
+        tau[first : first + 35, joint] = tau[first, joint]
+    return replace(log, tau=tau)
+
+
+def cut_off(log: MotionLog) -> MotionLog:
+    top = 0.7 * np.abs(log.tau).max(axis=0)
+    return replace(log, tau=np.clip(log.tau, -top, top))
+
+
+def lost(log: MotionLog) -> MotionLog:
+    rng, held = np.random.default_rng(3), np.arange(log.samples)
+    for first in rng.integers(50, log.samples - 50, 12).tolist():
+        held[first : first + int(rng.integers(2, 6))] = first
+    return replace(log, q=log.q[held], v=log.v[held], tau=log.tau[held])
+
+
+WORN = (spikes, stuck, cut_off, lost)
+
+
+@pytest.mark.parametrize("worn", WORN)
+def test_of_a_run_with_an_effect(model: ReconstructedModel, worn: Callable[[MotionLog], MotionLog]) -> None:
+    found = diagnose(model, [worn(run(6, 0.5))], jobs=1)
+    assert found.named == [("coulomb_friction", 2)] and found.unlisted is None
+    level = found.outcome.added()[0].parameters["level"]
+    assert abs(float(np.asarray(level.value)) - 0.5) < 0.03
+
+
+def test_of_a_clean_run(model: ReconstructedModel) -> None:
+    for worn in (spikes, stuck, cut_off, lost):
+        found = diagnose(model, [worn(run(5))], jobs=1)
+        assert found.verdict in ("no_effect", "cannot_tell") and found.named == [], worn.__name__
+
+
+def test_taken_as_it_is_a_stuck_torque_would_be_events(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signals, "repaired", lambda log: Repaired(log.q, log.v, log.tau, None))
+    assert len(diagnose(model, [stuck(run(6, 0.5))], jobs=1).contacts) > 1
