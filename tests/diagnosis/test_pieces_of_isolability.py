@@ -262,7 +262,9 @@ class TestIsolability:
             [],
             [],
         ]
-        outcome = SimpleNamespace(found=[SimpleNamespace(rivals=each) for each in rivals])
+        outcome = SimpleNamespace(
+            found=[SimpleNamespace(rivals=each, effect=SimpleNamespace(event=False)) for each in rivals]
+        )
         evidence = SimpleNamespace(residual=lambda known: "all of it")
         diagnosis: Any = SimpleNamespace(outcome=outcome, evidence=evidence)
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
@@ -321,7 +323,7 @@ class TestNextRun:
             fine_step=0.5,
         )
         monkeypatch.setattr(next_run.Planner, "of", staticmethod(lambda *_: planner))
-        monkeypatch.setattr(next_run, "found_laws", lambda diagnosis: [])
+        monkeypatch.setattr(next_run, "found_laws", lambda diagnosis: ["a law"])
         monkeypatch.setattr(next_run, "pairs", lambda *_: pairs)
         monkeypatch.setattr(next_run, "lookalikes", lambda *_: [])
         monkeypatch.setattr(next_run, "_sharper", lambda *_: ["sharper"])

@@ -62,6 +62,13 @@ def account_with_load(
     known = Known.of(plain, [load], [Shape.fixed(0.0)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
+    left = account.left(account.remaining()) - float(account.whole.rows.sum())
+    # beside what was found it must explain most of what that leaves; only then is all else searched anew
+    found_so_far = account.outcome.after
+    fixed = Shape.fixed(0.0)
+    beside = Known.of(plain, [load, *found_so_far.effects], [fixed, *found_so_far.shapes]).fit.score
+    if beside.error - float(beside.rows.sum()) > (1 - FAR_LESS) * left:
+        return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(_TURNS if other.outcome.found else 0):
         # what was found beside the load had a part in it; the load is regressed with that, and the search made anew
@@ -74,8 +81,7 @@ def account_with_load(
         other = _beside(whole, known, unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
-    left, left_so = (each.left(each.remaining()) - float(each.whole.rows.sum()) for each in (account, other))
-    if left_so > (1 - FAR_LESS) * left:
+    if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - FAR_LESS) * left:
         return None
     evidence = whole.only(other.evidence.rows)
     nothing, alone = Known.of(evidence), Known.of(evidence, [load], [Shape.fixed(0.0)])
