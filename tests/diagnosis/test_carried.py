@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, measured, rigid_torque, three_axis
+from rubbing_arm import model_with_baseline, motion_of, torque
+from synthetic import measured, three_axis
 
 from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
@@ -17,16 +18,11 @@ from armloop.diagnosis import diagnose
 from armloop.diagnosis.carried import find_carried
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.next_run import next_run
-from armloop.identification.scoring import score
 from armloop.laws.effects import Context, effect, hypotheses
 from armloop.laws.effects.payload import Payload
-from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.model.components import RigidBody
 from armloop.reports.findings import findings
-from armloop.robot.kinematics import nominal_parameters
 
-COULOMB, VISCOUS = (0.3, 0.4, 0.2), (0.8, 1.0, 0.5)
 LOAD = {"mass": 0.4, "com": [0.03, -0.02, 0.05], "own_inertia": 0.0}
 TIMES = [(2.5, 7.0), (11.0, 16.0), (21.0, 24.5)]
 
@@ -35,10 +31,9 @@ def run(
     seed: int, loads: list[tuple[float, float]], seconds: float = 30.0, load: dict[str, Any] | None = None
 ) -> MotionLog:
     """A measured run in which the load is carried in intervals."""
-    motion, arm = fourier_motion(seconds, 125.0, seed), three_axis()
-    tau = rigid_torque(arm, motion.q, motion.v, motion.vdot) + motion.v * VISCOUS
-    tau = tau + np.tanh(motion.v / 1e-4) * COULOMB
-    extra = Payload().torque(Context(arm, motion), load or LOAD)
+    motion = motion_of(seed, seconds)
+    tau = torque(motion)
+    extra = Payload().torque(Context(three_axis(), motion), load or LOAD)
     for first, last in loads:
         inside = (motion.time >= first) & (motion.time < last)
         tau[inside] += extra[inside]
@@ -47,13 +42,7 @@ def run(
 
 @pytest.fixture(scope="module")
 def model() -> ReconstructedModel:
-    terms = tuple(
-        (FrictionTerm("sign", f), FrictionTerm("viscous", c)) for f, c in zip(COULOMB, VISCOUS, strict=True)
-    )
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
-    samples = preprocess([run(90, [])], bare.conditioning)
-    return replace(bare, baseline=score(bare, samples).moving)
+    return model_with_baseline()
 
 
 def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
@@ -105,7 +94,8 @@ def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedMod
 def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int) -> None:
     """The load that is found first has soaked up some of it."""
     log = run(seed, TIMES)
-    more = np.tanh(fourier_motion(30.0, 125.0, seed).v / 1e-4) * [0.0, 0.5, 0.0]
+    motion = motion_of(seed, 30.0)
+    more = torque(motion, 0.5) - torque(motion)
     found = diagnose(model, [replace(log, tau=log.tau + more)], jobs=1)
     assert found.named == [("carried_load", None), ("coulomb_friction", 2)]
     mass, level = (found.outcome.added()[k].parameters[key] for k, key in enumerate(("mass", "level")))

@@ -7,38 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import fourier_motion, measured, rigid_torque, three_axis
+import rubbing_arm
+from rubbing_arm import model_with_baseline
 
 from armloop.data import signals
 from armloop.data.dropouts import Repaired
 from armloop.data.log import MotionLog
-from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
-from armloop.identification.scoring import score
-from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
-from armloop.model.components import RigidBody
-from armloop.robot.kinematics import nominal_parameters
-
-COULOMB, VISCOUS = np.array([0.3, 0.4, 0.2]), np.array([0.8, 1.0, 0.5])
-
-
-def run(seed: int, more: float = 0.0) -> MotionLog:
-    """Twenty seconds, with more dry friction at joint 2."""
-    motion = fourier_motion(20.0, 125.0, seed)
-    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v * VISCOUS
-    tau = tau + np.tanh(motion.v / 1e-4) * (COULOMB + more * np.eye(3)[1])
-    return measured(motion, tau, seed, 0.01)
 
 
 @pytest.fixture(scope="module")
 def model() -> ReconstructedModel:
-    terms = tuple(
-        (FrictionTerm("sign", f), FrictionTerm("viscous", c)) for f, c in zip(COULOMB, VISCOUS, strict=True)
-    )
-    body = RigidBody(nominal_parameters(three_axis()), (), np.zeros(0))
-    bare = ReconstructedModel(three_axis(), (body,), FrictionLaw(terms))
-    return replace(bare, baseline=score(bare, preprocess([run(90)], bare.conditioning)).moving)
+    return model_with_baseline()
+
+
+def run(seed: int, more: float = 0.0) -> MotionLog:
+    return rubbing_arm.run(seed, 20.0, more)
 
 
 def spikes(log: MotionLog) -> MotionLog:

@@ -3,7 +3,8 @@
 Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
 and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
 regressed. It is looked for where the effects found leave more than the model's own shortcomings, and taken if what is then
-left is far less: what comes and goes is no law of the motion, and a search for laws would find the nearest.
+left is far less: what comes and goes is no law of the motion, and a search for laws would find the nearest. When the load
+is carried, all samples say; how heavy it is, only those outside the fold that is judged.
 """
 
 from __future__ import annotations
@@ -64,20 +65,14 @@ def account_with_load(
         return None
     left = account.left(account.remaining()) - float(account.whole.rows.sum())
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
-    found_so_far = account.outcome.after
-    fixed = Shape.fixed(0.0)
-    beside = Known.of(plain, [load, *found_so_far.effects], [fixed, *found_so_far.shapes]).fit.score
-    if beside.error - float(beside.rows.sum()) > (1 - FAR_LESS) * left:
+    score = _with(plain, load, account).fit.score
+    if score.error - float(score.rows.sum()) > (1 - FAR_LESS) * left:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(_TURNS if other.outcome.found else 0):
         # what was found beside the load had a part in it; the load is regressed with that, and the search made anew
         before = {effect.place for effect in other.outcome.after.effects}
-        effects, shapes = (
-            [load, *other.outcome.after.effects],
-            [Shape.fixed(0.0), *other.outcome.after.shapes],
-        )
-        known = Known.of(plain.only(other.evidence.rows), effects, shapes)
+        known = _with(plain.only(other.evidence.rows), load, other)
         other = _beside(whole, known, unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
@@ -85,12 +80,17 @@ def account_with_load(
         return None
     evidence = whole.only(other.evidence.rows)
     nothing, alone = Known.of(evidence), Known.of(evidence, [load], [Shape.fixed(0.0)])
-    effects, shapes = [load, *other.outcome.after.effects], [Shape.fixed(0.0), *other.outcome.after.shapes]
     bare = nothing.fit.score
     share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
     every = [Found(load, Shape.fixed(0.0), min(share, 1.0)), *other.outcome.found]
-    together = Outcome(every, nothing.fit, Known.of(evidence, effects, shapes).fit, nothing.residual)
+    together = Outcome(every, nothing.fit, _with(evidence, load, other).fit, nothing.residual)
     return evidence, other, clear(evidence, pruned(evidence, together))
+
+
+def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:
+    """The load and what an account has found, fitted together."""
+    after = account.outcome.after
+    return Known.of(evidence, [load, *after.effects], [Shape.fixed(0.0), *after.shapes])
 
 
 def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
@@ -144,6 +144,8 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     with_load = left - smooth(evidence.samples, load.columns(evidence.context, 0.0) @ theta)
     better = ((left**2 - with_load**2) / evidence.scale**2).sum(axis=1)
     intervals, unknown = _intervals(evidence, best, run, better)
+    if not intervals:
+        return None
     edge = max(evidence.samples.period, evidence.samples.reach)
     return CarriedLoad(intervals=intervals, error=edge), np.broadcast_to(unknown[:, None], left.shape)
 
@@ -152,7 +154,7 @@ def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
     """(K,) samples that may carry the load: all, and those where the averaged residual is large, or is not."""
     size = (y**2).sum(axis=1)
     sums = np.concatenate([[0.0], np.cumsum(size)])
-    first = np.maximum(np.searchsorted(time + 1e9 * run, time + 1e9 * run - _WINDOW), 0)
+    first = np.searchsorted(time + 1e9 * run, time + 1e9 * run - _WINDOW)
     last = np.searchsorted(time + 1e9 * run, time + 1e9 * run + _WINDOW, side="right")
     mean = (sums[last] - sums[first]) / (last - first)
     large = mean > np.median(mean)

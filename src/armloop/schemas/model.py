@@ -105,8 +105,8 @@ class FrictionTermData(Struct):
 class EstimateData(Struct):
     """A physical parameter; vectors are lists; a standard error that nobody knows is null."""
 
-    value: Finite | Annotated[list[Finite], Meta(min_length=1, max_length=1024)]
-    std_error: NotNegative | Annotated[list[NotNegative | None], Meta(max_length=1024)] | None
+    value: Finite | Annotated[list[Finite], Meta(min_length=1, max_length=100_000)]
+    std_error: NotNegative | Annotated[list[NotNegative | None], Meta(max_length=100_000)] | None
     unit: Name
 
 
