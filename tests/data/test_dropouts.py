@@ -151,6 +151,9 @@ class TestStuck:
         assert repaired(recorded(replace(log, v=v, tau=still))).lost is None
         assert repaired(recorded(replace(log, tau=nothing))).lost is None
         assert repaired(recorded(replace(log, tau=rounded))).lost is None
+        # a joint that rests, but for the rounding of its speed
+        v[1000:1040, 0] = 1e-3 * (np.arange(40) % 3)
+        assert repaired(recorded(replace(log, v=v, tau=still))).lost is None
 
     def test_between_two_runs_nothing_is_repeated(self) -> None:
         log = a_log()
@@ -191,6 +194,14 @@ class TestRepeatedRows:
         assert fresh.lost is not None
         assert np.flatnonzero(fresh.lost.all(axis=1)).tolist() == list(range(2000, 2006))
         assert said(worn)[0].startswith("columns q, v repeat the row before in 7 rows while the arm moves")
+
+    def test_for_too_long_or_to_the_end_are_another_fault(self) -> None:
+        log = a_log()
+        for first, last, repeats in ((1000, 1025, 24), (1000, 1027, 0), (log.samples - 5, log.samples, 0)):
+            q, v = log.q.copy(), log.v.copy()
+            q[first:last], v[first:last] = q[first], v[first]
+            held = replace(recorded(log), q=q, v=v)
+            assert len(dropouts._held(held)) == repeats, (first, last)
 
     def test_of_an_arm_at_rest_say_nothing(self) -> None:
         log = a_log()

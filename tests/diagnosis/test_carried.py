@@ -90,17 +90,25 @@ def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedMod
     assert next_run(diagnose(model, [run(1, TIMES)], jobs=1)) is None
 
 
-@pytest.mark.parametrize("seed", [4, 5])
-def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int) -> None:
-    """The load that is found first has soaked up some of it."""
-    log = run(seed, TIMES)
-    motion = motion_of(seed, 30.0)
-    more = torque(motion, 0.5) - torque(motion)
+@pytest.mark.parametrize(("seed", "level"), [(4, 0.5), (6, 1.5)])
+def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int, level: float) -> None:
+    """The load that is found first has soaked up some of it, and seems to be there at other times."""
+    log, motion = run(seed, TIMES), motion_of(seed, 30.0)
+    more = torque(motion, level) - torque(motion)
     found = diagnose(model, [replace(log, tau=log.tau + more)], jobs=1)
-    assert found.named == [("carried_load", None), ("coulomb_friction", 2)]
-    mass, level = (found.outcome.added()[k].parameters[key] for k, key in enumerate(("mass", "level")))
-    assert abs(float(np.asarray(mass.value)) - 0.4) < 0.01
-    assert abs(float(np.asarray(level.value)) - 0.5) < 0.01
+    assert found.named == [("carried_load", None), ("coulomb_friction", 2)] and found.unlisted is None
+    load, friction = (added.parameters for added in found.outcome.added())
+    assert abs(float(np.asarray(load["mass"].value)) - 0.4) < 0.01
+    assert abs(float(np.asarray(friction["level"].value)) - level) < 0.02
+    times = np.column_stack([load["picked_up"].value, load["put_down"].value])
+    np.testing.assert_allclose(times, TIMES, atol=0.1)
+
+
+def test_a_load_of_moments_alone_is_none(model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = evidence(model, run(1, TIMES))
+    assert find_carried(given) is not None
+    monkeypatch.setattr(carrying, "_SHORTEST", 9.0)
+    assert find_carried(given) is None
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -181,6 +181,15 @@ class TestBurstsOfTheResidual:
         for height, seen in ((2.5, 0), (3.5, 1)):
             assert len(outliers.outlying(evidence, 6.0 + steps(400, (150, 200, height))[:, None])) == seen
 
+    def test_a_torque_that_was_not_measured_stands_out_of_nothing(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.zeros((400, 1)))
+        evidence, residual = self.evidence(motion([400], 0.02)), steps(400, (150, 200, 6.0))[:, None]
+        assert len(outliers.outlying(evidence, residual)) == 1
+        evidence.unknown = residual > 0
+        assert outliers.outlying(evidence, residual) == []
+
     @pytest.mark.parametrize(
         ("moving", "speed", "held"),
         [(True, 1.0, False), (True, -0.01, False), (True, -0.0099, True), (False, 1.0, True)],

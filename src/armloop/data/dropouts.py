@@ -164,11 +164,7 @@ def _held(log: Recorded) -> Index:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         # what stands still to the end of a run, or too long, is another fault
-        if (
-            log.time[last] - log.time[first] > _HELD
-            or last == len(same)
-            or not _in_one_run(log, first, last + 1)
-        ):
+        if log.time[last] - log.time[first] > _HELD or not _in_one_run(log, first, last + 1):
             same[first:last] = False
     return np.flatnonzero(same) + 1
 
@@ -211,6 +207,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
     size = np.abs(steps - trend)
     usual = max(float(np.median(size)) / 0.6745, 0.5 * resolution)
     large = np.flatnonzero(size > 0.5 * _SPIKE * usual)
+    # a spike makes two large steps, and some three to either side
     if len(large) == 0 or len(large) > 8 * _RARE * len(x):
         return none
     found: list[int] = []
@@ -226,8 +223,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
             back = up * down < 0 and away < _BACK * height
             if back and height > _SPIKE * least and _in_one_run(log, k, k + width + 1):
                 found += range(k + 1, k + width + 1)
-    rows = np.unique(np.array(found, dtype=np.intp))
-    return rows if len(rows) <= _RARE * len(x) else none
+    return np.unique(np.array(found, dtype=np.intp))
 
 
 def _in_one_run(log: Recorded, first: int, last: int) -> bool:

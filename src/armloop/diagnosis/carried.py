@@ -25,6 +25,7 @@ from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.diagnosis.unlisted import FAR_LESS
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
+from armloop.model import AddedEffect
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask
@@ -60,7 +61,7 @@ def account_with_load(
         return None
     load, unknown = found
     plain = without(whole.only(whole.rows & ~unknown), [])
-    known = Known.of(plain, [load], [Shape.fixed(0.0)])
+    known = Known.of(plain, [load], [_shape(load)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
     left = account.left(account.remaining()) - float(account.whole.rows.sum())
@@ -69,20 +70,25 @@ def account_with_load(
     if score.error - float(score.rows.sum()) > (1 - FAR_LESS) * left:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
-    for _ in range(_TURNS if other.outcome.found else 0):
-        # what was found beside the load had a part in it; the load is regressed with that, and the search made anew
+    for _ in range(_TURNS):
+        # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
-        known = _with(plain.only(other.evidence.rows), load, other)
-        other = _beside(whole, known, unknown, progress, jobs)
+        others = _with(plain.only(other.evidence.rows), load, other).added()[1:]
+        found = find_carried(without(_by(whole, others), [])) if others else None
+        if found is None:
+            break
+        load, unknown = found
+        plain = without(whole.only(whole.rows & ~unknown), [])
+        other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
     if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - FAR_LESS) * left:
         return None
     evidence = whole.only(other.evidence.rows)
-    nothing, alone = Known.of(evidence), Known.of(evidence, [load], [Shape.fixed(0.0)])
+    nothing, alone = Known.of(evidence), Known.of(evidence, [load], [_shape(load)])
     bare = nothing.fit.score
     share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
-    every = [Found(load, Shape.fixed(0.0), min(share, 1.0)), *other.outcome.found]
+    every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
     together = Outcome(every, nothing.fit, _with(evidence, load, other).fit, nothing.residual)
     return evidence, other, clear(evidence, pruned(evidence, together))
 
@@ -90,12 +96,22 @@ def account_with_load(
 def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:
     """The load and what an account has found, fitted together."""
     after = account.outcome.after
-    return Known.of(evidence, [load, *after.effects], [Shape.fixed(0.0), *after.shapes])
+    return Known.of(evidence, [load, *after.effects], [_shape(load), *after.shapes])
+
+
+def _shape(load: CarriedLoad) -> Shape:
+    """No parameter of the load, but a number that tells the columns of other intervals apart."""
+    return Shape.fixed(float(hash(load.intervals) % 2**31))
+
+
+def _by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
+    """The run as a model sees it that has some effects."""
+    return Evidence.of(whole.model.with_effects(added), whole.samples, list(whole.asked))
 
 
 def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
     """The account of a run by a model that has the load, the first of what is known."""
-    again = Evidence.of(whole.model.with_effects(known.added()[:1]), whole.samples, list(whole.asked))
+    again = _by(whole, known.added()[:1])
     if again.unknown is not None:
         unknown = unknown | again.unknown
     again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
