@@ -128,8 +128,21 @@ def deviations(hidden: dict[str, Any], verdict: dict[str, Any]) -> list[tuple[st
     return out
 
 
+def of_changes(case: Case) -> Case:
+    """The case by what changed alone, if the arm is a measured one: what a model of it lacks all along, nobody knows."""
+    hidden, verdict = case
+    changed = [effect for effect in verdict["effects"] if effect["when"] != "always"]
+    if not hidden.get("measured") or len(changed) == len(verdict["effects"]):
+        return case
+    return hidden, {**verdict, "effects": changed, "verdict": verdict["verdict"] if changed else "no_effect"}
+
+
 def print_verdicts(cases: dict[str, Case]) -> int:
     """Print everything; return 0 if the targets are met."""
+    whole, cases = cases, {name: of_changes(case) for name, case in cases.items()}
+    lacking = sum(cases[name] is not whole[name] for name in cases)
+    if lacking:
+        print(f"{lacking} runs of measured arms are said to show what their model lacks all along: not judged.")
     rows, wrong = [], []
     for name, (hidden, verdict) in sorted(cases.items()):
         if not is_right(hidden, verdict):

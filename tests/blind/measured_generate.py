@@ -103,6 +103,7 @@ def generate_measured(seed: int, cases: int, data: Path, logs: Path, answers: Pa
         run = MotionLog(log.time, log.q, log.v, tau, None, name=f"run_{case}")
         write_log(folder / f"run_{case}.csv", run)
         sealed = {
+            "measured": one.folder,
             "kind": kind,
             "effects": effects,
             "sizes": [size] * len(effects),

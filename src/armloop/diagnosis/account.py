@@ -101,6 +101,15 @@ class Account:
         model = self.whole.model.with_effects(added)
         return self.whole.left_by(model)
 
+    def without_effect(self, outcome: Outcome) -> Account:
+        """The account of an outcome with fewer effects, and of the events those that are one without them, too."""
+        fewer = replace(self, outcome=outcome)
+        if not self.contacts:
+            return fewer
+        known = np.logical_or.reduce([contact.rows for contact in self.contacts])
+        again = find_contacts(self.whole, fewer.remaining(), outcome.added())
+        return replace(fewer, contacts=[contact for contact in again if (contact.rows & known).any()])
+
     def left(self, residual: Array) -> float:
         """Squared error, weighted, of the whole run: held-out, and what the events leave of their own samples.
 

@@ -20,10 +20,18 @@ from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, fit
-from armloop.diagnosis.reasons import Standing, standing, too_still
+from armloop.diagnosis.reasons import Standing, in_doubt, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
-from armloop.diagnosis.search import Found, Outcome, Strength, strengths, useful
+from armloop.diagnosis.search import (
+    Found,
+    Outcome,
+    Strength,
+    outweighed,
+    strengths,
+    useful,
+    without_effect,
+)
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
@@ -277,23 +285,30 @@ def diagnose(
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
     outcome = useful(evidence, outcome)
-    named = bool(outcome.found or contacts)
-    verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
-    added = [*outcome.added(), *(contact.added for contact in contacts)]
-    augmented = model.with_effects(added)
-    found = Diagnosis(
-        verdict,
-        outcome,
-        augmented,
-        unlisted,
-        evidence,
-        contacts,
-        turned,
-        strengths=strengths(evidence, outcome),
-    )
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
-    stand = standing(evidence, augmented, found.errors()["after"], known)
+    doubted: list[str] = []
+    while True:
+        augmented = model.with_effects([*outcome.added(), *(contact.added for contact in contacts)])
+        named = bool(outcome.found or contacts)
+        verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
+        found = Diagnosis(
+            verdict,
+            outcome,
+            augmented,
+            unlisted,
+            evidence,
+            contacts,
+            turned,
+            strengths=strengths(evidence, outcome),
+        )
+        stand = standing(evidence, augmented, found.errors()["after"], known)
+        doubtful = outweighed(evidence, outcome, stand.left)
+        if doubtful is None:
+            break
+        doubted.append(in_doubt(doubtful.effect.label(), doubtful.share))
+        outcome = without_effect(evidence, outcome, doubtful)
+        contacts = account.without_effect(outcome).contacts
     if verdict == "no_effect" and stand.unknown:
         found = replace(found, verdict="cannot_tell")
-    return replace(found, standing=replace(stand, reasons=[*stand.reasons, *own_zeros]), zeros=zeros)
+    return replace(found, standing=replace(stand, reasons=[*doubted, *stand.reasons, *own_zeros]), zeros=zeros)

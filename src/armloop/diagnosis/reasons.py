@@ -31,11 +31,13 @@ class Standing:
         reasons: sentences.
         joints: entries of ``joints`` in ``diagnosis.json``.
         unknown: whether neither "nothing is there" nor "something is" can be said.
+        left: joints (0-based) of which something predictable is left that nothing accounts for.
     """
 
     reasons: list[str]
     joints: list[dict[str, Any]]
     unknown: bool
+    left: tuple[int, ...] = ()
 
 
 def standing(
@@ -56,7 +58,7 @@ def standing(
         samples.moving.sum(axis=0), 1
     )
     reasons: list[str] = []
-    unknown = False
+    unknown, unexplained = False, []
     for j, part in enumerate(parts):
         reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > _MOSTLY)
@@ -72,8 +74,8 @@ def standing(
         if j + 1 not in explained and not poor and ratio >= MULTIPLE:
             words, real = _multiple(part, j, ratio)
             reasons.append(words)
-            unknown |= real
-    return Standing(reasons, merged(parts, outside), unknown)
+            unexplained += [j] if real else []
+    return Standing(reasons, merged(parts, outside), unknown or bool(unexplained), tuple(unexplained))
 
 
 def too_still(evidence: Evidence) -> str:
@@ -86,6 +88,14 @@ def too_still(evidence: Evidence) -> str:
     return (
         f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
         f"{FEWEST_BLOCKS + 1} s in which the joints move"
+    )
+
+
+def in_doubt(label: str, share: float) -> str:
+    """A sentence on an effect that removes less than what nothing accounts for where it acts."""
+    return (
+        f"{label} would remove {share:.0%} of what can be explained, but more is left there that nothing accounts for: it "
+        "may be of the same origin, and is not stated"
     )
 
 

@@ -261,9 +261,34 @@ def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
     worst = min(range(len(given)), key=lambda k: given[k].times, default=None)
     if worst is None or given[worst].times > 0:
         return outcome
-    others = [f for k, f in enumerate(outcome.found) if k != worst]
-    fitted = _known(evidence, others).fit
-    return useful(evidence, Outcome(others, outcome.before, fitted, outcome.residual))
+    return useful(evidence, without_effect(evidence, outcome, outcome.found[worst]))
+
+
+def outweighed(evidence: Evidence, outcome: Outcome, left: Sequence[int]) -> Found | None:
+    """The effect that explains least of the joints it acts on, if more is left there than it removes; None if there is none.
+
+    Each joint counts by its part of what the effect removes. Where most of a residual is of unknown origin, an effect that
+    takes a part of it may be of that origin, too.
+
+    Args:
+        left: joints (0-based) of which something predictable is left that nothing accounts for.
+    """
+    after = outcome.after.score
+    rest = np.zeros(len(after.energy))
+    rest[list(left)] = np.maximum(after.energy - after.rows, 0.0)[list(left)]
+    margins = []
+    for k in range(len(outcome.found)):
+        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit.score
+        removed = np.maximum(others.energy - after.energy, 0.0)
+        margins.append(float(removed @ (removed - rest)))
+    least = int(np.argmin(margins)) if margins else 0
+    return outcome.found[least] if margins and margins[least] < 0 else None
+
+
+def without_effect(evidence: Evidence, outcome: Outcome, effect: Found) -> Outcome:
+    """The outcome without one of its effects; the others are fitted again."""
+    others = [f for f in outcome.found if f is not effect]
+    return Outcome(others, outcome.before, _known(evidence, others).fit, outcome.residual)
 
 
 def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outcome:
