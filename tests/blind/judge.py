@@ -134,7 +134,9 @@ def of_changes(case: Case) -> Case:
     changed = [effect for effect in verdict["effects"] if effect["when"] != "always"]
     if not hidden.get("measured") or len(changed) == len(verdict["effects"]):
         return case
-    return hidden, {**verdict, "effects": changed, "verdict": verdict["verdict"] if changed else "no_effect"}
+    named = [effect for effect in changed if effect["effect"] != "unlisted"]
+    words = "effects_found" if named else "unlisted_effect" if changed else "no_effect"
+    return hidden, {**verdict, "effects": changed, "verdict": words}
 
 
 def print_verdicts(cases: dict[str, Case]) -> int:
@@ -142,7 +144,9 @@ def print_verdicts(cases: dict[str, Case]) -> int:
     whole, cases = cases, {name: of_changes(case) for name, case in cases.items()}
     lacking = sum(cases[name] is not whole[name] for name in cases)
     if lacking:
-        print(f"{lacking} runs of measured arms are said to show what their model lacks all along: not judged.")
+        print(
+            f"{lacking} runs of measured arms are said to show what their model lacks all along: not judged."
+        )
     rows, wrong = [], []
     for name, (hidden, verdict) in sorted(cases.items()):
         if not is_right(hidden, verdict):

@@ -17,7 +17,7 @@ sys.path.insert(0, str(HERE))
 
 import loops  # noqa: E402
 from generate import generate  # noqa: E402
-from judge import LARGE, Case, is_right  # noqa: E402
+from judge import LARGE, Case, is_right, of_changes  # noqa: E402
 from run import judge  # noqa: E402
 
 from armloop.drake.experiments.scenarios import load_plan  # noqa: E402
@@ -72,6 +72,24 @@ def test_creep_into_points_is_no_friction_that_came(tmp_path: Path, monkeypatch:
     (verdict,) = judge(tmp_path / "logs" / "outside_509", tmp_path / "verdict.json").values()
     assert verdict["verdict"] == "no_effect", verdict["effects"]
     assert any("slower than it was trained at" in reason for reason in verdict["reasons"])
+
+
+def test_of_a_measured_arm_what_its_model_lacks_all_along_is_not_judged() -> None:
+    def found(*effects: tuple[str, str]) -> dict[str, Any]:
+        listed = [{"effect": name, "joint": 1, "when": when, "alternatives": []} for name, when in effects]
+        return {"verdict": "effects_found", "effects": listed}
+
+    memory, drag, law = ("presliding", "always"), ("drag", "changed"), ("unlisted", "changed")
+    clean = {"kind": "clean", "effects": [], "measured": "an arm"}
+    one = {"kind": "one", "effects": [{"name": "drag", "joint": 1}], "measured": "an arm"}
+    unlisted = {"kind": "unlisted", "effects": [], "measured": "an arm"}
+    assert is_right(*of_changes((clean, found(memory))))
+    assert is_right(*of_changes((one, found(memory, drag)))) and is_right(
+        *of_changes((unlisted, found(law, memory)))
+    )
+    assert not is_right(*of_changes((clean, found(memory, drag))))
+    # of a simulated arm it is known
+    assert not is_right(*of_changes(({**clean, "measured": None}, found(memory))))
 
 
 def test_finished_loops_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

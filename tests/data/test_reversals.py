@@ -64,3 +64,12 @@ def test_a_tenth_of_a_second_around_a_turn_belongs_to_it() -> None:
     found = at_reversals(Samples(motion, np.zeros((60, 2)), counted, 0.02), turns, counted)
     assert np.flatnonzero(found[:, 0]).tolist() == list(range(15, 23))
     assert np.flatnonzero(found[:, 1]).tolist() == list(range(38, 46))
+
+
+def test_what_belongs_to_a_reversal_ends_with_its_run() -> None:
+    motion = Motion(0.01 * np.arange(40.0), *np.zeros((3, 40, 1)), np.array([0, 20]))
+    turns = np.zeros((40, 1), dtype=bool)
+    turns[18] = True
+    samples = Samples(motion, np.zeros((40, 1)), ~turns, 0.01)
+    found = at_reversals(samples, turns, np.ones_like(turns))
+    assert np.flatnonzero(found[:, 0]).tolist() == list(range(8, 20))

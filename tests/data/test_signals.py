@@ -13,6 +13,7 @@ from armloop.data.signals import (
     ShortRunError,
     as_torque,
     derivative,
+    independent_rows,
     preprocess,
     smooth,
     uniform_period,
@@ -269,3 +270,52 @@ def test_a_prediction_is_smeared_like_the_measurement():
     sharp = np.sqrt(np.mean((samples.tau - predicted) ** 2))
     smeared = np.sqrt(np.mean((samples.tau - smooth(samples, predicted)) ** 2))
     assert smeared < 0.5 * sharp
+
+
+def at_rates(*steps: float) -> list[MotionLog]:
+    return [sines(np.arange(0, 8, step)) for step in steps]
+
+
+def test_logs_of_several_rates_are_one_rate_that_of_the_slowest():
+    fast, slow = at_rates(0.002, 0.01)
+    samples, alone = preprocess([fast, slow], TEN_HZ), preprocess([slow], TEN_HZ)
+    first, second = samples.motion.runs()
+    assert samples.period == pytest.approx(0.01) == alone.period
+    for key in ("time", "q", "v", "vdot"):
+        np.testing.assert_array_equal(getattr(samples.motion, key)[second], getattr(alone.motion, key))
+    # what was put on the coarser grid is still the motion; at the filter's own error
+    truth = preprocess([fast], TEN_HZ)
+    for key in ("q", "v", "vdot"):
+        own = getattr(samples.motion, key)[first]
+        expected = [
+            np.interp(samples.motion.time[first], truth.motion.time, x) for x in getattr(truth.motion, key).T
+        ]
+        assert np.abs(own - np.transpose(expected)).max() < 1e-3 * np.abs(own).max()
+    moving = np.mean(samples.moving[first]), np.mean(truth.moving)
+    assert moving[0] == pytest.approx(moving[1], abs=0.02) and moving[0] < 1
+
+
+def test_what_is_no_measurement_stays_so_at_another_rate():
+    fast, slow = at_rates(0.002, 0.01)
+    held = fast.tau.copy()
+    held[2000:2400] = held[2000]
+    fast = replace(fast, tau=held)
+    samples = preprocess([fast, slow], TEN_HZ)
+    lost = samples.unknown[samples.motion.runs()[0]].all(axis=1)
+    time = samples.motion.time[samples.motion.runs()[0]]
+    assert lost[(time > 4.0) & (time < 4.8)].all() and not lost[(time < 3.8) | (time > 5.0)].any()
+
+
+def test_each_run_passes_the_filter_of_its_own_rate():
+    """Samples of two rates, as pieces of several logs are when they are put side by side."""
+    parts = [preprocess([log], TEN_HZ) for log in at_rates(0.004, 0.01)]
+    motion = Motion.joined([part.motion for part in parts])
+    both = replace(
+        parts[0],
+        motion=motion,
+        tau=np.concatenate([part.tau for part in parts]),
+        moving=np.concatenate([part.moving for part in parts]),
+        spans=None,
+    )
+    for of in (lambda s: smooth(s, np.sign(s.motion.v)), independent_rows):
+        np.testing.assert_allclose(of(both), np.concatenate([of(part) for part in parts]), atol=1e-9)

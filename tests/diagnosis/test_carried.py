@@ -176,3 +176,26 @@ def test_parameters_are_as_many_and_in_order() -> None:
     assert kind.fault(good) == ""
     for bad in ({"put_down": [2.0]}, {"put_down": [2.0, 4.0]}, {"picked_up": [], "put_down": []}):
         assert "put_down must come after" in kind.fault({**good, **bad})
+
+
+def test_logs_whose_clocks_have_nothing_to_do_with_each_other() -> None:
+    """One counts from 1970, the next from zero: where the residual is large is asked within each."""
+    time = np.concatenate([1.7e9 + 0.1 * np.arange(50.0), 0.1 * np.arange(50.0)])
+    run = np.repeat([1, 2], 50)
+    y = np.zeros((100, 1))
+    y[30:50], y[80:] = 1.0, 1.0
+    _, large, small = carrying._starts(y, time, run)
+    assert (large == ~small).all() and large[30:50].all() and large[80:].all()
+    assert not large[:20].any() and not large[50:70].any()
+
+
+def test_a_start_of_too_few_samples_explains_nothing(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged = evidence(model, run(1, TIMES))
+
+    def few(y: np.ndarray, *_: Any) -> list[np.ndarray]:
+        return [np.arange(len(y)) < 3]
+
+    monkeypatch.setattr(carrying, "_starts", few)
+    assert find_carried(judged) is None

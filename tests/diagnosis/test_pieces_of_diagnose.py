@@ -27,6 +27,7 @@ class Standing:
     reasons: list[str]
     joints: list[Any] = field(default_factory=list)
     unknown: bool = False
+    left: tuple[int, ...] = (1,)
 
 
 class Evidence(SimpleNamespace):
@@ -76,6 +77,7 @@ class Answers:
             "best_account": self.best,
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
+            "outweighed": lambda evidence, outcome, left: None,
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
@@ -110,6 +112,7 @@ class Answers:
             evidence=self.account,
             outcome=self.outcome("account"),
             unlisted=self.given["unlisted"],
+            without_effect=lambda outcome: SimpleNamespace(contacts=contacts[:1]),
         )
 
     def loaded(self, whole: Evidence, account: Any, progress: Any, jobs: int | None) -> Any:
@@ -300,3 +303,32 @@ def test_what_friction_is_at_reversals_alone() -> None:
     made = of(reversals=turned)
     assert made._only_at_reversals(one) and not made._only_at_reversals(other)  # type: ignore[arg-type]
     assert not of()._only_at_reversals(one)  # type: ignore[arg-type]
+
+
+def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two effects, of which the first goes, and with it one of two events; the other is asked with what is left."""
+    spring, load = (SimpleNamespace(effect=SimpleNamespace(label=lambda: "spring"), share=0.25), "load")
+    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
+    answers = Answers(monkeypatch, found=[spring, load], contacts=[CONTACT, other], unknown=True)
+    asked: list[Any] = []
+
+    def outweighed(evidence: Evidence, outcome: Any, left: Any) -> Any:
+        asked.append((evidence.name, [*outcome.found], left))
+        return spring if spring in outcome.found else None
+
+    def without_effect(evidence: Evidence, outcome: Any, effect: Any) -> Any:
+        kept = [f for f in outcome.found if f is not effect]
+        return SimpleNamespace(name="fewer", found=kept, added=lambda: kept)
+
+    monkeypatch.setattr(module, "outweighed", outweighed)
+    monkeypatch.setattr(module, "without_effect", without_effect)
+    made = judged()
+    assert asked == [("account", [spring, load], (1,)), ("account", [load], (1,))]
+    assert made.outcome.name == "fewer" and made.contacts == [CONTACT]
+    assert made.model == ("with", "load", "push") and made.strengths[1] is made.outcome
+    assert made.verdict == "effects_found" and made.reasons[1:] == ["stands", "zeros of ['run']"]
+    assert made.reasons[0].startswith("spring would remove 25% of what can be explained")
+    # and where nothing else was found, nobody knows what is there
+    answers.given.update(found=[spring], contacts=[])
+    made = judged()
+    assert made.verdict == "cannot_tell" and made.reasons[0].startswith("spring")

@@ -316,7 +316,8 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
         return SimpleNamespace(suspects=lambda fit: [])
 
     monkeypatch.setattr(_View, "of", view)
-    samples = SimpleNamespace(motion=None, moving=None, period=0.05)
+    motion = SimpleNamespace(runs=lambda: [slice(0, N)])
+    samples = SimpleNamespace(motion=motion, moving=None, period=0.05)
     baseline: dict[str, Any] = {}
     evidence: Any = SimpleNamespace(
         model=SimpleNamespace(baseline=baseline),

@@ -405,6 +405,36 @@ class TestOutcomes:
         assert kept({("ac", "all"): 0.0, ("c", "ac"): -1.0}, "a", "b", "c") == "c"
         assert kept({("", "all"): -1.0}, "a") == ""
 
+    def test_an_effect_that_removes_less_than_what_is_left_where_it_acts(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Of two joints of a hundred rows, what is left with all, and without each of two effects."""
+        energy = {"all": (150.0, 500.0), "b": (150.0, 899.0), "a": (260.0, 500.0)}
+        monkeypatch.setattr(
+            searching,
+            "_known",
+            lambda evidence, found: SimpleNamespace(
+                fit=SimpleNamespace(score=score(*energy["".join(f.shape for f in found)]))
+            ),
+        )
+
+        def outweighed(*left: int) -> str | None:
+            whole = self.outcome("a", "b")
+            whole.after.score = score(*energy["all"])
+            nothing: Any = None
+            found = searching.outweighed(nothing, whole, left)
+            return None if found is None else str(found.shape)
+
+        # 399 of the second joint, of which 400 are left beyond its baseline; what is noise there is no rest
+        assert outweighed(1) == "a" and outweighed() is None and outweighed(0) is None
+        energy["b"] = (150.0, 901.0)
+        assert outweighed(1) is None
+        # each joint by its part of what is removed: 110 (110 - 50) of the first, and what the effect worsens is nothing
+        energy["a"] = (260.0, 400.0)
+        assert outweighed(0, 1) is None
+        energy["a"] = (199.0, 500.0)
+        assert outweighed(0, 1) == "b"
+
     def test_effects_at_a_joint_are_taken_away_and_the_others_fitted_again(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -255,11 +255,14 @@ class TestReasons:
         augmented: Any = 0.75
         found = reasons.standing(evidence, augmented, after, of.get("explained", []))
         assert (seen[0] == 0.75).all()
-        return found.reasons, found.unknown
+        assert all(found.unknown for _ in found.left)
+        return (found.reasons, found.unknown) if of.get("left") is None else found.left
 
     def test_twice_the_baseline_is_no_baseline(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.standing(monkeypatch, [1.0, None, 0.99]) == (["1 2"], False)
         assert self.standing(monkeypatch, [0.0, 2.0, np.nan]) == (["2 4"], True)
+        # the second joint's can be predicted, the first one's is noise
+        assert self.standing(monkeypatch, [2.0, 2.0, 0.5], left=True) == (1,)
         assert self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3]) == (["1 18"], False)
 
     def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from armloop.data.motion import Motion, Samples
+from armloop.util.arrays import Mask
 
 
 def block_numbers(
@@ -47,6 +49,14 @@ def halves(blocks: NDArray[np.intp]) -> NDArray[np.intp]:
     """
     coins = np.random.default_rng(0).random(int(blocks.max(initial=0)) // 2 + 1) < 0.5
     return np.asarray((blocks + coins[blocks // 2]) % 2, dtype=np.intp)
+
+
+def widened(rows: Mask, motion: Motion, reach: int) -> Mask:
+    """Samples (N, n) within so many of one of some (dilation), run by run."""
+    wide = np.empty_like(rows)
+    for run in motion.runs():
+        wide[run] = binary_dilation(rows[run], np.ones((2 * reach + 1, 1)))
+    return wide
 
 
 def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray[np.float64]:

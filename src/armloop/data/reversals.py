@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
+from armloop.data.blocks import widened
 from armloop.data.motion import Motion, Samples
 from armloop.util.arrays import Mask
 
@@ -35,4 +35,4 @@ def at_reversals(samples: Samples, turns: Mask, counted: Mask) -> Mask:
         counted: (N, n) samples of which none but these may belong to one.
     """
     reach = round(AROUND / samples.period)
-    return np.asarray(binary_dilation(turns, np.ones((2 * reach + 1, 1))) & counted)
+    return widened(turns, samples.motion, reach) & counted

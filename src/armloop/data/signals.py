@@ -26,6 +26,8 @@ from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
 _SHORTEST = 6
+#: Periods that differ by less than this part are one.
+_ALIKE = 0.01
 #: Hz; a filter of a lower corner would need hours of a log.
 LOWEST_CORNER = 1e-3
 
@@ -90,7 +92,8 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
-    ``oversampling`` samples per period of the corner. Half a period of the corner is cut at both ends.
+    ``oversampling`` samples per period of the corner, all to the rate of the slowest. Half a period of the corner is cut
+    at both ends.
     ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
 
     Args:
@@ -122,9 +125,10 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
             f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
         )
+    parts = _at_one_rate(parts)
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving, lost = (np.concatenate(column) for column in zip(*parts, strict=True))
-    period = uniform_period(parts[0][0]) if len(parts[0][0]) > 1 else 1.0
+    period = _period(parts[0][0]) or 1.0
     motion = Motion(time, q, v, vdot, starts, np.array(spans)[:, 0])
     return Samples(
         motion,
@@ -136,9 +140,6 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         WIDER,
         lost if lost.any() else None,
     )
-
-
-condition = preprocess  # the name before November 2026
 
 
 def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array]:
@@ -177,7 +178,9 @@ def smooth(samples: Samples, x: Array) -> Array:
 
     Whatever is computed of the motion must lose what the measured torque has lost before the two are compared.
     """
-    return LowPass(samples.cutoff_hz, samples.period).each(x, samples.motion.runs())
+    for period, runs in _rates(samples).items():
+        x = LowPass(samples.cutoff_hz, period).each(x, runs)
+    return x
 
 
 def as_torque(samples: Samples) -> Samples:
@@ -197,14 +200,53 @@ def as_torque(samples: Samples) -> Samples:
 def independent_rows(samples: Samples) -> NDArray[np.bool_]:
     """(N,) every so many samples that :data:`INDEPENDENT` are left per period of the corner."""
     rows = np.zeros(samples.motion.samples, dtype=bool)
-    stride = (
-        1
-        if samples.cutoff_hz <= 0
-        else max(1, int(1 / INDEPENDENT / (samples.cutoff_hz * samples.period) + 1e-6))
-    )
-    for run in samples.motion.runs():
-        rows[run.start : run.stop : stride] = True
+    for period, runs in _rates(samples).items():
+        corner = samples.cutoff_hz * period
+        stride = max(1, int(1 / INDEPENDENT / corner + 1e-6)) if corner > 0 else 1
+        for run in runs:
+            rows[run.start : run.stop : stride] = True
     return rows
+
+
+def _rates(samples: Samples) -> dict[float, list[slice]]:
+    """The runs by sample period, s: that of the samples for all that have it but for the rounding of their stamps."""
+    rates: dict[float, list[slice]] = {}
+    for run in samples.motion.runs():
+        own = _period(samples.motion.time[run])
+        rates.setdefault(own if own and _differ(own, samples.period) else samples.period, []).append(run)
+    return rates
+
+
+def _period(time: Array) -> float:
+    """The period of a run, s; 0 of a single sample."""
+    return uniform_period(time) if len(time) > 1 else 0.0
+
+
+def _differ(a: float, b: float) -> bool:
+    return abs(a - b) > _ALIKE * b
+
+
+def _at_one_rate(parts: list[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+    """Runs of :func:`_condition_run`, on cubic splines at the period of the coarsest where their rates differ.
+
+    They have passed the filter, and even the coarsest keeps what has.
+    """
+    coarsest = max(_period(part[0]) for part in parts)
+    return [
+        _thinned(part, coarsest) if _differ(_period(part[0]) or coarsest, coarsest) else part
+        for part in parts
+    ]
+
+
+def _thinned(part: tuple[Any, ...], period: float) -> tuple[Any, ...]:
+    from scipy.interpolate import CubicSpline
+
+    elapsed = part[0] - part[0][0]
+    grid = np.arange(0.0, elapsed[-1], period)
+    after = np.clip(np.searchsorted(elapsed, grid), 1, len(elapsed) - 1)
+    values = (CubicSpline(elapsed, x)(grid) for x in part[1:5])
+    moving, lost = part[5:]
+    return part[0][0] + grid, *values, moving[after] & moving[after - 1], lost[after] | lost[after - 1]
 
 
 def _condition_run(

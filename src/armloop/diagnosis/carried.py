@@ -101,7 +101,7 @@ def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:
 
 def _shape(load: CarriedLoad) -> Shape:
     """No parameter of the load, but a number that tells the columns of other intervals apart."""
-    return Shape.fixed(float(hash(load.intervals) % 2**31))
+    return Shape.fixed(float(hash(load.intervals) % 2**52))
 
 
 def _by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
@@ -140,8 +140,8 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     time = motion.time[evidence.kept]
     best: Mask | None = None
     theta, most = np.zeros(X.shape[2]), 0.0
-    for start in _starts(y, time, run):
-        carried = start
+    for carried in _starts(y, time, run):
+        gains, beta = np.zeros(len(y)), theta
         for _ in range(_ROUNDS):
             if carried.sum() < 2 * X.shape[2]:
                 break
@@ -168,11 +168,15 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
 
 def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
     """(K,) samples that may carry the load: all, and those where the averaged residual is large, or is not."""
-    size = (y**2).sum(axis=1)
-    sums = np.concatenate([[0.0], np.cumsum(size)])
-    first = np.searchsorted(time + 1e9 * run, time + 1e9 * run - _WINDOW)
-    last = np.searchsorted(time + 1e9 * run, time + 1e9 * run + _WINDOW, side="right")
-    mean = (sums[last] - sums[first]) / (last - first)
+    size, mean = (y**2).sum(axis=1), np.empty(len(y))
+    for number in np.unique(run):
+        mine = np.flatnonzero(run == number)
+        sums = np.concatenate([[0.0], np.cumsum(size[mine])])
+        first, last = (
+            np.searchsorted(time[mine], time[mine] + way * _WINDOW, side=side)
+            for way, side in ((-1, "left"), (1, "right"))
+        )
+        mean[mine] = (sums[last] - sums[first]) / (last - first)
     large = mean > np.median(mean)
     return [np.ones(len(y), dtype=bool), large, ~large]
 

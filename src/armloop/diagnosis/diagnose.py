@@ -311,4 +311,6 @@ def diagnose(
         contacts = account.without_effect(outcome).contacts
     if verdict == "no_effect" and stand.unknown:
         found = replace(found, verdict="cannot_tell")
-    return replace(found, standing=replace(stand, reasons=[*doubted, *stand.reasons, *own_zeros]), zeros=zeros)
+    return replace(
+        found, standing=replace(stand, reasons=[*doubted, *stand.reasons, *own_zeros]), zeros=zeros
+    )

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
-from armloop.data.blocks import block_numbers, halves
+from armloop.data.blocks import block_numbers, halves, widened
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
@@ -238,11 +237,7 @@ def too_slow(model: ReconstructedModel, motion: Motion) -> NDArray[np.bool_]:
 
 def near_standstill(samples: Samples) -> NDArray[np.bool_]:
     """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
-    near = ~samples.moving
-    steps = round(samples.reach / samples.period)
-    for run in samples.motion.runs():
-        near[run] = binary_dilation(near[run], np.ones((2 * steps + 1, 1)))
-    return near
+    return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
 
 
 def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:

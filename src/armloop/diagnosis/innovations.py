@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
+from armloop.data.blocks import widened
 from armloop.data.creep import CREEPING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
@@ -83,11 +84,7 @@ def at_rest(samples: Samples) -> NDArray[np.bool_]:
     rest = ~samples.moving
     reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
     if reach:
-        still = [
-            binary_erosion(rest[run], np.ones((2 * reach + 1, 1)), border_value=1)
-            for run in samples.motion.runs()
-        ]
-        rest = np.concatenate(still)
+        rest = ~widened(samples.moving, samples.motion, reach)
     return np.asarray(rest | (np.abs(samples.motion.v) < CREEP))
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
+from armloop.data.blocks import widened
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.diagnosis.evidence import Evidence
@@ -66,7 +66,7 @@ class Stage:
         motion = Motion(t, q, v, vdot, np.array([0]))
         still = np.abs(v) <= _SLOW * np.abs(v).max(axis=0)
         reach = int(np.ceil(samples.reach / period))
-        moving = ~binary_dilation(still, np.ones((2 * reach + 1, 1)))
+        moving = ~widened(still, motion, reach)
         made = Samples(motion, np.zeros_like(q), moving, period, samples.cutoff_hz)
         rows = moving & independent_rows(made)[:, None]
         return Stage(made, rows, evidence.scale, context_of(evidence, motion))
