@@ -172,10 +172,8 @@ def _starts(y: Array, time: Array, run: Index) -> list[Mask]:
     for number in np.unique(run):
         mine = np.flatnonzero(run == number)
         sums = np.concatenate([[0.0], np.cumsum(size[mine])])
-        first, last = (
-            np.searchsorted(time[mine], time[mine] + way * _WINDOW, side=side)
-            for way, side in ((-1, "left"), (1, "right"))
-        )
+        first = np.searchsorted(time[mine], time[mine] - _WINDOW)
+        last = np.searchsorted(time[mine], time[mine] + _WINDOW, side="right")
         mean[mine] = (sums[last] - sums[first]) / (last - first)
     large = mean > np.median(mean)
     return [np.ones(len(y), dtype=bool), large, ~large]
