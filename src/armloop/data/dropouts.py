@@ -2,8 +2,8 @@
 
 Spikes of one or two samples are replaced by what lies beside them (a median filter would touch every sample), and so are
 rows that repeat the positions and speeds before them, as where a bus loses packets or a log is written faster than it is
-measured. A torque that stands still to the last digit, or is cut off, is left out: nothing is fitted to it, and nothing is
-judged by it.
+measured. A v that is late, as a controller's own low-pass makes it, is moved to where it belongs. A torque that stands still
+to the last digit, or is cut off, is left out: nothing is fitted to it, and nothing is judged by it.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ _CHANCE, _FEWEST = 1e-6, 5
 _JUMP, _NEVER = 5.0, 0.02
 #: Position and speed of all joints may be repeated for so long, s.
 _HELD = 0.1
+#: Fewest samples of a run in which v is moved to where it belongs.
+_FEWEST_TO_SHIFT = 4
 #: Torque is cut off where so many of the rows hold its extreme, so many times as many as any of so many values beside it; a
 #: sensor that knows fewer values than the last rounds.
 _CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
@@ -38,7 +40,7 @@ _CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
 
 @dataclass(frozen=True, eq=False)
 class Repaired:
-    """A record without spikes.
+    """A record without spikes, v in time with q.
 
     Attributes:
         q, v, tau: (N, n).
@@ -56,8 +58,12 @@ class Repaired:
         return Repaired(self.q[rows], self.v[rows], self.tau[rows], lost)
 
 
-def repaired(log: Recorded) -> Repaired:
-    """The record without spikes, and which torques are none."""
+def repaired(log: Recorded, lag: float = 0.0) -> Repaired:
+    """The record without spikes, v moved to where q changes as it says, and which torques are none.
+
+    Args:
+        lag: seconds by which v is late.
+    """
     clean = _without_spikes(_moving_on(log))
     lost = np.zeros(log.tau.shape, dtype=bool)
     for j in range(log.tau.shape[1]):
@@ -65,7 +71,25 @@ def repaired(log: Recorded) -> Repaired:
             lost[first : last + 1, j] = True
         for value, _ in cut_off(clean, j):
             lost[:, j] |= clean.tau[:, j] == value
-    return Repaired(clean.q, clean.v, clean.tau, lost if lost.any() else None)
+    return Repaired(clean.q, _in_time(clean, lag), clean.tau, lost if lost.any() else None)
+
+
+def _in_time(log: Recorded, lag: float) -> Array:
+    """v (N, n) at the instants of q: a controller's own low-pass and differences make it late, and all joints alike.
+
+    A v that leads is left: no filter does that, so it may be q that is late.
+    """
+    if lag <= 0:
+        return log.v
+    # Here, for a fault of the input is to be told before this is imported.
+    from scipy.interpolate import CubicSpline
+
+    v = log.v.copy()
+    for run in log.runs:
+        if run.stop - run.start >= _FEWEST_TO_SHIFT:
+            time = log.time[run]
+            v[run] = CubicSpline(time, log.v[run])(np.minimum(time + lag, time[-1]))
+    return v
 
 
 def dropouts(log: Recorded) -> Iterator[Finding]:

@@ -41,7 +41,7 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
-from armloop.identification.reconstruction.tally import Part, Tally, at_least, lacks_places, with_places
+from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
@@ -315,10 +315,7 @@ def _finished(
             model, components=components, friction=last.law, effects=last.effects, history=history
         )
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
-    if blocks.too_short:
-        model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
-    elif lacks_places(model.baseline):
-        model = replace(model, baseline=with_places(model.baseline, data.sum(whole)))
+    model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}
