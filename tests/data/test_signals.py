@@ -353,6 +353,13 @@ def test_a_speed_that_is_in_time_or_leads_or_is_the_derivative_stays() -> None:
     assert early.velocity_lag == pytest.approx(-0.006, abs=2e-4)
     np.testing.assert_array_equal(repaired(recorded(early), early.velocity_lag).v, early.v)
     assert MotionLog.from_arrays(log.time, log.q, log.tau).velocity_lag == 0.0
+    # sweeps at steady speeds, rounded: what differs is the same all through a sweep, and fits some lag by chance
+    rng = np.random.default_rng(1)
+    speeds = np.repeat(rng.uniform(-0.7, 0.7, (40, 4)), 100, axis=0)
+    times = 0.004 * np.arange(4000) + np.repeat(np.arange(40.0), 100)
+    places = np.round(np.tile(0.004 * np.arange(100), 40)[:, None] * speeds / 1.2e-5) * 1.2e-5
+    sweeps = MotionLog(times, places, np.round(speeds / 1e-3) * 1e-3, speeds, name="sweeps")
+    assert sweeps.velocity_lag == 0.0
     # at a steady speed nothing tells
     steady = replace(log, q=np.outer(log.time, [1.0, 0.5]), v=np.tile([1.0, 0.5], (len(log.time), 1)))
     assert steady.velocity_lag == 0.0

@@ -24,6 +24,8 @@ _FROZEN = 0.2
 _WINDOWS = 5_000
 # Lags that are tried, the one from which on it is said, s, and the standard errors from which on it is one.
 _LAGS, _LAG, _SURE = np.arange(-0.03, 0.0301, 0.001), 0.0035, 5.0
+# Mean square error at the largest lags over the least, from which on a joint's motion tells of a lag.
+_PLAIN = 4.0
 # v that is proportional to the rate of q, at such a correlation, by a factor so far from one.
 _ALIKE, _OFF = 0.998, 0.05
 
@@ -237,18 +239,19 @@ def _errors(log: Recorded, windows: Windows) -> dict[int, Array]:
 def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     """The lag of largest likelihood, s, one for all joints, for they share a controller; 0 if the gain may be chance.
 
-    Errors are normal with a variance of each joint's own; each window's length is one observation. One joint alone says
-    the less the more it errs at every lag: a steady speed knows of none.
+    Errors are normal with a variance of each joint's own; each window's length is one observation. Only joints count at
+    which the largest lags would be plain: a steady speed fits every lag, and what it errs by is no noise.
     """
-    if not errors:
+    told = [e for e in errors.values() if min(e[0], e[-1]) > _PLAIN * e.min()]
+    if not told:
         return 0.0
     seconds = sum(float(np.ptp(log.time[run])) for run in log.runs)
-    size = np.sum([np.log(np.maximum(e, TINY)) for e in errors.values()], axis=0)
+    size = np.sum([np.log(np.maximum(e, TINY)) for e in told], axis=0)
     likelihood = -0.5 * seconds / _WINDOW * size
     best, none = int(np.argmax(likelihood)), len(_LAGS) // 2
     if not 0 < best < len(_LAGS) - 1 or likelihood[best] - likelihood[none] < 0.5 * _SURE**2:
         return 0.0
-    return _vertex(_LAGS, np.sum([e / max(e[best], TINY) for e in errors.values()], axis=0), best)
+    return _vertex(_LAGS, np.sum([e / max(e[best], TINY) for e in told], axis=0), best)
 
 
 def _far_from_the_ends(log: Recorded, windows: Windows) -> Mask:
