@@ -73,9 +73,10 @@ def read_text(path: Path) -> TextTable:
         lines = [*lines[:below], "", *lines[below + 1 :]]
         notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
     heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
+    repeated = set(heads[1:])
     body, starts, numbers, rows = [], [], [], 0
     for k in range(first + 1, len(lines)):
-        if k in set(heads[1:]):
+        if k in repeated:
             if _names(lines[k], separator) != names:
                 raise LogError(
                     f"{path}: line {k + 1} is a header with other columns than line {first + 1}; split the file there"

@@ -64,6 +64,11 @@ class Motion:
         begins = np.concatenate([m.time[m.starts] if m.begins is None else m.begins for m in motions])
         return cls(time, q, v, vdot, starts, begins)
 
+    def take(self, rows: Any, starts: NDArray[np.intp] | None = None) -> "Motion":
+        """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
+        starts = np.array([0]) if starts is None else starts
+        return Motion(self.time[rows], self.q[rows], self.v[rows], self.vdot[rows], starts)
+
     @property
     def samples(self) -> int:
         """The number of samples N."""

@@ -143,7 +143,7 @@ def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
     motion = samples.motion
     run = np.searchsorted(motion.starts, rows, side="right")
     starts = np.flatnonzero(np.diff(run, prepend=-1))
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
+    return motion.take(rows, starts)
 
 
 @dataclass(frozen=True, eq=False)

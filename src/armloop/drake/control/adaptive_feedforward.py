@@ -105,6 +105,11 @@ class AdaptiveFeedforward(LeafSystem):
         self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, sources)
         self.DeclareVectorOutputPort("given_back", 1, self._calc_given_back, kept)
 
+    @property
+    def settling(self) -> float:
+        """Seconds from a name until its effects are supplied in full, at most."""
+        return self._ramp + _LOOK
+
     def _taken(self, context: Context) -> _Taken:
         taken = context.get_abstract_state(int(self._memory)).get_value()
         assert isinstance(taken, _Taken)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.common import RandomDistribution
+from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import Adder, DiscreteDerivative, LogVectorOutput, MatrixGain, RandomSource
@@ -107,6 +107,7 @@ def run_watched(
     logs = [LogVectorOutput(port, builder, step) for port in ports]
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
+    noise.SetRandomContext(noise.GetMyMutableContextFromRoot(context), RandomGenerator(scenario.seed))
     q, v, _ = (table[0] for table in source.tables)
     plant.set_state(context, q, v)
     moments = {"change": np.inf, "alarm": np.nan, "named": np.nan}
@@ -134,7 +135,7 @@ def run_watched(
         return score(part, "pid_step3", time, source.tables, x, tau, asked)
 
     end = scenario.reference.duration
-    full = moments["named"] + 1.0 + 0.05
+    full = moments["named"] + adaptive.settling
     during = scored(at, min(full, end)) if full > at else None
     given = adaptive.GetOutputPort("given_back").Eval(adaptive.GetMyContextFromRoot(context))
     return WatchedRun(

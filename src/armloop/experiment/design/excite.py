@@ -86,8 +86,7 @@ class Excitation:
     def period_motion(self, step: float) -> Motion:
         """One period of the reference, sampled."""
         motion = sampled(self.reference, step)
-        rows = motion.time < self.timing.period - 1e-9
-        return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], motion.starts)
+        return motion.take(motion.time < self.timing.period - 1e-9)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop excite --json``, without the path."""

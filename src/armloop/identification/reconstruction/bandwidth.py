@@ -183,9 +183,8 @@ class Table:
 
     def every(self, step: int) -> Table:
         """Every so many instants."""
-        thin, motion = slice(None, None, step), self.motion
-        starts = -(-motion.starts // step)
-        some = Motion(motion.time[thin], motion.q[thin], motion.v[thin], motion.vdot[thin], starts)
+        thin = slice(None, None, step)
+        some = self.motion.take(thin, -(-self.motion.starts // step))
         return Table(
             self.columns[thin], self.tau[thin], self.blocks[thin], self.moving[thin], some, self.stride * step
         )
@@ -228,9 +227,7 @@ def table_at(
             continue
         fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / _FADES))
         dry = LowPass(corner, period)(fading)[inside]
-        part = Motion(
-            motion.time[inside], motion.q[inside], motion.v[inside], motion.vdot[inside], np.array([0])
-        )
+        part = motion.take(inside)
         N, n = part.q.shape
         columns = np.zeros((N, n, base.count + 3 * n))
         columns[:, :, : base.count] = base.columns(arm, part)
