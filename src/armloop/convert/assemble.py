@@ -70,7 +70,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     values: dict[str, Array] = {}
     for kind, quantity in mapping.quantities().items():
         values[kind] = np.stack([_column(recording, quantity, kind, j) for j in order], axis=1)
-    time, keep, starts = _time(recording, mapping, notes)
+    time, keep, starts = _time(recording, mapping)
     if len(keep) < FEWEST_SAMPLES:
         raise LogError(
             f"{where}: {len(keep)} of {N} {recording.rows}s have a time of their own; a motion log has at least "
@@ -310,9 +310,7 @@ def _there_are(recording: Recording) -> str:
     return f"there are: {', '.join(names[:12])}{' …' if len(names) > 12 else ''}"
 
 
-def _time(
-    recording: Recording, mapping: Mapping, notes: list[str]
-) -> tuple[Array, NDArray[np.intp], list[int]]:
+def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.intp], list[int]]:
     """Seconds from the first sample, the rows that are kept, and where parts of the source start among them."""
     N = recording.samples
     if mapping.time.rate is not None:
