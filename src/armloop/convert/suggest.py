@@ -87,8 +87,7 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
             lines.append("  # gains: [..]  N·m per A, one per joint, if these are currents")
     if "v" in unsure and mapping.v is None:
         lines.append(f"# v: unsure: {unsure['v']}")
-    used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {time.column}
-    extra = [name for name in recording.columns if name not in used]
+    extra = [name for name in recording.columns if name not in mapping.used()]
     lines.append(
         "keep: all" + (f"  # {', '.join(extra[:8])}{' …' if len(extra) > 8 else ''}" if extra else "")
     )
