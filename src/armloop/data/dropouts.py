@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
 _SPIKE, _BACK = 15.0, 0.3
@@ -163,8 +163,7 @@ def _held(log: Recorded) -> Index:
     same &= np.abs(log.v[1:]).max(axis=1) > _NO_SPEED
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in stretches(same).tolist():
         # what stands still to the end of a run, or too long, is another fault
         if log.time[last] - log.time[first] > _HELD or not _in_one_run(log, first, last + 1):
             same[first:last] = False
@@ -242,16 +241,16 @@ def _stuck(log: Recorded, j: int, cut: list[tuple[float, float]]) -> list[tuple[
     same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut])
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    if len(edges) == 0 or same.all() or len(np.unique(x)) < _LEVELS:
+    still = stretches(same)
+    if len(still) == 0 or same.all() or len(np.unique(x)) < _LEVELS:
         return []
     # the chance that a value is followed by the same: of the values that end a stretch, how many begin another
-    part = min(len(edges) / 2 / float((~same).sum()), 1 - 1e-9)
+    part = min(len(still) / float((~same).sum()), 1 - 1e-9)
     # so many equal steps one after the other come about by chance nowhere in the column
     fewest = max(_FEWEST, int(np.ceil(np.log(_CHANCE / len(x)) / np.log(part))))
     jump = 0.0 if part < _NEVER else _JUMP * float(np.median(np.abs(steps[~same]))) / 0.6745
     found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in still.tolist():
         if last - first < fewest:
             continue
         let_go = x[first] != 0 and last < len(steps) and abs(steps[last]) > max(jump, TINY)
