@@ -94,7 +94,7 @@ def choose_bandwidth(
     chosen = even_selection(logs)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
-    highest = highest_corner(logs, how)
+    highest = highest_corner(chosen, how)
     corners = [highest, *(round(part * highest, 3) for part in _PARTS)]
     # every corner must see the same logs: those that are long enough for the lowest
     long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]

@@ -122,7 +122,7 @@ class Laws:
                 continue
             both = []
             for vdot in (pushed, still):
-                motion = Motion(np.arange(float(len(still))), repeated, still, vdot, np.array([0]))
+                motion = Motion(np.arange(float(len(still))), repeated, still, vdot)
                 both.append(law.effect.full_columns(Context(arm, motion), law.shape))
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
             parts.append(added.transpose(0, 2, 1, 3))

@@ -1,4 +1,4 @@
-"""Laws of the catalogue beside base parameters or energies: found, fitted together with them and their friction."""
+"""Joint least squares of base parameters or energies, friction, and the laws of the catalogue that are found there."""
 
 from __future__ import annotations
 
