@@ -152,7 +152,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         gains = list(answers.drive_gains)
         if arm is not None and mapping.joints is not None:
             # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns.
-            at = match(mapping.joints, [joint.name for joint in arm.joints], where)
+            at = match(mapping.joints, arm.joint_names, where)
             gains = [gains[at.index(j)] for j in range(joints)]
         tau = replace(tau, unit=_said(tau.unit, "A"), gains=gains)
     elif answers.tau_unit is not None:
@@ -194,7 +194,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
 
 def _sizes(recording: Recording, mapping: Mapping, arm: Arm | None) -> str:
     """The largest values of tau beside the arm's effort limits, from which its user can tell which of them they are."""
-    if arm is None or not all(np.isfinite(joint.effort) for joint in arm.joints):
+    if arm is None or not np.isfinite(arm.effort).all():
         return ""
     largest = [
         np.abs(_column(recording, mapping.tau, "tau", j)).max() for j in _order(recording, mapping, arm, [])
@@ -275,7 +275,7 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
             )
         return list(range(mapping.n))
     if names is not None:
-        return match(names, [joint.name for joint in arm.joints], where)
+        return match(names, arm.joint_names, where)
     if mapping.n != arm.n:
         raise LogError(f"{where}: has {mapping.n} joints; the arm {arm.name} has {arm.n}")
     return list(range(arm.n))

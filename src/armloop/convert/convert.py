@@ -44,7 +44,7 @@ class Converted:
 
 def read_sources(paths: Sequence[str | Path], arm: Arm | None, topic: str | None = None) -> list[Recording]:
     """Read each source by its format; raises ``LogError``."""
-    wanted = None if arm is None else [joint.name for joint in arm.joints]
+    wanted = None if arm is None else arm.joint_names
     return [read_source(Path(path), topic, wanted) for path in paths]
 
 

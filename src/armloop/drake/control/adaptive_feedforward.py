@@ -87,8 +87,7 @@ class AdaptiveFeedforward(LeafSystem):
         require("a number above 0", ramp=ramp, trial=trial)
         super().__init__()
         n = self._n = model.arm.n
-        effort = np.array([joint.effort for joint in model.arm.joints])
-        limits = 0.5 * effort if bound is None else levels_of(bound, n, "bound")
+        limits = 0.5 * model.arm.effort if bound is None else levels_of(bound, n, "bound")
         if not (trial > _LOOK and (limits > 0).all()):
             raise InputError(f"trial {trial} s must be above {_LOOK} s and bound {limits} above 0")
         self._model, self._ramp, self._trial, self._bound = model, ramp, trial, limits

@@ -72,7 +72,6 @@ def run_watched(
     state = plant.GetOutputPort("state")
     builder.Connect(state, law.GetInputPort("state"))
     builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    # what the monitor sees: the drives' torques with their noise, the state, and its derivative
     monitor = builder.AddNamedSystem("monitor", ResidualMonitor(model, learn=learn))
     derivative = builder.AddSystem(DiscreteDerivative(n, step))
     speeds = builder.AddSystem(MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)])))
@@ -88,7 +87,6 @@ def run_watched(
     builder.Connect(measured.get_output_port(), monitor.GetInputPort("tau"))
     builder.Connect(state, monitor.GetInputPort("state"))
     builder.Connect(derivative.get_output_port(), monitor.GetInputPort("vdot"))
-    # what is named joins the feedforward
     adaptive = builder.AddNamedSystem("adaptive", AdaptiveFeedforward(model))
     for port in ("q_ref", "v_ref", "vdot_ref"):
         builder.Connect(source.GetOutputPort(port), adaptive.GetInputPort(port))
