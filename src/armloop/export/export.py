@@ -61,7 +61,7 @@ def _described(model: ReconstructedModel, target: str, path: Path, motion: Motio
     text, features, consumer, read = _FORMATS[target]
     what = said(model)
     notes = list(what.notes)
-    names = [joint.name for joint in model.arm.joints]
+    names = model.arm.joint_names
     whole = whole_torque(model, motion)
     difference = unsaid = None
     source = text(what)

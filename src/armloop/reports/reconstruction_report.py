@@ -12,7 +12,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters, sort_samples
 from armloop.data.signals import as_torque, preprocess
-from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.reconstruction import Reconstruction
 from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
@@ -144,13 +144,10 @@ def comparison(ours: Reconstruction, reference: Reconstruction) -> Table:
     rows = []
     for name, made in (("stepwise", ours), ("one-shot SINDy", reference)):
         errors = [percent(x) for x in made.held_out.moving["nrmse"]]
-        rows.append([name, *errors, " / ".join(map(str, _terms(made.reports)))])
+        terms = np.sum([report.terms for report in made.reports], axis=0)
+        rows.append([name, *errors, " / ".join(map(str, terms))])
     headers = ["method", *(f"joint {j + 1}" for j in range(ours.model.arm.n)), "terms per joint"]
     return make_table(headers, rows, "Held-out nRMSE of moving samples, same data")
-
-
-def _terms(reports: Sequence[StepReport]) -> list[int]:
-    return [int(x) for x in np.sum([report.terms for report in reports], axis=0)]
 
 
 def _factor(error: float, other: float | None) -> float | None:
