@@ -130,6 +130,11 @@ class ReconstructedModel:
     uncertainty: dict[str, Any] = field(default_factory=dict)
 
     @property
+    def in_amperes(self) -> bool:
+        """Whether the model predicts motor currents, for want of gains that make torques of them."""
+        return self.recorded["unit"] == "A" and self.recorded["drive_gains"] is None
+
+    @property
     def ranges(self) -> Array:
         """(4, n) how far q, v and v̇ went where the model was fitted, and the middle of q; a guess where it is not kept."""
         n = self.arm.n
