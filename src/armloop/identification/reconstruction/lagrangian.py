@@ -14,7 +14,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
@@ -49,11 +48,9 @@ from armloop.identification.reconstruction.training import Survey, Training, fit
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
-
-Rows = NDArray[np.bool_]
 
 #: Most terms tried beside the joints' own inertias, and additions without a gain after which the search ends.
 _MOST, _PATIENCE = 80, 8
@@ -244,7 +241,7 @@ def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Inde
     return np.sort(support[support < library.count])
 
 
-def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
+def _problem(library: EnergyTerms, samples: Samples, rows: Mask) -> _Problem:
     motion, acts, p, f = as_torque(samples).motion, library.acts, library.count, len(FRICTION)
     wheres = [
         np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
