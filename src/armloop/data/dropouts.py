@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
 _SPIKE, _BACK = 15.0, 0.3
@@ -67,9 +67,10 @@ def repaired(log: Recorded, lag: float = 0.0) -> Repaired:
     clean = _without_spikes(_moving_on(log))
     lost = np.zeros(log.tau.shape, dtype=bool)
     for j in range(log.tau.shape[1]):
-        for first, last in _stuck(clean, j):
+        cut = cut_off(clean, j)
+        for first, last in _stuck(clean, j, cut):
             lost[first : last + 1, j] = True
-        for value, _ in cut_off(clean, j):
+        for value, _ in cut:
             lost[:, j] |= clean.tau[:, j] == value
     return Repaired(clean.q, _in_time(clean, lag), clean.tau, lost if lost.any() else None)
 
@@ -111,7 +112,8 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
                 "their place",
             )
     for j in range(log.tau.shape[1]):
-        stuck = _stuck(log, j)
+        cut = cut_off(log, j)
+        stuck = _stuck(log, j, cut)
         if stuck:
             seconds = sum(float(log.time[last] - log.time[first]) for first, last in stuck)
             yield Finding(
@@ -119,7 +121,7 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
                 f"stands still to the last digit while the joint moves {len(stuck)} times, {seconds:.2g} s "
                 "in all; these parts are left out",
             )
-        for value, share in cut_off(log, j):
+        for value, share in cut:
             yield Finding(
                 f"column tau{j + 1}",
                 f"is {value:.6g} to the last digit in {share:.0%} of the rows, as where a sensor or a drive saturates; "
@@ -185,8 +187,7 @@ def _held(log: Recorded) -> Index:
     same &= np.abs(log.v[1:]).max(axis=1) > _NO_SPEED
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in stretches(same).tolist():
         # what stands still to the end of a run, or too long, is another fault
         if log.time[last] - log.time[first] > _HELD or not _in_one_run(log, first, last + 1):
             same[first:last] = False
@@ -254,34 +255,29 @@ def _in_one_run(log: Recorded, first: int, last: int) -> bool:
     return any(run.start <= first and last < run.stop for run in log.runs)
 
 
-def _stuck(log: Recorded, j: int) -> list[tuple[int, int]]:
+def _stuck(log: Recorded, j: int, cut: list[tuple[float, float]]) -> list[tuple[int, int]]:
     """First and last samples of stretches in which a joint's torque stands still by a fault, while the joint moves.
 
     Zero is no stuck value: a drive may be off.
     """
     x, v = log.tau[:, j], log.v[:, j]
     steps = np.diff(x)
-    same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut_off(log, j)])
+    same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut])
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    if len(edges) == 0 or same.all():
+    still = stretches(same)
+    if len(still) == 0 or same.all() or len(np.unique(x)) < _LEVELS:
         return []
     # the chance that a value is followed by the same: of the values that end a stretch, how many begin another
-    part = min(len(edges) / 2 / float((~same).sum()), 1 - 1e-9)
+    part = min(len(still) / float((~same).sum()), 1 - 1e-9)
     # so many equal steps one after the other come about by chance nowhere in the column
     fewest = max(_FEWEST, int(np.ceil(np.log(_CHANCE / len(x)) / np.log(part))))
     jump = 0.0 if part < _NEVER else _JUMP * float(np.median(np.abs(steps[~same]))) / 0.6745
     found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in still.tolist():
         if last - first < fewest:
             continue
         let_go = x[first] != 0 and last < len(steps) and abs(steps[last]) > max(jump, TINY)
-        if (
-            let_go
-            and len(np.unique(x)) >= _LEVELS
-            and np.ptp(v[first : last + 1]) > 0
-            and np.abs(v[first : last + 1]).min() > 0
-        ):
+        if let_go and np.ptp(v[first : last + 1]) > 0 and np.abs(v[first : last + 1]).min() > 0:
             found.append((first, last))
     return found

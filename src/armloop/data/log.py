@@ -65,6 +65,14 @@ class MotionLog:
     tau_unit: str = "N*m"
     v_derived: bool = False
 
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return what was measured by the names of the columns of its file, (N,) each, in their order."""
+        columns = {"time": self.time}
+        for kind, values in (("q", self.q), ("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
+            if values is not None and not (kind == "v" and self.v_derived):
+                columns |= {f"{kind}{j + 1}": values[:, j] for j in range(self.joints)}
+        return columns
+
     def __post_init__(self) -> None:
         if self.tau_unit not in TAU_UNITS:
             raise LogError(
@@ -294,11 +302,7 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     where = path_of(path, "the path of a log", LogError)
     if not isinstance(log, MotionLog):
         raise LogError(f"{where}: what is written must be a MotionLog; this is of type {type(log).__name__}")
-    columns = {"time": log.time}
-    for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
-        if values is not None and not (kind == "v" and log.v_derived):
-            columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
-    write_columns(where, columns, said_of_log(log))
+    write_columns(where, log.columns(), said_of_log(log))
 
 
 def said_of_log(log: MotionLog) -> dict[str, str]:

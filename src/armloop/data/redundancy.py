@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Mask, stretches
 
 # Window of the comparison of rates, s, and the rate (rms, rad/s or m/s) from which a joint is judged.
 _WINDOW, _MOVES = 0.05, 0.05
@@ -164,7 +164,7 @@ def frozen(log: Recorded, integral: Array) -> Iterator[Finding]:
                 ("q", np.diff(q[:, j]) == 0, path[:, j]),
                 ("v", v[1:, j] == 0, q[:, j]),
             ):
-                first, last = _stretches(same)
+                first, last = stretches(same).T
                 length, travel = time[last] - time[first], other[last] - other[first]
                 wrong = (last - first >= 5) & (length >= _FROZEN)
                 wrong &= np.abs(travel) > np.maximum(_MOVES * length, 0.02)
@@ -176,12 +176,6 @@ def frozen(log: Recorded, integral: Array) -> Iterator[Finding]:
                         f"while {moves} {travel[k]:.3g}; drop these rows",
                         run.start + int(first[k]),
                     )
-
-
-def _stretches(same: Mask) -> tuple[Index, Index]:
-    """First and last sample of every stretch whose steps are all ``same``."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    return edges[::2], edges[1::2]
 
 
 def disagreements(log: Recorded) -> Iterator[Finding]:

@@ -94,7 +94,7 @@ def choose_bandwidth(
     chosen = even_selection(logs)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
-    highest = highest_corner(logs, how)
+    highest = highest_corner(chosen, how)
     corners = [highest, *(round(part * highest, 3) for part in _PARTS)]
     # every corner must see the same logs: those that are long enough for the lowest
     long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
@@ -183,9 +183,8 @@ class Table:
 
     def every(self, step: int) -> Table:
         """Every so many instants."""
-        thin, motion = slice(None, None, step), self.motion
-        starts = -(-motion.starts // step)
-        some = Motion(motion.time[thin], motion.q[thin], motion.v[thin], motion.vdot[thin], starts)
+        thin = slice(None, None, step)
+        some = self.motion.take(thin, -(-self.motion.starts // step))
         return Table(
             self.columns[thin], self.tau[thin], self.blocks[thin], self.moving[thin], some, self.stride * step
         )
@@ -230,9 +229,7 @@ def table_at(
             continue
         fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / (_FADES * unit)))
         dry = smooth(samples, fading)[inside]
-        part = Motion(
-            motion.time[inside], motion.q[inside], motion.v[inside], motion.vdot[inside], np.array([0])
-        )
+        part = motion.take(inside)
         N, n = part.q.shape
         columns = np.zeros((N, n, base.count + 3 * n))
         columns[:, :, : base.count] = base.columns(arm, part)

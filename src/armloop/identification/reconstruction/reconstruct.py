@@ -266,9 +266,7 @@ def _finished(
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
     if not METHODS[method].reference:
-        bare = ReconstructedModel(
-            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
-        )
+        bare = found.model(conditioning=tried.conditioning)
         if data.in_memory:
             recorded_logs, chunk = [log.read() for log in logs], data.reference
         else:
@@ -283,11 +281,7 @@ def _finished(
             f"the residual remembers for {blocks.correlation:.2g} s, and the logs are too short for held-out blocks of more "
             f"than {blocks.seconds:.2g} s: the held-out error may be too good"
         )
-    model = ReconstructedModel(
-        arm=arm,
-        components=tuple(found.components),
-        friction=found.law,
-        effects=found.effects,
+    model = found.model(
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
@@ -309,10 +303,13 @@ def _finished(
     model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
-        components = tuple(found.final.components)
         last = found.final
         model = replace(
-            model, components=components, friction=last.law, effects=last.effects, history=history
+            model,
+            components=tuple(last.components),
+            friction=last.law,
+            effects=last.effects,
+            history=history,
         )
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))

@@ -125,10 +125,7 @@ class Tally:
         ]
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        return {
-            **{"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks()},
-            "samples": self.samples,
-        }
+        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks(), "samples": self.samples}
 
     def yardsticks(self) -> dict[str, list[float | None]]:
         """RMSE per joint that one block in ten exceeds (``worst``), and at the places that are apart."""
