@@ -16,6 +16,7 @@ FAULTS = {
         "rad",
         ["Subtract 0.04 rad from the position readings of joint 3", "the joint stands -0.04 rad from where"],
     ),
+    "torque_drift": (2, "rate", 0.01, "N*m/s", ["Let the sensor of joint 2 warm up"]),
     "time_delay": (None, "seconds", 0.03, "s", ["Shift the torque record by 30 ms back"]),
 }
 

@@ -47,7 +47,8 @@ class Fit:
     Attributes:
         effects, shapes: what was fitted.
         parameters: one dict of estimates per effect, from all blocks.
-        clear: per effect, how many standard errors the clearest of its coefficients is from zero.
+        clear: per effect, how many standard errors the clearest of its coefficients is from zero; what would be another
+            law by itself does not count.
         wald: per effect, chi-square and degrees of freedom of all its coefficients together: where columns are alike each
             coefficient may be anything, though what they do together is plain.
         outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
@@ -88,7 +89,8 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     for effect, value, free in zip(effects, values, x, strict=True):
         block = slice(start, start + len(free))
         parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
-        clear.append(float(np.max(np.abs(free) / np.sqrt(np.diag(spread)[block] + TINY), initial=0.0)))
+        errors = np.abs(free) / np.sqrt(np.diag(spread)[block] + TINY)
+        clear.append(float(np.max(errors[: len(free) - effect.nested], initial=0.0)))
         wald.append(_wald(free, spread[block, block]))
         start += len(free)
     said = tuple(parameters), tuple(clear), tuple(wald)

@@ -54,6 +54,17 @@ def test_a_sensor_of_a_joint_falsifies_its_own_record_alone(
     np.testing.assert_array_equal(tau, before[1])
 
 
+def test_a_sensor_that_drifts_falsifies_its_joints_torque_from_the_start_of_each_record() -> None:
+    time, q, tau = 1.7e9 + np.arange(40.0), np.zeros((40, N)), np.ones((40, N))
+    p = {"rate": 0.1, "time_constant": 5.0, "offset": -0.2}
+    found = effect("torque_drift", 2).falsified(time, q, tau, p)
+    assert found is not None and (tau == 1.0).all()
+    expected = np.ones((40, N))
+    expected[:, 1] += -0.2 + 0.1 * 5.0 * (1 - np.exp(-np.arange(40) / 5.0))
+    np.testing.assert_allclose(found[1], expected, atol=1e-6)
+    np.testing.assert_array_equal(found[0], q)
+
+
 def runs() -> Motion:
     """Two logs with one clock, a tenth of a second a sample, at other postures."""
     time = np.tile(np.arange(11) * 0.1, 2)

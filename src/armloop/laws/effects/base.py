@@ -146,6 +146,7 @@ class Effect(ABC):
         simulated: whether Drake's systems can have it; else it is found in logs alone.
         rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
         fault_order: of sensors: a record is falsified by the lower ones first.
+        nested: how many of its coefficients, the last, are all of another listed law: it is there if the others are.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
         looks_like: the name of an effect whose likenesses it shares.
     """
@@ -168,6 +169,7 @@ class Effect(ABC):
     simulated: ClassVar[bool] = True
     rubs: ClassVar[bool] = False
     fault_order: ClassVar[int] = 9
+    nested: ClassVar[int] = 0
     alike: ClassVar[Mapping[str, str]] = {}
     looks_like: ClassVar[str] = ""
 

@@ -24,6 +24,7 @@ class JointSpring(Law):
         Element(lambda x, p, f: -1.0, "-1", part="position"),
     )
     load = True
+    nested = 1
     alike: ClassVar = {
         "torque_offset": (
             "over a small range a spring is a constant; a run over a larger range of the joint would tell them apart"
