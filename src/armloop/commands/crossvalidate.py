@@ -76,6 +76,7 @@ def run(options: Crossvalidate) -> None:
         physical_table,
     )
     from armloop.util.checkpoints import Kept
+    from armloop.util.errors import InputError
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
 
@@ -94,11 +95,15 @@ def run(options: Crossvalidate) -> None:
         "kept": kept,
         "workers": Processes(options.jobs),
     }
-    if options.compare_physical:
-        comparison = compare_physical(logs, arm, **how)
-        result = comparison.runs["physical"]
-    else:
-        comparison, result = None, crossvalidate(logs, arm, **how)
+    try:
+        if options.compare_physical:
+            comparison = compare_physical(logs, arm, **how)
+            result = comparison.runs["physical"]
+        else:
+            comparison, result = None, crossvalidate(logs, arm, **how)
+    except InputError:
+        kept.give_up()
+        raise
     compared = {} if comparison is None else {"physical_consistency": comparison.to_dict()}
     answer = {**result.to_dict(), **compared}
     if folder is not None:
