@@ -80,8 +80,13 @@ def run(options: Crossvalidate) -> None:
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
 
+    if options.block != Crossvalidate.block and len(options.logs) > 1 and options.leave_out != "blocks":
+        raise InputError(
+            "--block is the length of blocks, but of several logs each is left out whole; add --leave-out blocks, or leave "
+            "it out"
+        )
     arm = arm_of(options)
-    logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
+    logs = read_logs(options.logs, arm, recorded_as(options, TORQUE))
     folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
     kept = Kept(folder, "crossvalidate")
     how: dict[str, Any] = {
