@@ -10,7 +10,7 @@ import numpy as np
 from armloop.reports.tables import Table, make_table
 from armloop_paper.noise_study import METHODS, Draw, reduction
 from armloop_paper.readings import Reading
-from armloop_paper.spread import in_words, median
+from armloop_paper.spread import by_joint, in_words, median
 
 
 def active_table(draws: list[Draw], paper: Sequence[float] | None, title: str) -> Table:
@@ -39,7 +39,7 @@ def readings_table(
         fewer = median(reduction(kept))
         away = float(np.mean(np.abs(np.array(fewer) - np.array(paper))))
         cells.append(
-            [reading.label, len(kept), *(_plain(x) for x in (sindy, stepwise, fewer)), f"{away:.0f}"]
+            [reading.label, len(kept), *(by_joint(x) for x in (sindy, stepwise, fewer)), f"{away:.0f}"]
         )
         values.append(
             {
@@ -54,7 +54,3 @@ def readings_table(
     cells.append(["paper", None, None, None, " / ".join(map(str, paper)), None])
     headers = ["reading of Eq. (32) and the noise", "draws", "SINDy", "stepwise", "fewer [%]", "from paper"]
     return make_table(headers, cells, title), values
-
-
-def _plain(values: Sequence[float]) -> str:
-    return " / ".join(f"{x:.0f}" for x in values)

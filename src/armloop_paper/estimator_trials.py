@@ -241,8 +241,7 @@ def _moments(library: WaveProducts, motion: Motion, rest: Array) -> list[list[Mo
     joints: list[list[Moments]] = [[] for _ in rest.T]
     for k in range(_PARTS):
         rows = slice(k, None, _PARTS)
-        part = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
-        sums = library.sums(part, rest[rows])
+        sums = library.sums(motion.take(rows), rest[rows])
         G = library.gram(sums)
         for j, mine in enumerate(joints):
             mine.append(Moments(G, sums.cross[:, j], float(sums.given[j, j]), float(sums.count)))

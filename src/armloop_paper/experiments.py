@@ -76,7 +76,7 @@ class Experiment:
         centre, amplitude = (np.array(part) for part in self.beyond)
         q = centre + np.outer(np.sin(np.pi * t), amplitude)
         v = np.pi * np.outer(np.cos(np.pi * t), amplitude)
-        return Motion(t, q, v, -(np.pi**2) * np.outer(np.sin(np.pi * t), amplitude), np.array([0]))
+        return Motion(t, q, v, -(np.pi**2) * np.outer(np.sin(np.pi * t), amplitude))
 
 
 def as_motion(*logs: MotionLog) -> tuple[Motion, Array]:
@@ -84,7 +84,7 @@ def as_motion(*logs: MotionLog) -> tuple[Motion, Array]:
     q, v, vdot, tau = (
         np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("q", "v", "vdot", "tau")
     )
-    return Motion(np.arange(float(len(q))), q, v, vdot, np.array([0])), tau
+    return Motion(np.arange(float(len(q))), q, v, vdot), tau
 
 
 _QUARTER = np.pi / 4

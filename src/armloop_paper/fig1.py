@@ -143,8 +143,7 @@ def _noisy(pace: float, seed: int) -> tuple[Motion, np.ndarray]:
 
 
 def _trial(job: tuple[float, int, int]) -> _Trial:
-    """Iterations from samples and from a box, Rand indices and elbows of the paper's and the robust "
-    "indicator."""
+    """Iterations from samples and from a box, Rand indices and elbows of the paper's and the robust indicator."""
     pace, seed, starts = job
     motion, truth = _noisy(pace, seed)
     clusters, robust = sort_samples(motion, "paper"), sort_samples(motion)

@@ -1,5 +1,4 @@
-"""Fig. 10: active terms of the three-axis arm in Cases I to III, and how much the reading of the recipe "
-"matters."""
+"""Fig. 10: active terms of the three-axis arm in Cases I to III, and how much the reading of the recipe matters."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from armloop_paper.experiments import THREE_AXIS
 from armloop_paper.noise_study import METHODS, Draw, case, least_counts, readings, reduction
 from armloop_paper.outcome import Outcome
 from armloop_paper.plots import active_figure
-from armloop_paper.spread import median, spread
+from armloop_paper.spread import by_joint, median, spread
 
 _NAMES = {"case_1": "Case I", "case_2": "Case II", "case_3": "Case III"}
 
@@ -50,10 +49,10 @@ def run(context: Context) -> Outcome:
         f"λ = {THREE_AXIS.penalty:g}, active above {THREE_AXIS.threshold}; {len(cases['case_3'])} draws of Cases II "
         f"and III, {len(cases['case_1'])} of the noise-free Case I. The reading is that of Fig. 5, which matched "
         "there: Eq. (32) literally, solved to convergence, noise measured over the matrix of signals.",
-        f"Case I: both keep about the same number of terms ({_percent(fewer['case_1'])} % fewer), as the paper says. "
-        f"Cases II and III: stepwise keeps {_percent(fewer['case_2'])} and {_percent(fewer['case_3'])} % fewer, the "
-        f"paper prints {_percent(paper.THREE_AXIS_REDUCTION['case_2'])} and "
-        f"{_percent(paper.THREE_AXIS_REDUCTION['case_3'])} %.",
+        f"Case I: both keep about the same number of terms ({by_joint(fewer['case_1'])} % fewer), as the paper says. "
+        f"Cases II and III: stepwise keeps {by_joint(fewer['case_2'])} and {by_joint(fewer['case_3'])} % fewer, the "
+        f"paper prints {by_joint(paper.THREE_AXIS_REDUCTION['case_2'])} and "
+        f"{by_joint(paper.THREE_AXIS_REDUCTION['case_3'])} %.",
         "The paper's percentages cannot come from a converged Lasso with its λ: printed to two decimals they fix "
         f"how many terms SINDy kept at least (fourth table), {implied} for one joint, while SINDy keeps at most "
         f"{most:.0f} in any reading with the printed λ. The noise does reach its solution, but as many coefficients "
@@ -63,7 +62,7 @@ def run(context: Context) -> Outcome:
         "hundreds of terms; what the authors ran cannot be told from the text, so the literal reading stays the "
         "default here.",
         "armloop's own choice (angle sums, information criterion, no threshold) keeps "
-        + _percent(median([one.active["armloop"] for one in cases["case_3"]]), " / ")
+        + by_joint(median([one.active["armloop"] for one in cases["case_3"]]))
         + " terms in Case III.",
     ]
     counts = {
@@ -74,8 +73,8 @@ def run(context: Context) -> Outcome:
         theirs,
         ours,
         "agrees" if all(close) and away < 5 else "partly" if all(close) else "differs",
-        f"Case III: stepwise {_percent(fewer['case_3'])} % fewer active terms (paper "
-        f"{_percent(paper.THREE_AXIS_REDUCTION['case_3'])} %, which no converged reading reaches)",
+        f"Case III: stepwise {by_joint(fewer['case_3'])} % fewer active terms (paper "
+        f"{by_joint(paper.THREE_AXIS_REDUCTION['case_3'])} %, which no converged reading reaches)",
         Section(
             "Figure 10, three axes: active terms under noise",
             text,
@@ -135,7 +134,3 @@ def _implied() -> tuple[Table, int]:
             rows.append([f"{_NAMES[name]}, joint {j + 1}", f"{percent:.2f}", many, few])
     headers = ["the paper", "fewer [%]", "SINDy at least", "stepwise then"]
     return make_table(headers, rows, "Smallest numbers of terms that give the printed percentages"), largest
-
-
-def _percent(values: list[float], separator: str = " / ") -> str:
-    return separator.join(f"{x:.0f}" for x in values)

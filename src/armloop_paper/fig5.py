@@ -12,7 +12,7 @@ from armloop_paper.experiments import SCARA
 from armloop_paper.noise_study import METHODS, case, readings, reduction
 from armloop_paper.outcome import Outcome
 from armloop_paper.plots import active_figure
-from armloop_paper.spread import median, spread
+from armloop_paper.spread import by_joint, median, spread
 
 
 def run(context: Context) -> Outcome:
@@ -27,7 +27,7 @@ def run(context: Context) -> Outcome:
         f"SNR {paper.SCARA_SNR} dB in q, v, vdot, λ = {SCARA.penalty}, active above {SCARA.threshold}; {len(draws)} "
         "draws of states and noise. Eq. (32) is taken literally (norm not squared) and solved until the duality gap "
         "closes; the noise power refers to the whole matrix of signals of a kind, as MATLAB measures it.",
-        f"Stepwise keeps {' / '.join(f'{x:.0f}' for x in fewer)} % fewer terms than SINDy (paper "
+        f"Stepwise keeps {by_joint(fewer)} % fewer terms than SINDy (paper "
         f"{' / '.join(map(str, paper.SCARA_REDUCTION))} %). "
         + (
             f"Joint{'s' if len(off) > 1 else ''} {', '.join(str(j + 1) for j in off)} "
@@ -40,15 +40,14 @@ def run(context: Context) -> Outcome:
         "zero there, and each step has few columns to spread the noise over. Squared and divided by m, λ = 0.02 "
         "leaves a handful of terms with either method: that is not what the authors can have solved.",
         "armloop's own choice (angle sums, information criterion, no threshold) keeps "
-        + " / ".join(f"{x:.0f}" for x in median([one.active["armloop"] for one in draws]))
+        + by_joint(median([one.active["armloop"] for one in draws]))
         + " terms.",
     ]
     return Outcome(
         {"reduction_percent": paper.SCARA_REDUCTION},
         {"reduction_percent": fewer},
         "agrees" if not off else "partly" if min(fewer) > 50 else "differs",
-        f"stepwise {' / '.join(f'{x:.0f}' for x in fewer)} % fewer active terms (paper "
-        f"{' / '.join(f'{x:.0f}' for x in paper.SCARA_REDUCTION)} %)",
+        f"stepwise {by_joint(fewer)} % fewer active terms (paper {by_joint(paper.SCARA_REDUCTION)} %)",
         Section(
             "Figure 5, SCARA: active terms under noise",
             text,

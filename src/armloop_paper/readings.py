@@ -116,7 +116,7 @@ def _along_trajectories(experiment: Experiment, seed: int, trajectories: int = 1
         instants = np.linspace(2.0, 20.0, share)
         parts.append((100.0 * k + instants, *reference.evaluate(instants)))
     time, q, v, vdot = (np.concatenate(column) for column in zip(*parts, strict=True))
-    tau = experiment.torque(Motion(time, q, v, vdot, np.array([0])))
+    tau = experiment.torque(Motion(time, q, v, vdot))
     return MotionLog(time, q, v, tau, vdot, name="varying")
 
 

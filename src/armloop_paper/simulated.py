@@ -65,7 +65,7 @@ def true_model(arm_name: str = "three_axis") -> ReconstructedModel:
         library = DoubleFeatureSet(turns, N1, N2, second)
         q = rng.uniform(-3, 3, (library.size + 200, arm.n))
         v, vdot = rng.normal(size=(2, *q.shape))
-        motion = Motion(np.arange(float(len(q))), q, v * (step > 1), vdot * (step > 2), np.array([0]))
+        motion = Motion(np.arange(float(len(q))), q, v * (step > 1), vdot * (step > 2))
         before = Motion(motion.time, q, motion.v * (step > 2), 0 * vdot, motion.starts)
         tau = regressor(arm, q, motion.v, motion.vdot) @ parameters
         if step > 1:
@@ -153,7 +153,7 @@ def _fourier(rng: np.random.Generator, ranges: MotionRanges, seconds: float) -> 
     amplitude *= (0.45 * np.minimum(ranges.upper - ranges.lower, 4.0) / amplitude.sum(axis=1))[:, None]
     q = (amplitude * np.sin(phase)).sum(axis=2) + 0.5 * (ranges.upper + ranges.lower)
     v, vdot = (amplitude * w * np.cos(phase)).sum(axis=2), -(amplitude * w**2 * np.sin(phase)).sum(axis=2)
-    return Motion(time, q, v, vdot, np.array([0]))
+    return Motion(time, q, v, vdot)
 
 
 def _coloured(rng: np.random.Generator, motion: Motion, correlation: float) -> Array:

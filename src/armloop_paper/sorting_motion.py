@@ -49,7 +49,7 @@ def sorting_motion(
         truth += [np.full(len(rest), Condition.STATIC), kind]
     q_all, v_all, vdot_all = (np.concatenate(parts).astype(np.float64) for parts in (q, v, vdot))
     time = _PERIOD * np.arange(float(len(q_all)))
-    return Motion(time, q_all, v_all, vdot_all, np.array([0])), np.concatenate(truth).astype(int)
+    return Motion(time, q_all, v_all, vdot_all), np.concatenate(truth).astype(int)
 
 
 def _trapezoid(u: Array) -> tuple[Array, Array, Array]:

@@ -114,7 +114,7 @@ def case_data(case: str, level: float, seed: int) -> tuple[Motion, Labels, NDArr
         moving = np.eye(n)[rng.integers(n, size=len(v))] * [1.0, 1.0, 0.1, 1.0]
         v, vdot = v * moving, vdot * moving
     v, vdot = _noisy(v, level, rng), _noisy(vdot, level, rng)
-    motion = Motion(np.arange(float(len(v))), np.zeros_like(v), v, vdot, np.array([0]))
+    motion = Motion(np.arange(float(len(v))), np.zeros_like(v), v, vdot)
     return motion, truth, np.ones(len(v), dtype=bool)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -37,3 +38,8 @@ def in_words(draws: ArrayLike, digits: int = 3) -> str:
     whole = all(x.is_integer() for x in three)
     middle, low, high = (f"{x:.0f}" if whole else number(x, digits) for x in three)
     return f"{middle} ({low}–{high})"
+
+
+def by_joint(values: Sequence[float]) -> str:
+    """Whole numbers, one per joint, as ``16 / 14 / 19``."""
+    return " / ".join(f"{x:.0f}" for x in values)

@@ -5,10 +5,14 @@ Processor time is taken: what else the machine does must not show in the ratio."
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
+from armloop.data.motion import Motion
 from armloop.experiment.sampling import CONDITIONS, inverse_dynamics_samples
+from armloop.util.arrays import Array
 from armloop_paper.experiments import EXPERIMENTS, STEPS, as_motion
 from armloop_paper.least_squares import least_squares
 
@@ -20,19 +24,10 @@ def lstsq_times(job: tuple[str, int]) -> dict[str, float]:
     does not change the work.
     """
     name, repeats = job
-    experiment = EXPERIMENTS[name]
-    logs = inverse_dynamics_samples(experiment.arm, experiment.ranges, experiment.counts, 0)
-    parts = {"sindy": tuple(CONDITIONS), **{s: (c,) for s, c in zip(STEPS, CONDITIONS, strict=True)}}
     times = {}
-    for part, conditions in parts.items():
-        motion, tau = as_motion(*(logs[condition] for condition in conditions))
-        Y = np.ascontiguousarray(experiment.library(part).columns(motion))
-        best = np.inf
-        for _ in range(repeats):
-            start = time.process_time()
-            np.linalg.lstsq(Y, tau, rcond=None)
-            best = min(best, time.process_time() - start)
-        times[part] = float(best)
+    for part, motion, tau in _parts(name):
+        Y = np.ascontiguousarray(EXPERIMENTS[name].library(part).columns(motion))
+        times[part] = _best(repeats, partial(np.linalg.lstsq, Y, tau, rcond=None))
     return times
 
 
@@ -42,17 +37,25 @@ def moment_times(job: tuple[str, int]) -> dict[str, float]:
     Normal equations by table look-up, a Cholesky factor, iterative refinement to the accuracy of lstsq.
     """
     name, repeats = job
+    times = {}
+    for part, motion, tau in _parts(name):
+        times[part] = _best(repeats, partial(least_squares, EXPERIMENTS[name].waves(part), motion, tau))
+    return times
+
+
+def _parts(name: str) -> Iterator[tuple[str, Motion, Array]]:
+    """The samples and torques of one-shot SINDy and of each step, by name."""
     experiment = EXPERIMENTS[name]
     logs = inverse_dynamics_samples(experiment.arm, experiment.ranges, experiment.counts, 0)
-    parts = {"sindy": tuple(CONDITIONS), **{s: (c,) for s, c in zip(STEPS, CONDITIONS, strict=True)}}
-    times = {}
-    for part, conditions in parts.items():
-        motion, tau = as_motion(*(logs[condition] for condition in conditions))
-        library = experiment.waves(part)
-        best = np.inf
-        for _ in range(repeats):
-            start = time.process_time()
-            least_squares(library, motion, tau)
-            best = min(best, time.process_time() - start)
-        times[part] = float(best)
-    return times
+    yield "sindy", *as_motion(*(logs[condition] for condition in CONDITIONS))
+    for step, condition in zip(STEPS, CONDITIONS, strict=True):
+        yield step, *as_motion(logs[condition])
+
+
+def _best(repeats: int, calculate: Callable[[], object]) -> float:
+    best = np.inf
+    for _ in range(repeats):
+        start = time.process_time()
+        calculate()
+        best = min(best, time.process_time() - start)
+    return float(best)

@@ -220,7 +220,8 @@ def test_v_that_lags_is_said_with_the_lag(milliseconds: float) -> None:
     (doubt,) = replace(log, v=late).doubts()
     word = "lag behind" if milliseconds > 0 else "lead"
     assert doubt.startswith(f"columns v {word} dq/dt by ")
-    assert float(doubt.split(" by ")[1].split()[0]) == pytest.approx(abs(milliseconds), abs=0.5)
+    assert float(doubt.split(" by ")[1].split()[0]) == pytest.approx(abs(milliseconds), abs=0.1)
+    assert ("they are taken to be that late" in doubt) == (milliseconds > 0)
     assert log.doubts() == []
 
 

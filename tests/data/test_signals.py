@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armloop.data.dropouts import repaired
 from armloop.data.filters import filter_reach
-from armloop.data.log import MotionLog
+from armloop.data.log import MotionLog, recorded
 from armloop.data.motion import Motion
 from armloop.data.signals import (
     Conditioning,
@@ -319,3 +320,59 @@ def test_each_run_passes_the_filter_of_its_own_rate():
     )
     for of in (lambda s: smooth(s, np.sign(s.motion.v)), independent_rows):
         np.testing.assert_allclose(of(both), np.concatenate([of(part) for part in parts]), atol=1e-9)
+
+
+def filtered_by_its_driver(log: MotionLog, corner: float, noise: float = 0.0, seed: int = 0) -> MotionLog:
+    """The log with v of a first-order low-pass, as a controller forms it of its encoders, and noise on it."""
+    a, v = np.exp(-2 * np.pi * corner * log.period), log.v.copy()
+    for k in range(1, len(v)):
+        v[k] = a * v[k - 1] + (1 - a) * log.v[k]
+    return replace(log, v=v + noise * np.random.default_rng(seed).normal(size=v.shape))
+
+
+@pytest.mark.parametrize("corner", [30.0, 60.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_speed_that_its_driver_filters_is_moved_to_where_it_belongs(corner: float, seed: int) -> None:
+    log = sines(np.arange(0, 20, 0.004))
+    late = filtered_by_its_driver(log, corner, 0.02, seed)
+    # of its group delay a step of the log counts to the sample before: exp(-wT) / (1 - exp(-wT)) steps
+    a = np.exp(-2 * np.pi * corner * 0.004)
+    assert late.velocity_lag == pytest.approx(0.004 * a / (1 - a), abs=1e-4)
+    motion, truth = preprocess([late], TEN_HZ).motion, preprocess([log], TEN_HZ).motion
+    for j, hz in enumerate((0.7, 2.0)):
+        for key in ("v", "vdot"):
+            own, right = (phase_of(m.time, getattr(m, key)[:, j], hz) for m in (motion, truth))
+            assert np.sin(own - right) == pytest.approx(0.0, abs=2 * np.pi * hz * 3e-4)
+
+
+def test_a_speed_that_is_in_time_or_leads_or_is_the_derivative_stays() -> None:
+    log = sines(np.arange(0, 20, 0.004))
+    noisy = replace(log, v=log.v + 0.02 * np.random.default_rng(5).normal(size=log.v.shape))
+    assert log.velocity_lag == pytest.approx(0.0, abs=1e-4) and abs(noisy.velocity_lag) < 1e-4
+    early = replace(log, v=np.stack([np.interp(log.time + 0.006, log.time, v) for v in log.v.T], axis=1))
+    assert early.velocity_lag == pytest.approx(-0.006, abs=2e-4)
+    np.testing.assert_array_equal(repaired(recorded(early), early.velocity_lag).v, early.v)
+    assert MotionLog.from_arrays(log.time, log.q, log.tau).velocity_lag == 0.0
+    # sweeps at steady speeds, rounded: what differs is the same all through a sweep, and fits some lag by chance
+    rng = np.random.default_rng(1)
+    speeds = np.repeat(rng.uniform(-0.7, 0.7, (40, 4)), 100, axis=0)
+    times = 0.004 * np.arange(4000) + np.repeat(np.arange(40.0), 100)
+    places = np.round(np.tile(0.004 * np.arange(100), 40)[:, None] * speeds / 1.2e-5) * 1.2e-5
+    sweeps = MotionLog(times, places, np.round(speeds / 1e-3) * 1e-3, speeds, name="sweeps")
+    assert sweeps.velocity_lag == 0.0
+    # at a steady speed nothing tells
+    steady = replace(log, q=np.outer(log.time, [1.0, 0.5]), v=np.tile([1.0, 0.5], (len(log.time), 1)))
+    assert steady.velocity_lag == 0.0
+
+
+def test_a_late_speed_is_moved_run_by_run_and_never_beyond_its_end() -> None:
+    time = np.concatenate([np.arange(0, 8, 0.004), np.arange(20, 28, 0.004), [40.0, 40.004]])
+    log = sines(time)
+    moved = repaired(recorded(log), 0.01).v
+    assert len(log.runs()) == 3
+    for run in log.runs()[:2]:
+        inside = slice(run.start, run.stop - 3)
+        expected = sines(log.time[inside] + 0.01).v
+        np.testing.assert_allclose(moved[inside], expected, atol=1e-3 * np.abs(expected).max())
+        np.testing.assert_allclose(moved[run][-2:], np.tile(log.v[run][-1], (2, 1)), rtol=1e-9)
+    np.testing.assert_array_equal(moved[-2:], log.v[-2:])

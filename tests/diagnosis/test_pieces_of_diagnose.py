@@ -37,7 +37,7 @@ class Evidence(SimpleNamespace):
         return f"residual of {self.name}"
 
     def only(self, rows: Any) -> Evidence:
-        return Evidence(name=self.name, rows=rows, blocks=self.blocks)
+        return Evidence(name=self.name, rows=rows, blocks=None)
 
 
 class Answers:
@@ -77,7 +77,7 @@ class Answers:
             "best_account": self.best,
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
-            "outweighed": lambda evidence, outcome, left: None,
+            "outweighed": lambda *_: None,
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
@@ -100,6 +100,7 @@ class Answers:
 
     def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
         self.asked["standing"] = (evidence.name, model, errors, list(joints))
+        self.asked["judged"] = evidence.rows
         return Standing(["stands"], unknown=self.given["unknown"])
 
     def outcome(self, name: str) -> Any:
@@ -127,7 +128,8 @@ class Answers:
         self.asked["kept"] = kept
         if not self.given["turned"]:
             return None
-        return SimpleNamespace(outcome=self.outcome("turned"), evidence=Evidence(name="turned", rows=ROWS))
+        rows = Evidence(name="turned", rows=ROWS)
+        return SimpleNamespace(outcome=self.outcome("turned"), evidence=rows, found=self.given["found"][:1])
 
 
 def judged(jobs: int | None = None) -> Any:
@@ -251,7 +253,7 @@ def of(**given: Any) -> Diagnosis:
         with_effects=lambda law: SimpleNamespace(arm=model.arm, effects=law),
     )
     outcome: Any = SimpleNamespace(before=before, after=after, found=[])
-    values = {"verdict": "no_effect", "outcome": outcome, "model": model, "unlisted": None}
+    values = {"verdict": "no_effect", "outcome": outcome, "model": model, "unlisted": None, "sliding": rows}
     return Diagnosis(**(values | {"evidence": evidence, "contacts": []} | given))
 
 
@@ -275,6 +277,11 @@ def test_errors_are_root_mean_squares_of_held_out_rows_in_the_torques_unit() -> 
     assert (
         errors["noise_floor"] == [0.5, 1.0, 2.0] and errors["held_out"] is True and "reversals" not in errors
     )
+    # what is a reversal, as the first row of the last joint, has numbers of its own
+    sliding = np.array([[1, 0, 0], [1, 0, 0], [1, 0, 1]], dtype=bool)
+    errors = of(sliding=sliding).errors()
+    assert finite(errors["before"])[2] == pytest.approx(2.0 * 4.0) and errors["before"][0] == before[0]
+    assert errors["after"][2] == pytest.approx(2.0) and errors["nrmse"]["after"][2] == pytest.approx(2 / 8)
     turned: Any = SimpleNamespace(before=np.array([1.0, np.nan, 3.0]), after=np.array([0.5, np.nan, 1.0]))
     assert finite(of(reversals=turned).errors()["reversals"]) == {
         "before": [1.0, None, 3.0],
@@ -312,7 +319,8 @@ def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pyt
     answers = Answers(monkeypatch, found=[spring, load], contacts=[CONTACT, other], unknown=True)
     asked: list[Any] = []
 
-    def outweighed(evidence: Evidence, outcome: Any, left: Any) -> Any:
+    def outweighed(evidence: Evidence, outcome: Any, among: Any, left: Any, counted: Any) -> Any:
+        assert among == outcome.found and counted.shape == (12,) and counted.all()
         asked.append((evidence.name, [*outcome.found], left))
         return spring if spring in outcome.found else None
 
@@ -332,3 +340,17 @@ def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pyt
     answers.given.update(found=[spring], contacts=[])
     made = judged()
     assert made.verdict == "cannot_tell" and made.reasons[0].startswith("spring")
+
+
+def test_what_is_left_is_judged_where_joints_slide_and_what_is_found_at_reversals_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = Answers(monkeypatch, found=["memory", "drag"], turned=True)
+    answers.account.rows[1:3, 0] = False
+    asked: list[Any] = []
+    monkeypatch.setattr(module, "outweighed", lambda *given: asked.append(given[2:]))
+    made = judged()
+    assert made.evidence.name == "turned" and made.evidence.rows.all()
+    assert answers.asked["judged"] is answers.account.rows and made.sliding is answers.account.rows
+    ((among, left, counted),) = asked
+    assert among == ["drag"] and left == (1,) and counted.tolist() == answers.account.rows.ravel().tolist()

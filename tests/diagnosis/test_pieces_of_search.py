@@ -410,23 +410,30 @@ class TestOutcomes:
     ) -> None:
         """Of two joints of a hundred rows, what is left with all, and without each of two effects."""
         energy = {"all": (150.0, 500.0), "b": (150.0, 899.0), "a": (260.0, 500.0)}
+
+        def fitted(names: str) -> Any:
+            """A hundred rows of each joint, and two that do not count."""
+            held_out = np.concatenate([np.full(100, np.sqrt(e / 100)) for e in energy[names]])
+            joint = np.append(np.repeat([0, 1], 100), [0, 1])
+            rows = SimpleNamespace(joint=joint, block=np.zeros(202, dtype=int), joints=2)
+            return SimpleNamespace(stacked=rows, held_out=np.append(held_out, [99.0, 99.0]))
+
         monkeypatch.setattr(
             searching,
             "_known",
-            lambda evidence, found: SimpleNamespace(
-                fit=SimpleNamespace(score=score(*energy["".join(f.shape for f in found)]))
-            ),
+            lambda evidence, found: SimpleNamespace(fit=fitted("".join(f.shape for f in found))),
         )
 
-        def outweighed(*left: int) -> str | None:
-            whole = self.outcome("a", "b")
-            whole.after.score = score(*energy["all"])
-            nothing: Any = None
-            found = searching.outweighed(nothing, whole, left)
+        def outweighed(*left: int, among: str = "ab") -> str | None:
+            whole, nothing = self.outcome("a", "b"), None
+            given: Any = SimpleNamespace(found=whole.found, after=fitted("all"))
+            asked = [f for f in whole.found if f.shape in among]
+            found = searching.outweighed(nothing, given, asked, left, np.arange(202) < 200)  # type: ignore[arg-type]
             return None if found is None else str(found.shape)
 
         # 399 of the second joint, of which 400 are left beyond its baseline; what is noise there is no rest
         assert outweighed(1) == "a" and outweighed() is None and outweighed(0) is None
+        assert outweighed(1, among="b") is None and outweighed(1, among="") is None
         energy["b"] = (150.0, 901.0)
         assert outweighed(1) is None
         # each joint by its part of what is removed: 110 (110 - 50) of the first, and what the effect worsens is nothing

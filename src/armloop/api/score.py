@@ -84,7 +84,7 @@ def logs_for(model: ReconstructedModel, logs: Sequence[MotionLog]) -> list[Motio
     """The logs in the unit that the model predicts; raises ``InputError`` where they cannot be."""
     require_model(model)
     gains = model.recorded["drive_gains"]
-    predicts = "A" if model.recorded["unit"] == "A" and gains is None else "N*m"
+    predicts = "A" if model.in_amperes else "N*m"
     fitting = []
     for log in logs:
         if log.joints != model.arm.n:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from armloop.commands.arguments import REFUSE_OTHERS, Json
 from armloop.commands.options import argument, option, required, several
+
+if TYPE_CHECKING:
+    from armloop.export import Exported
+    from armloop.model import ReconstructedModel
 
 HELP = "write a model as URDF, SDFormat, MJCF (MuJoCo), a Drake program or C, read it back and compare the torques"
 EXAMPLE = (
@@ -54,20 +60,16 @@ def run(options: Export) -> None:
     _tell(found, model, bool(options.log))
 
 
-def _tell(found: object, model: object, by_log: bool) -> None:
-    from armloop.export import Exported
-    from armloop.model import ReconstructedModel
+def _tell(found: Exported, model: ReconstructedModel, by_log: bool) -> None:
     from armloop.reports.tables import table
     from armloop.reports.words import unit
 
-    assert isinstance(found, Exported) and isinstance(model, ReconstructedModel)
     states = "states of the log" if by_log else "random states within the training range"
     if found.difference is not None and found.unsaid is not None:
         print(f"read back by {found.consumer}, on {states}; largest difference of torque:")
-        in_amperes = model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None
         rows = []
         for j, joint in enumerate(model.arm.joints):
-            of = "A" if in_amperes else unit(joint.torque_unit)
+            of = "A" if model.in_amperes else unit(joint.torque_unit)
             values = (found.rms[j], found.difference[j], found.unsaid[j])
             rows.append([f"{j + 1}  {joint.name}", of, *(f"{x:.3g}" for x in values)])
         heads = ["joint", "unit", "RMS of the model", "of what it can say", "of the whole model"]

@@ -87,7 +87,6 @@ def run(options: Reconstruct) -> None:
     from armloop.data.signals import Conditioning
     from armloop.identification.reconstruction import Options
     from armloop.identification.reconstruction import reconstruct as run
-    from armloop.regression.estimators import LISTED, REGISTRY
     from armloop.regression.sparse import Sparse
     from armloop.reports.tables import (
         compared,
@@ -97,14 +96,10 @@ def run(options: Reconstruct) -> None:
         score_table,
         steps_table,
     )
-    from armloop.util.errors import InputError
     from armloop.util.files import write_text
     from armloop.util.workers import Cluster, Processes
 
-    if REGISTRY.find(options.estimator) is None:
-        names = ", ".join([*LISTED, *REGISTRY.own_names()])
-        raise InputError(f"unknown estimator {options.estimator!r}; there are: {names}")
-    _snr(options)
+    sparse, snr = Sparse(options.estimator, options.penalty), _snr(options)
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
     arm = arm_of(options)
@@ -125,10 +120,10 @@ def run(options: Reconstruct) -> None:
             options.library,
             None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
             Options(
-                sparse=Sparse(options.estimator, options.penalty),
+                sparse=sparse,
                 max_order=options.max_order,
                 physical=not options.no_physical,
-                snr=_snr(options),
+                snr=snr,
                 friction=_laws(options.friction),
             ),
             progress(options),

@@ -123,7 +123,7 @@ def check_columns(paths: list[str], arm: Arm | None) -> None:
             )
         n, _ = check_header(Path(path))
         if arm is not None and n != arm.n:
-            names = ", ".join(joint.name for joint in arm.joints)
+            names = ", ".join(arm.joint_names)
             # of a model's arm there is no URDF in which a joint could be locked
             lock = (
                 "; fix those that the log has not with --lock JOINT=VALUE" if arm.urdf and n < arm.n else ""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from armloop.convert.joints import doubtful_order, match
@@ -70,7 +71,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     values: dict[str, Array] = {}
     for kind, quantity in mapping.quantities().items():
         values[kind] = np.stack([_column(recording, quantity, kind, j) for j in order], axis=1)
-    time, keep, starts = _time(recording, mapping, notes)
+    time, keep, starts = _time(recording, mapping)
     if len(keep) < FEWEST_SAMPLES:
         raise LogError(
             f"{where}: {len(keep)} of {N} {recording.rows}s have a time of their own; a motion log has at least "
@@ -88,10 +89,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         notes.append(beyond)
     # Parts that follow one another without a gap may jump: they are checked once they are kept apart.
     log = unchecked_log(time=time, **cells, name=recording.path.stem, tau_unit=unit)
-    used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {
-        mapping.time.column or ""
-    }
-    extra = {}
+    used, extra = mapping.used(), {}
     for name in recording.columns if mapping.keep == "all" else mapping.keep:
         if name not in recording.columns:
             raise LogError(f"{where}: no column {name} to keep; {_there_are(recording)}")
@@ -154,11 +152,11 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         gains = list(answers.drive_gains)
         if arm is not None and mapping.joints is not None:
             # Gains are given base to tip, as everywhere; the map's lists are in the order of its columns.
-            at = match(mapping.joints, [joint.name for joint in arm.joints], where)
+            at = match(mapping.joints, arm.joint_names, where)
             gains = [gains[at.index(j)] for j in range(joints)]
-        tau = QuantityMap(tau.columns, _said(tau.unit, "A"), tau.sign, tau.offset, gains)
+        tau = replace(tau, unit=_said(tau.unit, "A"), gains=gains)
     elif answers.tau_unit is not None:
-        tau = QuantityMap(tau.columns, answers.tau_unit, tau.sign, tau.offset, tau.gains)
+        tau = replace(tau, unit=answers.tau_unit)
     if answers.angle_unit is not None:
         told = {
             str(canonical(unit, "q")) for unit in (q.unit if isinstance(q.unit, list) else [q.unit]) if unit
@@ -169,9 +167,9 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
                 f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
             )
         rates = {"rad": "rad/s", "deg": "deg/s"}
-        q = QuantityMap(q.columns, _said(q.unit, answers.angle_unit), q.sign, q.offset)
+        q = replace(q, unit=_said(q.unit, answers.angle_unit))
         if v is not None:
-            v = QuantityMap(v.columns, _said(v.unit, rates[answers.angle_unit]), v.sign, v.offset)
+            v = replace(v, unit=_said(v.unit, rates[answers.angle_unit]))
     if not _is_said(tau):
         asked.append(
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
@@ -191,13 +189,12 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     unit = mapping.time.unit
     if mapping.time.column is not None and (unit is None or unit == UNSAID):
         unit = _time_unit(recording, mapping, q, v)
-    time = type(mapping.time)(mapping.time.column, unit, mapping.time.rate)
-    return Mapping(time, q, tau, v, mapping.vdot, mapping.joints, mapping.keep)
+    return replace(mapping, time=replace(mapping.time, unit=unit), q=q, tau=tau, v=v)
 
 
 def _sizes(recording: Recording, mapping: Mapping, arm: Arm | None) -> str:
     """The largest values of tau beside the arm's effort limits, from which its user can tell which of them they are."""
-    if arm is None or not all(np.isfinite(joint.effort) for joint in arm.joints):
+    if arm is None or not np.isfinite(arm.effort).all():
         return ""
     largest = [
         np.abs(_column(recording, mapping.tau, "tau", j)).max() for j in _order(recording, mapping, arm, [])
@@ -278,7 +275,7 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
             )
         return list(range(mapping.n))
     if names is not None:
-        return match(names, [joint.name for joint in arm.joints], where)
+        return match(names, arm.joint_names, where)
     if mapping.n != arm.n:
         raise LogError(f"{where}: has {mapping.n} joints; the arm {arm.name} has {arm.n}")
     return list(range(arm.n))
@@ -310,9 +307,7 @@ def _there_are(recording: Recording) -> str:
     return f"there are: {', '.join(names[:12])}{' …' if len(names) > 12 else ''}"
 
 
-def _time(
-    recording: Recording, mapping: Mapping, notes: list[str]
-) -> tuple[Array, NDArray[np.intp], list[int]]:
+def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.intp], list[int]]:
     """Seconds from the first sample, the rows that are kept, and where parts of the source start among them."""
     N = recording.samples
     if mapping.time.rate is not None:

@@ -39,17 +39,12 @@ class Converted:
 
     def columns(self) -> dict[str, Array]:
         """The columns of the log's file, in its order."""
-        log = self.log
-        columns = {"time": log.time}
-        for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
-            if values is not None:
-                columns |= {f"{kind}{j + 1}": values[:, j] for j in range(log.joints)}
-        return columns | self.extra
+        return self.log.columns() | self.extra
 
 
 def read_sources(paths: Sequence[str | Path], arm: Arm | None, topic: str | None = None) -> list[Recording]:
     """Read each source by its format; raises ``LogError``."""
-    wanted = None if arm is None else [joint.name for joint in arm.joints]
+    wanted = None if arm is None else arm.joint_names
     return [read_source(Path(path), topic, wanted) for path in paths]
 
 
@@ -100,7 +95,5 @@ def convert(
     for path, one in zip(paths, parts, strict=True):
         head = f"{Path(path).name}: " if len(parts) > 1 else ""
         notes += [head + note for note in one.notes]
-    empty = [name for name, cells in extra.items() if np.isnan(cells).all()]
-    for name in empty:
-        del extra[name]
+    extra = {name: cells for name, cells in extra.items() if not np.isnan(cells).all()}
     return Converted(log, extra, parts[0].joints, [r.kind for r in recordings], notes)

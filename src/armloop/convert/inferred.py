@@ -74,10 +74,9 @@ def described(recording: Recording, clock: str | None) -> list[str]:
 
 def alternatives(recording: Recording, mapping: Mapping) -> list[list[str]]:
     """Groups of columns that the map does not use and that may answer a ``?`` of it."""
-    used = {name for quantity in mapping.quantities().values() for name in quantity.names()}
     known = max((len(q.names()) for q in mapping.quantities().values() if UNSAID not in q.names()), default=0)
     seen = evidence(recording.columns, mapping.time.column, recording.starts)
-    away = used | seen.used | {mapping.time.column or ""}
+    away = mapping.used() | seen.used
     found = [list(group.columns) for group in groups_of(list(recording.columns), (), recording.units)]
     fit = [names for names in found if not {*names} & away and (not known or len(names) == known)]
     return list({frozenset(names): names for names in reversed(fit)}.values())[::-1]

@@ -15,6 +15,7 @@ import numpy as np
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording, flatten
+from armloop.data.tables import is_number
 from armloop.util.errors import LogError
 from armloop.util.reading import read_json
 
@@ -182,10 +183,10 @@ def _array(column: Any) -> Any:
     ):
         rows = column.combine_chunks()
         inner = kind.value_type
-        if not (pyarrow.types.is_floating(inner) or pyarrow.types.is_integer(inner)):
+        if not is_number(inner):
             return None
         flat = np.asarray(rows.flatten().to_numpy(zero_copy_only=False), dtype=np.float64)
         return flat.reshape(len(rows), -1) if len(rows) and len(flat) % len(rows) == 0 else None
-    if pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind):
+    if is_number(kind):
         return column.to_numpy().astype(np.float64)
     return None

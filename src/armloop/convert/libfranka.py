@@ -44,7 +44,5 @@ def read_libfranka(path: Path) -> Recording:
         TimeMap(clocks[0], unit), quantity("q", "rad"), quantity("tau_J", "N*m"), quantity("dq", "rad/s")
     )
     notes = [f"{len(table.starts)} logs below each other"] if len(table.starts) > 1 else []
-    notes.append(f"{clocks[0]} is in {unit}")
-    if table.dropped:
-        notes.append(f"columns left out: {', '.join(table.dropped)}")
+    notes += [f"{clocks[0]} is in {unit}", *table.left_out()]
     return Recording(path, "libfranka log", columns, mapping, starts=table.starts, notes=notes)

@@ -82,6 +82,13 @@ class Mapping(msgspec.Struct, forbid_unknown_fields=True):
         found = {"q": self.q, "v": self.v, "tau": self.tau, "vdot": self.vdot}
         return {name: quantity for name, quantity in found.items() if quantity is not None}
 
+    def used(self) -> set[str]:
+        """The names of all columns that a quantity or the time is made of."""
+        return {
+            self.time.column or "",
+            *(name for each in self.quantities().values() for name in each.names()),
+        }
+
     @property
     def n(self) -> int:
         """Number of joints."""

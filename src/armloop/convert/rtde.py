@@ -44,7 +44,5 @@ def read_rtde(path: Path) -> Recording:
     mapping = Mapping(
         TimeMap("timestamp", "s"), QuantityMap(names("actual_q"), "rad"), QuantityMap(names(stem), unit), v
     )
-    notes = [f"tau is {stem}"]
-    if table.dropped:
-        notes.append(f"columns left out: {', '.join(table.dropped)}")
+    notes = [f"tau is {stem}", *table.left_out()]
     return Recording(path, "UR RTDE recording", columns, mapping, starts=table.starts, notes=notes)

@@ -23,7 +23,7 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
     """The map of a source, and by field what is not sure of it; what cannot be told has the one column ``?``."""
     mapping, unsure = recording.mapping, dict(recording.unsure)
     if mapping is None or (arm is not None and mapping.n != arm.n and not recording.named):
-        names = [] if arm is None else [joint.name for joint in arm.joints]
+        names = [] if arm is None else arm.joint_names
         found = suggest(list(recording.columns), names, recording.units)
         if found.mapping is not None and (arm is None or found.mapping.n == arm.n):
             mapping, unsure = found.mapping, found.unsure
@@ -87,8 +87,7 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
             lines.append("  # gains: [..]  N·m per A, one per joint, if these are currents")
     if "v" in unsure and mapping.v is None:
         lines.append(f"# v: unsure: {unsure['v']}")
-    used = {name for quantity in mapping.quantities().values() for name in quantity.names()} | {time.column}
-    extra = [name for name in recording.columns if name not in used]
+    extra = [name for name in recording.columns if name not in mapping.used()]
     lines.append(
         "keep: all" + (f"  # {', '.join(extra[:8])}{' …' if len(extra) > 8 else ''}" if extra else "")
     )

@@ -7,36 +7,30 @@ from pathlib import Path
 from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
-from armloop.convert.text import clock_seconds, numbers_of, read_text
-from armloop.data.tables import PARQUET, kind_of
+from armloop.convert.text import TextTable, clock_seconds, numbers_of, read_text
+from armloop.data.tables import PARQUET, is_number, kind_of
 from armloop.util.errors import LogError
 
 
 def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
-    if kind_of(path) == PARQUET:
-        columns, starts, dropped, units = _parquet(path)
-        notes: list[str] = []
-        twice: list[str] = []
-    else:
-        table = read_text(path)
-        columns, starts, dropped, units, notes = (
-            table.columns,
-            table.starts,
-            table.dropped,
-            table.units,
-            table.notes,
-        )
-        twice = table.twice
-    notes += [f"columns left out: {', '.join(dropped)}"] if dropped else []
+    table = _parquet(path) if kind_of(path) == PARQUET else read_text(path)
+    columns, units, said = table.columns, table.units, [*table.notes, *table.left_out()]
     own = _own(columns) if not units else None
     if own is not None:
-        _require_once(path, own, twice)
-        return Recording(path, "motion log", columns, own, starts=starts, notes=notes)
+        _require_once(path, own, table.twice)
+        return Recording(path, "motion log", columns, own, starts=table.starts, notes=said)
     found = suggest(list(columns), units=units)
-    _require_once(path, found.mapping, twice)
+    _require_once(path, found.mapping, table.twice)
     return Recording(
-        path, "table", columns, found.mapping, starts=starts, notes=notes, unsure=found.unsure, units=units
+        path,
+        "table",
+        columns,
+        found.mapping,
+        starts=table.starts,
+        notes=said,
+        unsure=found.unsure,
+        units=units,
     )
 
 
@@ -44,10 +38,8 @@ def _require_once(path: Path, mapping: Mapping | None, twice: list[str]) -> None
     """Raise ``LogError`` where a column that is needed stands twice with other numbers."""
     if mapping is None:
         return  # a map will say what is needed
-    quantities = [mapping.q, mapping.tau, *(each for each in (mapping.v, mapping.vdot) if each is not None)]
-    needed = {mapping.time.column, *(name for each in quantities for name in each.names())}
     for name in twice:
-        if name in needed:
+        if name in mapping.used():
             raise LogError(
                 f"{path}: column {name} stands twice, with other numbers; give each a name of its own"
             )
@@ -69,7 +61,7 @@ def _own(columns: dict[str, Array]) -> Mapping | None:
     )
 
 
-def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str], dict[str, str]]:
+def _parquet(path: Path) -> TextTable:
     import pyarrow
     import pyarrow.parquet
 
@@ -77,17 +69,13 @@ def _parquet(path: Path) -> tuple[dict[str, Array], list[int], list[str], dict[s
         table = pyarrow.parquet.read_table(path)
     except (pyarrow.ArrowException, OSError) as error:
         raise LogError(f"{path}: not a Parquet file; write it anew, or name it .csv if it is text") from error
-    columns, dropped, units = {}, [], {}
+    made = TextTable({}, [0], [])
     for name in table.column_names:
         kind = table.schema.field(name).type
-        if (
-            pyarrow.types.is_floating(kind)
-            or pyarrow.types.is_integer(kind)
-            or pyarrow.types.is_boolean(kind)
-        ):
-            columns[name] = numbers_of(table.column(name))
+        if is_number(kind) or pyarrow.types.is_boolean(kind):
+            made.columns[name] = numbers_of(table.column(name))
         elif (seconds := clock_seconds(table.column(name))) is not None:
-            columns[name], units[name] = seconds, "s"
+            made.columns[name], made.units[name] = seconds, "s"
         else:
-            dropped.append(f"{name} ({kind})")
-    return columns, [0], dropped, units
+            made.dropped.append(f"{name} ({kind})")
+    return made

@@ -12,6 +12,7 @@ import numpy as np
 
 from armloop.convert.recording import Array
 from armloop.convert.units import FACTORS, canonical
+from armloop.data.tables import is_number
 from armloop.util.errors import LogError
 
 _NUMBER = re.compile(
@@ -25,7 +26,7 @@ _CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
 
 @dataclass
 class TextTable:
-    """Columns of text; ``starts`` holds the first row below each header, ``units`` what a row below it says.
+    """Columns of a table; ``starts`` holds the first row below each header, ``units`` what a row below it says.
 
     ``twice`` names those that stand a second time with other numbers.
     """
@@ -36,6 +37,10 @@ class TextTable:
     units: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     twice: list[str] = field(default_factory=list)
+
+    def left_out(self) -> list[str]:
+        """What is to be said of the columns that are dropped."""
+        return [f"columns left out: {', '.join(self.dropped)}"] if self.dropped else []
 
 
 def header_of(path: Path) -> list[str]:
@@ -73,9 +78,10 @@ def read_text(path: Path) -> TextTable:
         lines = [*lines[:below], "", *lines[below + 1 :]]
         notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
     heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
+    repeated = set(heads[1:])
     body, starts, numbers, rows = [], [], [], 0
     for k in range(first + 1, len(lines)):
-        if k in set(heads[1:]):
+        if k in repeated:
             if _names(lines[k], separator) != names:
                 raise LogError(
                     f"{path}: line {k + 1} is a header with other columns than line {first + 1}; split the file there"
@@ -124,14 +130,9 @@ def read_text(path: Path) -> TextTable:
         kind = cells.type
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
-            numeric = pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)
-            if not numeric or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
+            if not is_number(kind) or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
                 twice.append(name)
-        elif (
-            pyarrow.types.is_floating(kind)
-            or pyarrow.types.is_integer(kind)
-            or pyarrow.types.is_boolean(kind)
-        ):
+        elif is_number(kind) or pyarrow.types.is_boolean(kind):
             columns[name] = numbers_of(cells)
         elif pyarrow.types.is_string(kind) and (bad := _first_text(cells)) is not None:
             # A cell that is no number among numbers is a fault only where the column is needed.
@@ -245,14 +246,13 @@ def _separator(line: str) -> str:
 
 
 def _names(line: str, separator: str) -> list[str]:
-    cells = line.split(separator) if separator != " " else line.split()
-    names = [cell.strip().strip('"').strip("'").strip() for cell in cells]
+    names = [cell.strip().strip('"').strip("'").strip() for cell in _cells(line, separator)]
     names[0] = names[0].lstrip("# ")
     return names if names[-1] else names[:-1]
 
 
 def _is_header(line: str, separator: str) -> bool:
-    cells = [cell for cell in (line.split(separator) if separator != " " else line.split()) if cell.strip()]
+    cells = [cell for cell in _cells(line, separator) if cell.strip()]
     return bool(cells) and sum(not _NUMBER.match(cell) for cell in cells) > len(cells) / 2
 
 

@@ -76,7 +76,6 @@ _ALIASES = {
 }
 #: The unit of the velocity that goes with a position's, and so on.
 RATES = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s"}
-ACCELERATIONS = {"rad": "rad/s^2", "deg": "deg/s^2", "m": "m/s^2", "mm": "mm/s^2"}
 
 
 def canonical(text: str, quantity: str) -> str | None:

@@ -87,9 +87,7 @@ def stretch(samples: Samples, low: int, high: int) -> Samples:
     """Samples from one number up to another; spans, which belong to whole runs, are left out."""
     motion, cut = samples.motion, slice(low, high)
     inner = motion.starts[(motion.starts > low) & (motion.starts < high)] - low
-    part = Motion(
-        motion.time[cut], motion.q[cut], motion.v[cut], motion.vdot[cut], np.concatenate([[0], inner])
-    )
+    part = motion.take(cut, np.concatenate([[0], inner]))
     return replace(
         samples, motion=part, tau=samples.tau[cut], moving=samples.moving[cut], spans=None, unknown=None
     )

@@ -2,8 +2,8 @@
 
 Spikes of one or two samples are replaced by what lies beside them (a median filter would touch every sample), and so are
 rows that repeat the positions and speeds before them, as where a bus loses packets or a log is written faster than it is
-measured. A torque that stands still to the last digit, or is cut off, is left out: nothing is fitted to it, and nothing is
-judged by it.
+measured. A v that is late, as a controller's own low-pass makes it, is moved to where it belongs. A torque that stands still
+to the last digit, or is cut off, is left out: nothing is fitted to it, and nothing is judged by it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
 _SPIKE, _BACK = 15.0, 0.3
@@ -31,6 +31,8 @@ _CHANCE, _FEWEST = 1e-6, 5
 _JUMP, _NEVER = 5.0, 0.02
 #: Position and speed of all joints may be repeated for so long, s.
 _HELD = 0.1
+#: Fewest samples of a run in which v is moved to where it belongs.
+_FEWEST_TO_SHIFT = 4
 #: Torque is cut off where so many of the rows hold its extreme, so many times as many as any of so many values beside it; a
 #: sensor that knows fewer values than the last rounds.
 _CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
@@ -38,7 +40,7 @@ _CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
 
 @dataclass(frozen=True, eq=False)
 class Repaired:
-    """A record without spikes.
+    """A record without spikes, v in time with q.
 
     Attributes:
         q, v, tau: (N, n).
@@ -56,16 +58,39 @@ class Repaired:
         return Repaired(self.q[rows], self.v[rows], self.tau[rows], lost)
 
 
-def repaired(log: Recorded) -> Repaired:
-    """The record without spikes, and which torques are none."""
+def repaired(log: Recorded, lag: float = 0.0) -> Repaired:
+    """The record without spikes, v moved to where q changes as it says, and which torques are none.
+
+    Args:
+        lag: seconds by which v is late.
+    """
     clean = _without_spikes(_moving_on(log))
     lost = np.zeros(log.tau.shape, dtype=bool)
     for j in range(log.tau.shape[1]):
-        for first, last in _stuck(clean, j):
+        cut = cut_off(clean, j)
+        for first, last in _stuck(clean, j, cut):
             lost[first : last + 1, j] = True
-        for value, _ in cut_off(clean, j):
+        for value, _ in cut:
             lost[:, j] |= clean.tau[:, j] == value
-    return Repaired(clean.q, clean.v, clean.tau, lost if lost.any() else None)
+    return Repaired(clean.q, _in_time(clean, lag), clean.tau, lost if lost.any() else None)
+
+
+def _in_time(log: Recorded, lag: float) -> Array:
+    """v (N, n) at the instants of q: a controller's own low-pass and differences make it late, and all joints alike.
+
+    A v that leads is left: no filter does that, so it may be q that is late.
+    """
+    if lag <= 0:
+        return log.v
+    # Here, for a fault of the input is to be told before this is imported.
+    from scipy.interpolate import CubicSpline
+
+    v = log.v.copy()
+    for run in log.runs:
+        if run.stop - run.start >= _FEWEST_TO_SHIFT:
+            time = log.time[run]
+            v[run] = CubicSpline(time, log.v[run])(np.minimum(time + lag, time[-1]))
+    return v
 
 
 def dropouts(log: Recorded) -> Iterator[Finding]:
@@ -87,7 +112,8 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
                 "their place",
             )
     for j in range(log.tau.shape[1]):
-        stuck = _stuck(log, j)
+        cut = cut_off(log, j)
+        stuck = _stuck(log, j, cut)
         if stuck:
             seconds = sum(float(log.time[last] - log.time[first]) for first, last in stuck)
             yield Finding(
@@ -95,7 +121,7 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
                 f"stands still to the last digit while the joint moves {len(stuck)} times, {seconds:.2g} s "
                 "in all; these parts are left out",
             )
-        for value, share in cut_off(log, j):
+        for value, share in cut:
             yield Finding(
                 f"column tau{j + 1}",
                 f"is {value:.6g} to the last digit in {share:.0%} of the rows, as where a sensor or a drive saturates; "
@@ -161,8 +187,7 @@ def _held(log: Recorded) -> Index:
     same &= np.abs(log.v[1:]).max(axis=1) > _NO_SPEED
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in stretches(same).tolist():
         # what stands still to the end of a run, or too long, is another fault
         if log.time[last] - log.time[first] > _HELD or not _in_one_run(log, first, last + 1):
             same[first:last] = False
@@ -230,34 +255,29 @@ def _in_one_run(log: Recorded, first: int, last: int) -> bool:
     return any(run.start <= first and last < run.stop for run in log.runs)
 
 
-def _stuck(log: Recorded, j: int) -> list[tuple[int, int]]:
+def _stuck(log: Recorded, j: int, cut: list[tuple[float, float]]) -> list[tuple[int, int]]:
     """First and last samples of stretches in which a joint's torque stands still by a fault, while the joint moves.
 
     Zero is no stuck value: a drive may be off.
     """
     x, v = log.tau[:, j], log.v[:, j]
     steps = np.diff(x)
-    same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut_off(log, j)])
+    same = (steps == 0) & ~np.isin(x[1:], [value for value, _ in cut])
     for run in log.runs[1:]:
         same[run.start - 1] = False
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    if len(edges) == 0 or same.all():
+    still = stretches(same)
+    if len(still) == 0 or same.all() or len(np.unique(x)) < _LEVELS:
         return []
     # the chance that a value is followed by the same: of the values that end a stretch, how many begin another
-    part = min(len(edges) / 2 / float((~same).sum()), 1 - 1e-9)
+    part = min(len(still) / float((~same).sum()), 1 - 1e-9)
     # so many equal steps one after the other come about by chance nowhere in the column
     fewest = max(_FEWEST, int(np.ceil(np.log(_CHANCE / len(x)) / np.log(part))))
     jump = 0.0 if part < _NEVER else _JUMP * float(np.median(np.abs(steps[~same]))) / 0.6745
     found = []
-    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, last in still.tolist():
         if last - first < fewest:
             continue
         let_go = x[first] != 0 and last < len(steps) and abs(steps[last]) > max(jump, TINY)
-        if (
-            let_go
-            and len(np.unique(x)) >= _LEVELS
-            and np.ptp(v[first : last + 1]) > 0
-            and np.abs(v[first : last + 1]).min() > 0
-        ):
+        if let_go and np.ptp(v[first : last + 1]) > 0 and np.abs(v[first : last + 1]).min() > 0:
             found.append((first, last))
     return found

@@ -9,6 +9,7 @@ SI units; joints numbered from 1, base to tip. Columns of any other name are lef
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
+from armloop.data.redundancy import velocity_lag
 from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
@@ -62,6 +64,14 @@ class MotionLog:
     name: str = "log"
     tau_unit: str = "N*m"
     v_derived: bool = False
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return what was measured by the names of the columns of its file, (N,) each, in their order."""
+        columns = {"time": self.time}
+        for kind, values in (("q", self.q), ("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
+            if values is not None and not (kind == "v" and self.v_derived):
+                columns |= {f"{kind}{j + 1}": values[:, j] for j in range(self.joints)}
+        return columns
 
     def __post_init__(self) -> None:
         if self.tau_unit not in TAU_UNITS:
@@ -190,13 +200,18 @@ class MotionLog:
         """The median time between samples in seconds."""
         return float(np.median(np.diff(self.time)))
 
+    @cached_property
+    def velocity_lag(self) -> float:
+        """The group delay of v behind dq/dt in seconds, 0 if none is sure (see :mod:`armloop.data.redundancy`)."""
+        return velocity_lag(recorded(self))
+
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""
         return _runs(self.time)
 
     def doubts(self) -> list[str]:
         """Return what may be right and should be known before the log is relied on, one line each."""
-        return [f"{found.columns} {found.text}" for found in doubts(_recorded(self))]
+        return [f"{found.columns} {found.text}" for found in doubts(recorded(self))]
 
     def rows_digest(self) -> NDArray[np.uint64]:
         """(N,) a number for each row's q, v and tau, the same for the same digits: equal rows are found by it."""
@@ -287,11 +302,7 @@ def write_log(path: str | Path, log: MotionLog) -> None:
     where = path_of(path, "the path of a log", LogError)
     if not isinstance(log, MotionLog):
         raise LogError(f"{where}: what is written must be a MotionLog; this is of type {type(log).__name__}")
-    columns = {"time": log.time}
-    for kind, values in (("q", log.q), ("v", log.v), ("tau", log.tau), ("vdot", log.vdot)):
-        if values is not None and not (kind == "v" and log.v_derived):
-            columns |= {f"{kind}{j}": values[:, j - 1] for j in range(1, log.joints + 1)}
-    write_columns(where, columns, said_of_log(log))
+    write_columns(where, log.columns(), said_of_log(log))
 
 
 def said_of_log(log: MotionLog) -> dict[str, str]:
@@ -424,14 +435,15 @@ def _runs(time: NDArray[np.float64]) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(edges)]
 
 
-def _recorded(log: MotionLog) -> Recorded:
+def recorded(log: MotionLog) -> Recorded:
+    """The arrays of a log, as checks see them."""
     return Recorded(log.time, log.q, log.v, log.tau, log.vdot, log.runs(), log.v_derived)
 
 
 def _check(log: MotionLog, label: str, place: Callable[[int], str]) -> None:
     """Raise `LogError` for time that does not rise and for the first thing that no arm can have done."""
     _check_time(log.time, label, place)
-    found: Finding | None = next(faults(_recorded(log)), None)
+    found: Finding | None = next(faults(recorded(log)), None)
     if found is not None:
         where = "" if found.row is None else f", {place(found.row)}"
         raise LogError(f"{label}: {found.columns}{where} {found.text}")

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,7 @@ class Motion:
 
     time : (N,) seconds
     q, v, vdot : (N, n) rad, rad/s, rad/s^2 (m, m/s, m/s^2 for a prismatic joint)
-    starts : (R,) index of the first sample of each run; `starts[0] == 0`
+    starts : (R,) index of the first sample of each run; `starts[0] == 0`; one run by default
     begins : (R,) instant at which the record of each run began, where a filter has cut its ends; None where it is that of
         the first sample
 
@@ -32,7 +32,7 @@ class Motion:
     q: NDArray[np.float64]
     v: NDArray[np.float64]
     vdot: NDArray[np.float64]
-    starts: NDArray[np.intp]
+    starts: NDArray[np.intp] = field(default_factory=lambda: np.array([0]))
     begins: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
@@ -63,6 +63,11 @@ class Motion:
         )
         begins = np.concatenate([m.time[m.starts] if m.begins is None else m.begins for m in motions])
         return cls(time, q, v, vdot, starts, begins)
+
+    def take(self, rows: Any, starts: NDArray[np.intp] | None = None) -> "Motion":
+        """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
+        starts = np.array([0]) if starts is None else starts
+        return Motion(self.time[rows], self.q[rows], self.v[rows], self.vdot[rows], starts)
 
     @property
     def samples(self) -> int:
@@ -122,7 +127,8 @@ class Samples:
 
     motion : the kinematics, N samples of n joints
     tau : (N, n) N*m (N for a prismatic joint)
-    moving : (N, n) true where joint j slides, that is |v_j| is above the dead zone of its velocity noise
+    moving : (N, n) true where joint j slides: |v_j| is above the dead zone of its velocity noise, tau is known, and no
+        standstill is so near that the filter has mixed it in
     period : the sample period in seconds
     cutoff_hz : corner of the low-pass that tau has passed; 0 where there was none
     spans : (R, 2) first and last instant of the recorded run that each run of the motion was cut from; None where

@@ -1,4 +1,4 @@
-"""Analytical redundancy of a record: v against dq/dt, and vdot against dv/dt.
+"""Analytical redundancy of a record: v against dq/dt, how late it is, and vdot against dv/dt.
 
 Rates are compared over windows of 50 ms, ∫v dt against the change of q, so that neither rounding nor jitter of the stamps
 matters; measured arms agree within 2 % while they move.
@@ -6,13 +6,13 @@ matters; measured arms agree within 2 % while they move.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Mask, stretches
 
 # Window of the comparison of rates, s, and the rate (rms, rad/s or m/s) from which a joint is judged.
 _WINDOW, _MOVES = 0.05, 0.05
@@ -22,8 +22,10 @@ _ACCELERATES = 0.5
 _FROZEN = 0.2
 # Windows that are compared at most.
 _WINDOWS = 5_000
-# Lags that are tried, and the one from which on it is said, s.
-_LAGS, _LAG = np.arange(-0.03, 0.0301, 0.001), 0.0035
+# Lags that are tried, the one from which on it is said, s, and the standard errors from which on it is one.
+_LAGS, _LAG, _SURE = np.arange(-0.03, 0.0301, 0.001), 0.0035, 5.0
+# Mean square error at the largest lags over the least, from which on a joint's motion tells of a lag.
+_PLAIN = 4.0
 # v that is proportional to the rate of q, at such a correlation, by a factor so far from one.
 _ALIKE, _OFF = 0.998, 0.05
 
@@ -61,6 +63,8 @@ class Windows:
 
 def windows_of(log: Recorded) -> Windows | None:
     """None where no run is long enough for a few of them."""
+    if len(log.time) < 2:
+        return None
     steps = 0.5 * (log.v[1:] + log.v[:-1]) * np.diff(log.time)[:, None]
     path = np.concatenate([np.zeros((1, log.v.shape[1])), np.cumsum(steps, axis=0)])
     width = max(1, round(_WINDOW / float(np.median(np.diff(log.time)))))
@@ -160,7 +164,7 @@ def frozen(log: Recorded, integral: Array) -> Iterator[Finding]:
                 ("q", np.diff(q[:, j]) == 0, path[:, j]),
                 ("v", v[1:, j] == 0, q[:, j]),
             ):
-                first, last = _stretches(same)
+                first, last = stretches(same).T
                 length, travel = time[last] - time[first], other[last] - other[first]
                 wrong = (last - first >= 5) & (length >= _FROZEN)
                 wrong &= np.abs(travel) > np.maximum(_MOVES * length, 0.02)
@@ -174,25 +178,14 @@ def frozen(log: Recorded, integral: Array) -> Iterator[Finding]:
                     )
 
 
-def _stretches(same: Mask) -> tuple[Index, Index]:
-    """First and last sample of every stretch whose steps are all ``same``."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    return edges[::2], edges[1::2]
-
-
 def disagreements(log: Recorded) -> Iterator[Finding]:
     """v that lags, or that is near the rate of q and not equal to it."""
-    windows = windows_of(log)
-    inside = None if windows is None else _far_from_the_ends(log, windows)
-    if windows is None or inside is None or inside.sum() < 10:
+    windows = _inner_windows(log)
+    if windows is None:
         return
-    windows = replace(
-        windows,
-        **{key: getattr(windows, key)[inside] for key in ("start", "end", "change", "integral")},
-    )
-    lags = []
+    every = _errors(log, windows)
     of_q, of_v = windows.rates()
-    for j in windows.moving():
+    for j, errors in every.items():
         similar = float(windows.similarity()[j, j])
         factor = similar * float(of_v[j] / of_q[j])
         if similar > _ALIKE and abs(factor - 1) > _OFF:
@@ -201,26 +194,58 @@ def disagreements(log: Recorded) -> Iterator[Finding]:
                 f"is {factor:.3g} times the rate of q{j + 1}; leave out all columns v to have q differentiated",
             )
             continue
-        size = float(np.mean(np.square(windows.change[:, j])))
-        errors = [_error(log, windows, j, float(lag)) for lag in _LAGS]
-        best = int(np.argmin(errors))
-        # A steady speed says nothing of a lag: shifting v must explain a good part of what differs.
-        if 0 < best < len(_LAGS) - 1:
-            clear = errors[best] < 0.75 * errors[len(_LAGS) // 2]
-            lags.append(_vertex(_LAGS, errors, best) if clear else 0.0)
-        left = float(np.sqrt(errors[best] / size))
+        left = float(np.sqrt(errors.min() / np.mean(np.square(windows.change[:, j]))))
         if left > 0.2:
             yield Finding(
                 f"column v{j + 1}",
                 f"differs from the rate of q{j + 1} by {left:.0%}; leave out all columns v to have q differentiated",
             )
-    lag = float(np.median(lags)) if lags else 0.0
+    lag = _common_lag(log, every)
     if abs(lag) > _LAG:
         yield Finding(
             "columns v",
             f"{'lag behind' if lag > 0 else 'lead'} dq/dt by {1e3 * abs(lag):.1f} ms; "
-            "leave them out to have q differentiated",
+            f"{'they are taken to be that late; ' if lag > 0 else ''}leave them out to have q differentiated",
         )
+
+
+def velocity_lag(log: Recorded) -> float:
+    """Group delay of v behind dq/dt, s: negative if it leads; 0 if it was differentiated, or neither is sure."""
+    windows = None if log.derived else _inner_windows(log)
+    return 0.0 if windows is None else _common_lag(log, _errors(log, windows))
+
+
+def _inner_windows(log: Recorded) -> Windows | None:
+    """Windows that stay within their run at every lag that is tried; None where they are too few."""
+    windows = windows_of(log)
+    inside = None if windows is None else _far_from_the_ends(log, windows)
+    if windows is None or inside is None or inside.sum() < 10:
+        return None
+    keys = ("start", "end", "change", "integral")
+    return replace(windows, **{key: getattr(windows, key)[inside] for key in keys})
+
+
+def _errors(log: Recorded, windows: Windows) -> dict[int, Array]:
+    """By joint that moves, the mean square of what q changes beyond ∫v dt, for every lag that is tried."""
+    return {j: np.array([_error(log, windows, j, float(lag)) for lag in _LAGS]) for j in windows.moving()}
+
+
+def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
+    """The lag of largest likelihood, s, one for all joints, for they share a controller; 0 if the gain may be chance.
+
+    Errors are normal with a variance of each joint's own; each window's length is one observation. Only joints count at
+    which the largest lags would be plain: a steady speed fits every lag, and what it errs by is no noise.
+    """
+    told = [e for e in errors.values() if min(e[0], e[-1]) > _PLAIN * e.min()]
+    if not told:
+        return 0.0
+    seconds = sum(float(np.ptp(log.time[run])) for run in log.runs)
+    size = np.sum([np.log(np.maximum(e, TINY)) for e in told], axis=0)
+    likelihood = -0.5 * seconds / _WINDOW * size
+    best, none = int(np.argmax(likelihood)), len(_LAGS) // 2
+    if not 0 < best < len(_LAGS) - 1 or likelihood[best] - likelihood[none] < 0.5 * _SURE**2:
+        return 0.0
+    return _vertex(_LAGS, np.sum([e / max(e[best], TINY) for e in told], axis=0), best)
 
 
 def _far_from_the_ends(log: Recorded, windows: Windows) -> Mask:
@@ -239,7 +264,7 @@ def _error(log: Recorded, windows: Windows, j: int, lag: float) -> float:
     return float(np.mean(np.square(windows.change[:, j] - next(later) + next(later))))
 
 
-def _vertex(x: Array, y: Sequence[float], k: int) -> float:
+def _vertex(x: Array, y: Array, k: int) -> float:
     """Where the parabola through three neighbouring points is lowest."""
     before, here, after = y[k - 1], y[k], y[k + 1]
     bend = before - 2 * here + after

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from armloop.data.dropouts import Repaired, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
-from armloop.data.log import FEWEST_SAMPLES, MotionLog
+from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
-from armloop.data.recorded import Recorded
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
@@ -113,7 +112,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
     parts, spans = [], []
     for log in logs:
-        fresh = repaired(Recorded(log.time, log.q, log.v, log.tau, log.vdot, log.runs(), log.v_derived))
+        fresh = repaired(recorded(log), log.velocity_lag)
         for run in log.runs():
             part = _condition_run(log.select(run), fresh.part(run), how, how.dead_zone * noise)
             if part is not None:

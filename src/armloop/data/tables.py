@@ -19,7 +19,7 @@ from armloop.util.errors import LogError
 from armloop.util.files import replacing
 
 if TYPE_CHECKING:
-    from pyarrow import Table
+    from pyarrow import DataType, Table
     from pyarrow.parquet import ParquetFile
 
 CSV, PARQUET = ".csv", ".parquet"
@@ -172,6 +172,13 @@ def _parquet_header(path: Path) -> list[str]:
         ) from error
 
 
+def is_number(kind: DataType) -> bool:
+    """Whether a type of pyarrow is one of numbers."""
+    from pyarrow import types
+
+    return bool(types.is_floating(kind) or types.is_integer(kind))
+
+
 def _read_parquet(
     path: Path, names: Sequence[str], rows: tuple[int, int] | None
 ) -> dict[str, NDArray[np.float64]]:
@@ -187,7 +194,7 @@ def _read_parquet(
     columns = {}
     for name in names:
         kind = table.schema.field(name).type
-        if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
+        if not is_number(kind):
             raise LogError(f"{path}: column {name} holds {kind}; it must hold floating-point numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
     if rows is not None:  # every process that reads pieces would keep what one of them took

@@ -19,7 +19,7 @@ from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.fit import Fit, fit
+from armloop.diagnosis.fit import fit
 from armloop.diagnosis.reasons import Standing, in_doubt, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
@@ -41,7 +41,7 @@ from armloop.laws.effects.base import entry
 from armloop.laws.effects.listed import listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
@@ -61,6 +61,7 @@ class Diagnosis:
         unlisted: the law of a residual that no listed effect explains, if there is such a residual.
         contacts: events of the run, found before the search and kept out of it.
         evidence: the run as it was judged; reversals are among its rows only if something was found there.
+        sliding: (N, n) samples of the evidence that are no reversals.
         reversals: what was found at reversals, if anything.
         strengths: of each effect found.
         adopted: whether the model has the unlisted law.
@@ -74,6 +75,7 @@ class Diagnosis:
     unlisted: Unlisted | None
     evidence: Evidence
     contacts: list[Contact]
+    sliding: Mask
     reversals: AtReversals | None = None
     standing: Standing = field(default_factory=lambda: Standing([], [], False))
     strengths: list[Strength] = field(default_factory=list)
@@ -111,11 +113,19 @@ class Diagnosis:
         return not too_still(self.evidence)
 
     def errors(self) -> dict[str, Any]:
-        """RMSE per joint of held-out moving samples, before and after, beside the baseline's; NaN for joints at rest."""
-        scale = self.evidence.scale
-        tau = np.sqrt(_by_joint(self.outcome.before, self._torque() ** 2))
-        before, after = (
-            np.sqrt(_by_joint(f, f.held_out**2)) * scale for f in (self.outcome.before, self.outcome.after)
+        """RMSE per joint of held-out sliding samples, before and after, beside the baseline's; NaN for joints at rest.
+
+        What a joint does where it turns round has numbers of its own, for the baseline knows nothing of it.
+        """
+        scale, slides = self.evidence.scale, self.sliding[self.evidence.rows]
+        joint, n = self.outcome.before.stacked.joint[slides], len(scale)
+        tau, before, after = (
+            np.sqrt(_by_joint(joint, n, x[slides] ** 2))
+            for x in (
+                self.samples.tau[self.evidence.rows],
+                self.outcome.before.held_out * scale[self.outcome.before.stacked.joint],
+                self.outcome.after.held_out * scale[self.outcome.before.stacked.joint],
+            )
         )
         if self.adopted and self.unlisted is not None:
             after[self.unlisted.joint - 1] = self.unlisted.rmse_with_form
@@ -138,12 +148,6 @@ class Diagnosis:
 
     def _only_at_reversals(self, found: Found) -> bool:
         return self.reversals is not None and found in self.reversals.found
-
-    def _torque(self) -> Array:
-        stacked = self.outcome.before.stacked
-        order = np.argwhere(self.evidence.rows)
-        assert len(order) == len(stacked.y)
-        return np.asarray(self.samples.tau[order[:, 0], order[:, 1]])
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
@@ -199,11 +203,9 @@ class Diagnosis:
         }
 
 
-def _by_joint(fit: Fit, values: Array) -> Array:
-    """(n,) mean of row values over each joint; NaN where a joint has no rows."""
-    joints, n = fit.stacked.joint, fit.stacked.joints
-    counts = np.bincount(joints, minlength=n)
-    return _ratio(np.bincount(joints, weights=values, minlength=n), counts)
+def _by_joint(joint: NDArray[np.intp], n: int, values: Array) -> Array:
+    """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
+    return _ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
 
 
 def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
@@ -268,6 +270,7 @@ def diagnose(
             None,
             evidence,
             contacts,
+            evidence.rows,
         )
         stand = standing(evidence, augmented, found.errors()["after"], range(1, model.arm.n + 1))
         why = [too_still(evidence), *stand.reasons, *own_zeros]
@@ -284,7 +287,7 @@ def diagnose(
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
     if unlisted is not None:
         kept[:, unlisted.joint - 1] = False
-    turned = judge_reversals(evidence, outcome, kept, progress)
+    turned, sliding = judge_reversals(evidence, outcome, kept, progress), evidence.rows
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
     outcome = useful(evidence, outcome)
@@ -302,11 +305,13 @@ def diagnose(
             unlisted,
             evidence,
             contacts,
+            sliding,
             turned,
             strengths=strengths(evidence, outcome),
         )
-        stand = standing(evidence, augmented, found.errors()["after"], known)
-        doubtful = outweighed(evidence, outcome, stand.left)
+        stand = standing(evidence.only(sliding), augmented, found.errors()["after"], known)
+        searched = [f for f in outcome.found if turned is None or f not in turned.found]
+        doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])
         if doubtful is None:
             break
         doubted.append(in_doubt(doubtful.effect.label(), doubtful.share))

@@ -29,7 +29,7 @@ from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced
 
 #: Name and joints of an effect.
@@ -264,25 +264,34 @@ def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
     return useful(evidence, without_effect(evidence, outcome, outcome.found[worst]))
 
 
-def outweighed(evidence: Evidence, outcome: Outcome, left: Sequence[int]) -> Found | None:
+def outweighed(
+    evidence: Evidence, outcome: Outcome, among: Sequence[Found], left: Sequence[int], counted: Mask
+) -> Found | None:
     """The effect that explains least of the joints it acts on, if more is left there than it removes; None if there is none.
 
     Each joint counts by its part of what the effect removes. Where most of a residual is of unknown origin, an effect that
     takes a part of it may be of that origin, too.
 
     Args:
+        among: the effects that are asked.
         left: joints (0-based) of which something predictable is left that nothing accounts for.
+        counted: (R,) stacked rows that count.
     """
-    after = outcome.after.score
+
+    def score(fitted: Fit) -> Score:
+        rows = fitted.stacked
+        joint, block = rows.joint[counted], rows.block[counted]
+        return Score.of(0, fitted.held_out[counted], joint, block, rows.joints)
+
+    after = score(outcome.after)
     rest = np.zeros(len(after.energy))
     rest[list(left)] = np.maximum(after.energy - after.rows, 0.0)[list(left)]
     margins = []
-    for k in range(len(outcome.found)):
-        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit.score
+    for effect in among:
+        others = score(_known(evidence, [f for f in outcome.found if f is not effect]).fit)
         removed = np.maximum(others.energy - after.energy, 0.0)
         margins.append(float(removed @ (removed - rest)))
-    least = int(np.argmin(margins)) if margins else 0
-    return outcome.found[least] if margins and margins[least] < 0 else None
+    return among[int(np.argmin(margins))] if min(margins, default=0.0) < 0 else None
 
 
 def without_effect(evidence: Evidence, outcome: Outcome, effect: Found) -> Outcome:

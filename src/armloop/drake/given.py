@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 from pydrake.multibody.plant import MultibodyPlant
@@ -75,11 +74,11 @@ def require_plant(plant: Any) -> None:
 def require_order(plant: MultibodyPlant, arm: Arm) -> None:
     """Raise `ArmError` for a plant of as many joints that are others, or stand in another order, as far as that shows."""
     joints = moving(plant)
-    wanted, found = [joint.name for joint in arm.joints], [joint.name() for joint in joints]
+    wanted, found = arm.joint_names, [joint.name() for joint in joints]
     if sorted(wanted) == sorted(found) and wanted != found:
         raise ArmError(
-            f"the plant's velocities are those of {_listed(found)}, in this order; the joints of {arm.name} are "
-            f"{_listed(wanted)}"
+            f"the plant's velocities are those of {', '.join(found)}, in this order; the joints of {arm.name} are "
+            f"{', '.join(wanted)}"
         )
     for own, joint in zip(arm.joints, joints, strict=True):
         slides = isinstance(joint, PrismaticJoint)
@@ -94,7 +93,3 @@ def moving(plant: MultibodyPlant) -> list[Any]:
     """The plant's joints that move, in the order of its velocities."""
     joints = [plant.get_joint(index) for index in plant.GetJointIndices()]
     return sorted((j for j in joints if j.num_velocities()), key=lambda j: j.velocity_start())
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)

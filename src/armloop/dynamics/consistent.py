@@ -238,7 +238,7 @@ def _torque_factor(arm: Arm, with_rotor: NDArray[np.intp], links: Array, rotors:
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (_STATES, arm.n))
     v, vdot = rng.normal(size=(2, _STATES, arm.n))
-    motion = Motion(np.arange(float(_STATES)), q, v, 3 * vdot, np.array([0]))
+    motion = Motion(np.arange(float(_STATES)), q, v, 3 * vdot)
     columns = full_columns(arm, motion, rotors=True)
     size = np.sqrt(np.mean((columns @ np.concatenate([links, rotors])) ** 2, axis=0))
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

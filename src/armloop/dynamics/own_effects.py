@@ -97,6 +97,6 @@ class OwnEffectEquations(Equations):
             # samples of arrays have no past
             tau = np.array([self._one(*x) for x in zip(qs, vs, accelerations, strict=True)], dtype=float)
         else:
-            motion = Motion(np.arange(float(len(qs))), qs, vs, accelerations, np.array([0]))
+            motion = Motion(np.arange(float(len(qs))), qs, vs, accelerations)
             tau = self._effect.torque(Context(self._arm, motion, self._inertial), self._parameters)
         return [column.reshape(shape) for column in tau.T]

@@ -35,7 +35,7 @@ def c_source(model: ReconstructedModel) -> tuple[str, Formula]:
         for j, joint in enumerate(arm.joints)
     )
     notes = "".join(f" * Not in it: {_comment(line)}.\n" for line in found.left_out)
-    if model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None:
+    if model.in_amperes:
         notes += " * tau is the motor current in A: the model was made of currents.\n"
         joints = joints.replace("N.m", "A")
     if found.has_memory:

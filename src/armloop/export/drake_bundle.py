@@ -63,7 +63,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
     what = said(model, nearest_friction=False)
     smoothing = _smoothing(model, what)
     texts = {"arm.urdf": urdf_text(what), "simulate.py": _PROGRAM.format(step=_STEP, smoothing=smoothing)}
-    names = [joint.name for joint in model.arm.joints]
+    names = model.arm.joint_names
     with tempfile.TemporaryDirectory() as place:  # what does not run is not written
         draft = Path(place)
         for name, text in texts.items():

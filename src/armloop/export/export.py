@@ -42,10 +42,9 @@ def export(
         ModelError: the model cannot be said in this form at all.
     """
     path = path_of(path, "the path of an export")
-    in_amperes = model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None
     if not isinstance(target, str) or target not in TARGETS:
         raise InputError(f"--to {target}: unknown; it must be one of {', '.join(TARGETS)}")
-    if in_amperes and target != "c":
+    if model.in_amperes and target != "c":
         raise ModelError(
             f"the model predicts motor currents in A; {target} needs torques: reconstruct it with --drive-gains"
         )
@@ -61,7 +60,7 @@ def _described(model: ReconstructedModel, target: str, path: Path, motion: Motio
     text, features, consumer, read = _FORMATS[target]
     what = said(model)
     notes = [*what.notes, NAMES]
-    names = [joint.name for joint in model.arm.joints]
+    names = model.arm.joint_names
     whole = whole_torque(model, motion)
     difference = unsaid = None
     source = text(what)

@@ -79,4 +79,4 @@ def states_of(motion: Motion, moving: NDArray[np.bool_], most: int = _MOST) -> M
     rows = np.flatnonzero(moving.all(axis=1))
     rows = rows if len(rows) >= 20 else np.arange(motion.samples)
     rows = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
+    return motion.take(rows)

@@ -100,7 +100,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     arm = model.arm
     missing: list[str] = []
     notes: list[str] = []
-    constants = _constants(model) if nearest_friction else np.zeros(arm.n)
+    constants = _summed(model, "offset") if nearest_friction else np.zeros(arm.n)
     links, rotors, left, constants = rigid_parameters(model, constants)
     if left.max() > _NO_BODY:
         listed = ", ".join(f"{x:.2g}" for x in left)
@@ -172,22 +172,26 @@ def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array
     return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0), offsets
 
 
-def _constants(model: ReconstructedModel) -> Array:
-    """(n,) what the laws of friction hold of torques that are the same in both directions and at any speed."""
-    return np.array(
-        [sum(t.coefficient for t in terms if t.kind == "offset") for terms in model.friction.terms], float
+def _summed(model: ReconstructedModel, kind: str, effect: str = "", key: str = "") -> Array:
+    """(n,) sums of the coefficients of a kind of friction term and of a parameter of an effect that is the same."""
+    found = np.array(
+        [sum(t.coefficient for t in terms if t.kind == kind) for terms in model.friction.terms], float
     )
+    for added in model.effects:
+        if added.effect.name == effect and added.effect.joint is not None:
+            found[added.effect.joint - 1] += number(added.parameters[key].value)
+    return found
 
 
 def random_motion(model: ReconstructedModel, samples: int, seed: int) -> Motion:
     """Random states within the range that the model was fitted on; no joint stands still."""
     n, rng = model.arm.n, np.random.default_rng(seed)
     lower, upper = training_range(model)
-    size = np.array(model.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+    size = model.ranges
     q = rng.uniform(lower, upper, (samples, n))
     v = rng.uniform(0.05, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape) * size[1]
     vdot = rng.uniform(-1.0, 1.0, q.shape) * size[2]
-    return Motion(np.arange(float(samples)), q, v, vdot, np.array([0]))
+    return Motion(np.arange(float(samples)), q, v, vdot)
 
 
 def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Array]:
@@ -196,18 +200,11 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     Where a joint's law is a sum of the two, they are its coefficients; else those nearest to it over the speeds that
     the model was fitted on, by least squares, and what they leave goes to ``missing``.
     """
-    n = model.arm.n
-    damping, dry, others = np.zeros(n), np.zeros(n), _other_laws(model)
-    for j, terms in enumerate(model.friction.terms):
-        damping[j] = sum(t.coefficient for t in terms if t.kind == "viscous")
-        dry[j] = sum(t.coefficient for t in terms if t.kind == "sign")
-    for added in model.effects:
-        if added.effect.name in ("viscous_friction", "coulomb_friction") and added.effect.joint is not None:
-            values, key = (damping, "coefficient") if added.effect.name[0] == "v" else (dry, "level")
-            values[added.effect.joint - 1] += number(added.parameters[key].value)
+    damping, dry = _damping(model), _summed(model, "sign", "coulomb_friction", "level")
+    others = _other_laws(model)
     if any(others) or (damping < 0).any() or (dry < 0).any():
         v, torques = friction_torques(model)
-        for j in range(n):
+        for j in range(model.arm.n):
             unit = model.arm.joints[j].torque_unit
             if not others[j] and damping[j] >= 0 and dry[j] >= 0:
                 continue
@@ -223,13 +220,13 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     return damping, dry
 
 
+def _damping(model: ReconstructedModel) -> Array:
+    return _summed(model, "viscous", "viscous_friction", "coefficient")
+
+
 def _viscous(model: ReconstructedModel) -> Array:
     """The sums of the joints' viscous terms, which must not push."""
-    viscous = [[t.coefficient for t in terms if t.kind == "viscous"] for terms in model.friction.terms]
-    damping = np.array([sum(found) for found in viscous], dtype=float)
-    for added in model.effects:
-        if added.effect.name == "viscous_friction" and added.effect.joint is not None:
-            damping[added.effect.joint - 1] += number(added.parameters["coefficient"].value)
+    damping = _damping(model)
     if (damping < 0).any():
         j = int(np.argmin(damping))
         raise ModelError(

@@ -8,6 +8,7 @@ import numpy as np
 
 from armloop import __version__
 from armloop.export.expressible import Said, body_of
+from armloop.export.robot_xml import comment, numbers
 from armloop.util.arrays import Array
 
 FEATURES = frozenset({"damping", "dry", "spring", "gravity"})
@@ -21,10 +22,10 @@ def mjcf_text(said: Said) -> str:
     """The arm as MJCF, with a torque drive at each joint; the thin capsules are for the eye only."""
     arm = said.arm
     lines = [
-        f"<!-- {said.arm.name.replace('--', '- -')}, reconstructed by armloop {__version__}. {_UNITS} -->",
+        f"<!-- {comment(arm.name)}, reconstructed by armloop {__version__}. {_UNITS} -->",
         f"<mujoco model={quoteattr(arm.name)}>",
         '  <compiler angle="radian" autolimits="true"/>',
-        f'  <option gravity="{_numbers(said.gravity)}" timestep="0.001" integrator="implicitfast"/>',
+        f'  <option gravity="{numbers(said.gravity)}" timestep="0.001" integrator="implicitfast"/>',
         "  <worldbody>",
     ]
     for i, joint in enumerate(arm.joints):
@@ -40,23 +41,23 @@ def mjcf_text(said: Said) -> str:
             spring = f' stiffness="{float(said.stiffness[i])!r}" springref="{float(said.rest[i])!r}"'
         places = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
         lines += [
-            f'{pad}<body name="link_{i + 1}" pos="{_numbers(X[:3, 3])}" quat="{_numbers(quaternion(X[:3, :3]))}">',
-            f'{pad}  <inertial pos="{_numbers(com)}" mass="{mass!r}" '
-            f'fullinertia="{_numbers(np.array([inertia[place] for place in places]))}"/>',
-            f'{pad}  <joint name={quoteattr(joint.name)} type="{kind}" axis="{_numbers(arm.axis[i])}"{limits} '
+            f'{pad}<body name="link_{i + 1}" pos="{numbers(X[:3, 3])}" quat="{numbers(quaternion(X[:3, :3]))}">',
+            f'{pad}  <inertial pos="{numbers(com)}" mass="{mass!r}" '
+            f'fullinertia="{numbers(np.array([inertia[place] for place in places]))}"/>',
+            f'{pad}  <joint name={quoteattr(joint.name)} type="{kind}" axis="{numbers(arm.axis[i])}"{limits} '
             f'damping="{float(said.damping[i])!r}" frictionloss="{float(said.dry[i])!r}" '
             f'armature="{float(said.rotors[i])!r}"{spring}/>',
         ]
         reach = arm.X_PF[i + 1][:3, 3] if i + 1 < arm.n else arm.X_tool[:3, 3]
         if np.linalg.norm(reach) > 1e-3:
             lines.append(
-                f'{pad}  <geom type="capsule" fromto="0 0 0 {_numbers(reach)}" size="{0.05 * np.linalg.norm(reach):.4g}" '
+                f'{pad}  <geom type="capsule" fromto="0 0 0 {numbers(reach)}" size="{0.05 * np.linalg.norm(reach):.4g}" '
                 'mass="0" contype="0" conaffinity="0"/>'
             )
         if i + 1 == arm.n:
             tool = arm.X_tool
             lines.append(
-                f'{pad}  <site name="tool" pos="{_numbers(tool[:3, 3])}" quat="{_numbers(quaternion(tool[:3, :3]))}"/>'
+                f'{pad}  <site name="tool" pos="{numbers(tool[:3, 3])}" quat="{numbers(quaternion(tool[:3, :3]))}"/>'
             )
     lines += ["  " * (i + 2) + "</body>" for i in reversed(range(arm.n))]
     lines += ["  </worldbody>", "  <actuator>"]
@@ -80,7 +81,3 @@ def quaternion(R: Array) -> Array:
     ]
     q = np.array(rows[k])
     return np.asarray(q / np.linalg.norm(q))
-
-
-def _numbers(values: Array) -> str:
-    return " ".join(repr(float(x)) for x in values)

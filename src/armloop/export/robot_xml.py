@@ -24,7 +24,7 @@ def urdf_text(said: Said) -> str:
     arm = said.arm
     lines = [
         '<?xml version="1.0"?>',
-        f"<!-- {_comment(arm.name)}, reconstructed by armloop {__version__}. {UNITS} -->",
+        f"<!-- {comment(arm.name)}, reconstructed by armloop {__version__}. {UNITS} -->",
         f'<robot name={quoteattr(arm.name)} xmlns:drake="http://drake.mit.edu">',
         '  <link name="world"/>',
         '  <link name="base_link"/>',
@@ -35,7 +35,7 @@ def urdf_text(said: Said) -> str:
         lines += [
             f'  <link name="link_{i + 1}">',
             "    <inertial>",
-            f'      <origin xyz="{_numbers(com)}" rpy="0 0 0"/>',
+            f'      <origin xyz="{numbers(com)}" rpy="0 0 0"/>',
             f'      <mass value="{mass!r}"/>',
             f"      <inertia {_tensor(inertia)}/>",
             "    </inertial>",
@@ -50,7 +50,7 @@ def urdf_text(said: Said) -> str:
             f'  <joint name={quoteattr(joint.name)} type="{kind}">',
             f'    <parent link="{parent}"/><child link="link_{i + 1}"/>',
             f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
-            f'    <axis xyz="{_numbers(arm.axis[i])}"/>',
+            f'    <axis xyz="{numbers(arm.axis[i])}"/>',
             f"    <limit {_limits(joint)}/>",
             f'    <dynamics damping="{float(said.damping[i])!r}" friction="{float(said.dry[i])!r}"/>',
             "  </joint>",
@@ -81,7 +81,7 @@ def sdf_text(said: Said) -> str:
     arm = said.arm
     lines = [
         '<?xml version="1.0"?>',
-        f"<!-- {_comment(arm.name)}, reconstructed by armloop {__version__}. {UNITS} -->",
+        f"<!-- {comment(arm.name)}, reconstructed by armloop {__version__}. {UNITS} -->",
         '<sdf version="1.9" xmlns:drake="http://drake.mit.edu">',
         f"<model name={quoteattr(arm.name)}>",
         '  <link name="base_link"/>',
@@ -110,12 +110,12 @@ def sdf_text(said: Said) -> str:
         lines += [
             f'  <link name="link_{i + 1}">',
             f'    <pose relative_to="{parent}">{xyz} {rpy}</pose>',
-            f"    <inertial><pose>{_numbers(com)} 0 0 0</pose>",
+            f"    <inertial><pose>{numbers(com)} 0 0 0</pose>",
             f"      <mass>{mass!r}</mass><inertia>{tensor}</inertia></inertial>",
             "  </link>",
             f'  <joint name={quoteattr(joint.name)} type="{joint.kind}">',
             f"    <parent>{parent}</parent><child>link_{i + 1}</child>",
-            f"    <axis><xyz>{_numbers(arm.axis[i])}</xyz>",
+            f"    <axis><xyz>{numbers(arm.axis[i])}</xyz>",
             f"      <limit>{limits}</limit>",
             f"      <dynamics><damping>{float(said.damping[i])!r}</damping>"
             f"<friction>{float(said.dry[i])!r}</friction>{springs}</dynamics></axis>",
@@ -138,7 +138,7 @@ def roll_pitch_yaw(R: Array) -> Array:
 
 
 def _pose(X: Array) -> tuple[str, str]:
-    return _numbers(X[:3, 3]), _numbers(roll_pitch_yaw(X[:3, :3]))
+    return numbers(X[:3, 3]), numbers(roll_pitch_yaw(X[:3, :3]))
 
 
 def _limits(joint: Joint) -> str:
@@ -158,9 +158,11 @@ def _tensor(inertia: Array) -> str:
     return " ".join(f'{key}="{value!r}"' for key, value in _entries(inertia))
 
 
-def _numbers(values: Array) -> str:
+def numbers(values: Array) -> str:
+    """Numbers of an attribute, to the last digit."""
     return " ".join(repr(float(x)) for x in values)
 
 
-def _comment(text: str) -> str:
+def comment(text: str) -> str:
+    """Text that cannot end a comment."""
     return text.replace("--", "- -")

@@ -68,7 +68,7 @@ class BaseParameters:
         rng = np.random.default_rng(seed)
         q = rng.uniform(-np.pi, np.pi, (_EXCITATION, arm.n))
         v, vdot = rng.normal(size=(2, _EXCITATION, arm.n))
-        random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot, np.array([0]))
+        random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot)
         columns = full_columns(arm, random, rotors)
         return cls._keeping(columns, _independent(_rows(columns), _usual_order(arm.n, rotors)), rotors)
 

@@ -129,14 +129,23 @@ class ReconstructedModel:
     history: dict[str, Any] = field(default_factory=dict)
     uncertainty: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def in_amperes(self) -> bool:
+        """Whether the model predicts motor currents, for want of gains that make torques of them."""
+        return self.recorded["unit"] == "A" and self.recorded["drive_gains"] is None
+
+    @property
+    def ranges(self) -> Array:
+        """(4, n) how far q, v and v̇ went where the model was fitted, and the middle of q; a guess where it is not kept."""
+        n = self.arm.n
+        return np.array(self.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+
     def rigid_body(self, motion: Motion, step: int = 3) -> Array:
         """(N, n) torque of the components without friction and effects."""
         tau = np.zeros_like(motion.q)
         for start in range(0, motion.samples, _ROWS):
             own = slice(start, start + _ROWS)
-            part = Motion(
-                motion.time[own], motion.q[own], motion.v[own], motion.vdot[own], np.zeros(1, dtype=np.intp)
-            )
+            part = motion.take(own)
             for component in self.components:
                 tau[own] += component.torque(self.arm, part, step)
         return tau
@@ -207,9 +216,9 @@ class ReconstructedModel:
         if "inertial" in self.history:
             return np.asarray(self.history["inertial"], dtype=float)
         n, rng = self.arm.n, np.random.default_rng(0)
-        size = np.array(self.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
+        size = self.ranges
         q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
-        part = Motion(np.arange(400.0), q + size[3], v, vdot, np.array([0]))
+        part = Motion(np.arange(400.0), q + size[3], v, vdot)
         Y = regressor(self.arm, part.q, v, vdot).reshape(-1, 10 * n)
         nominal = nominal_parameters(self.arm)
         rest = self.rigid_body(part).ravel() - Y @ nominal
@@ -403,7 +412,7 @@ def _from_dict(data: dict[str, Any]) -> ReconstructedModel:
                     f"effect {added.effect.label()}: the unit of {parameter.name} is {given.unit!r:.40}; it must be {unit!r}"
                 )
     half = np.full((1, arm.n), 0.5)
-    probe = Motion(np.zeros(1), half, half, half, np.array([0]))
+    probe = Motion(np.zeros(1), half, half, half)
     with np.errstate(all="ignore"):  # the line below says it
         tau = model.predict(probe)
     if not np.isfinite(tau).all():

@@ -19,6 +19,9 @@ from armloop.laws.effects import Effect, effect, hypotheses
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 
+#: An effect's name and joints.
+Place = tuple[str, int | None, int | None]
+
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.
 _SPECTRUM = 40
@@ -57,7 +60,7 @@ class Column:
         )
 
     @property
-    def place(self) -> tuple[str, int | None, int | None]:
+    def place(self) -> Place:
         """Effect and joints."""
         return self.name, self.joint, self.other_joint
 
@@ -84,7 +87,6 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     a motion that fills the ranges the model was fitted on: it must not depend on the log, or sums of different logs
     would not add.
     """
-    n = model.arm.n
     kept = [
         e
         for e in hypotheses(model.arm)
@@ -92,11 +94,11 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
         and not (e.pair_wise and e.joint and e.other_joint and abs(e.joint - e.other_joint) > 1)
     ]
     rng = np.random.default_rng(0)
-    size = np.array(model.history.get("range", [[1.0] * n, [1.0] * n, [2.0] * n, [0.0] * n]), dtype=float)
-    q, v, vdot = rng.uniform(-1, 1, (3, 400, n)) * size[:3, None]
+    size = model.ranges
+    q, v, vdot = rng.uniform(-1, 1, (3, 400, model.arm.n)) * size[:3, None]
     cutoff = model.conditioning.cutoff_hz
     period = 1 / INDEPENDENT / cutoff if cutoff > 0 else 0.01
-    motion = Motion(period * np.arange(400.0), q + size[3], v, vdot, np.array([0]))
+    motion = Motion(period * np.arange(400.0), q + size[3], v, vdot)
     known = replace(model.context(motion, kept), period=period)
     shapes = [(e, list(e.shapes(known))) for e in kept]
     return tuple((e, float(s[len(s) // 2])) for e, s in shapes if 0 < len(s) <= _SPECTRUM)
@@ -144,7 +146,7 @@ def motion_of(samples: Samples, rows: NDArray[np.intp]) -> Motion:
     motion = samples.motion
     run = np.searchsorted(motion.starts, rows, side="right")
     starts = np.flatnonzero(np.diff(run, prepend=-1))
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
+    return motion.take(rows, starts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,9 +159,9 @@ class Catalogue:
     predicted: Array
 
 
-def groups(columns: Sequence[Column]) -> dict[tuple[str, int | None, int | None], NDArray[np.intp]]:
+def groups(columns: Sequence[Column]) -> dict[Place, NDArray[np.intp]]:
     """Indices of the columns of each effect at each place."""
-    found: dict[tuple[str, int | None, int | None], list[int]] = {}
+    found: dict[Place, list[int]] = {}
     for index, column in enumerate(columns):
         found.setdefault(column.place, []).append(index)
     return {place: np.array(indices, dtype=np.intp) for place, indices in found.items()}

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from armloop.laws.effects import Estimate
 from armloop.laws.effects.base import entry
-from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
+from armloop.monitoring.catalogue import Column, Place, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, solve
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
-
-Place = tuple[str, int | None, int | None]
 
 #: Ridge on columns of unit length, and those tried of what the model leaves on healthy units: where it is no more than
 #: noise, or the motion goes on to others, its weak directions would put more into the window than they take out.

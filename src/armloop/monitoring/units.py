@@ -7,13 +7,13 @@ by one, hardly do; they are what the sequential test takes as exchangeable.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from armloop.monitoring.catalogue import Column
+from armloop.monitoring.catalogue import Column, Place
 from armloop.monitoring.ranks import HORIZON
 from armloop.monitoring.sums import FEWEST_ROWS
 from armloop.util.arrays import Array
@@ -67,25 +67,8 @@ class Units:
 
     def take(self, index: NDArray[np.intp] | slice) -> Units:
         """Some of the units."""
-        return Units(
-            self.columns,
-            *(np.asarray(getattr(self, name))[index] for name in _ARRAYS),
-        )
-
-
-_ARRAYS = (
-    "when",
-    "seconds",
-    "programme",
-    "log",
-    "moment",
-    "size",
-    "rows",
-    "energy",
-    "torque",
-    "temperature",
-    "since_start",
-)
+        _, *arrays = fields(self)
+        return Units(self.columns, *(getattr(self, each.name)[index] for each in arrays))
 
 
 def unit_edges(seconds: Array) -> list[slice]:
@@ -111,7 +94,7 @@ class Stream:
     column: int | None
 
     @property
-    def place(self) -> tuple[str, int | None, int | None]:
+    def place(self) -> Place:
         """Effect and joints."""
         return self.name, self.joint, self.other_joint
 

@@ -49,9 +49,7 @@ def coefficients_table(model: ReconstructedModel, title: str | None = "Coefficie
     return make_table(headers, rows, title, left=(0, 1))
 
 
-def stribeck_table(
-    model: ReconstructedModel, title: str | None = "Friction, Eq. (34), SI units"
-) -> Table | None:
+def stribeck_table(model: ReconstructedModel) -> Table | None:
     """f_s, f_c, f_v and v_s of every joint with standard errors; None where no joint has such a law."""
     found = model.uncertainty.get("stribeck", [])
     if not any(found):
@@ -64,7 +62,7 @@ def stribeck_table(
         ]
         for j, e in enumerate(found)
     ]
-    return make_table(headers, rows, title)
+    return make_table(headers, rows, "Friction, Eq. (34), SI units")
 
 
 def _shared_values(model: ReconstructedModel) -> dict[str, float]:

@@ -149,6 +149,7 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
         ]
     added = diagnosis.outcome.added()[0]
     key, estimate = next(iter(added.parameters.items()))
+    title = key.replace("_", " ").capitalize()
     relative = errors["nrmse"]
     return [
         Card(
@@ -159,7 +160,7 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
         ),
         Card(
             with_error(estimate.value, estimate.std_error),
-            _with_unit(key.replace("_", " ").capitalize(), unit(estimate.unit)),
+            f"{title} [{unit(estimate.unit)}]" if unit(estimate.unit) else title,
             "± standard error",
         ),
         Card(
@@ -175,10 +176,6 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
             "good",
         ),
     ]
-
-
-def _with_unit(title: str, of: str) -> str:
-    return f"{title} [{of}]" if of else title
 
 
 def _contact_card(diagnosis: Diagnosis, k: int) -> Card:

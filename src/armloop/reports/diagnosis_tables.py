@@ -23,7 +23,7 @@ _WIDTH = 110
 _WHEN = ("picked_up", "put_down", "posture")
 
 
-def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> Table:
+def effects_table(diagnosis: Diagnosis) -> Table:
     """Each effect found with its parameters ± standard error, its share of the explainable residual, and where it is."""
     rows: list[list[object]] = []
     every = zip(diagnosis.outcome.found, diagnosis.outcome.added(), diagnosis.strengths, strict=True)
@@ -47,10 +47,10 @@ def effects_table(diagnosis: Diagnosis, title: str | None = "Effects found") -> 
         if not terms:
             rows.append([label, "law", MISSING, "", "", percent(probability.UNLISTED.probability), ""])
     headers = ["effect", "parameter", "value ± std. error", "unit", "share", "probability", "where"]
-    return make_table(headers, rows, title, left=(0, 1, 3, 6))
+    return make_table(headers, rows, "Effects found", left=(0, 1, 3, 6))
 
 
-def events_table(diagnosis: Diagnosis, title: str | None = "Events") -> Table:
+def events_table(diagnosis: Diagnosis) -> Table:
     """Each event's interval, where it acted, and its mean: a force in the base frame, or the torque the drive supplied."""
     rows = []
     for k, contact in enumerate(diagnosis.contacts):
@@ -74,10 +74,10 @@ def events_table(diagnosis: Diagnosis, title: str | None = "Events") -> Table:
             ]
         )
     headers = ["event", "from [s]", "to [s]", "at", "mean", "unit", "(x, y, z)", "std. error", "explains"]
-    return make_table(headers, rows, title, left=(3, 5))
+    return make_table(headers, rows, "Events", left=(3, 5))
 
 
-def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not fitted, RMSE") -> Table:
+def errors_table(diagnosis: Diagnosis) -> Table:
     """RMSE per joint before and after the effects were added, and the model's own on its baseline data."""
     errors = diagnosis.errors()
     relative = errors["nrmse"]
@@ -91,12 +91,10 @@ def errors_table(diagnosis: Diagnosis, title: str | None = "Residual on data not
         for j, joint in enumerate(diagnosis.model.arm.joints)
     ]
     headers = ["joint", "unit", "before", "after", "baseline", "nRMSE before", "nRMSE after"]
-    return make_table(headers, rows, title, left=(0, 1))
+    return make_table(headers, rows, "Residual on data not fitted, RMSE", left=(0, 1))
 
 
-def feedforward_table(
-    diagnosis: Diagnosis, compensation: Closing, title: str | None = "Torque that the controller now adds"
-) -> Table:
+def feedforward_table(diagnosis: Diagnosis, compensation: Closing) -> Table:
     """RMS and largest change of the feedforward along the run, beside the RMS torque measured."""
     change = compensation.feedforward
     measured = np.sqrt(np.mean(diagnosis.samples.tau**2, axis=0))
@@ -112,12 +110,10 @@ def feedforward_table(
         for j, joint in enumerate(diagnosis.model.arm.joints)
     ]
     headers = ["joint", "unit", "RMS", "largest", "RMS measured", "of it"]
-    return make_table(headers, rows, title, left=(0, 1))
+    return make_table(headers, rows, "Torque that the controller now adds", left=(0, 1))
 
 
-def held_out_table(
-    compensation: Closing, arm: Arm, title: str | None = "Whole runs that were not fitted, RMSE"
-) -> Table:
+def held_out_table(compensation: Closing, arm: Arm) -> Table:
     """RMSE and nRMSE per run and joint, of the model before and the augmented one."""
     rows: list[list[object]] = []
     for run in compensation.held_out:
@@ -135,7 +131,7 @@ def held_out_table(
                 ]
             )
     headers = ["run", "joint", "unit", "before", "after", "nRMSE before", "nRMSE after"]
-    return make_table(headers, rows, title, left=(0, 1, 2))
+    return make_table(headers, rows, "Whole runs that were not fitted, RMSE", left=(0, 1, 2))
 
 
 def found_tables(diagnosis: Diagnosis) -> list[Table]:

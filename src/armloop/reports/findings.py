@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.reports.prose import Prose
 from armloop.reports.words import counted, effect_label, listed, percent, place, unit
@@ -81,7 +80,7 @@ def blame(diagnosis: Diagnosis) -> list[str]:
         who=who[:1].upper() + who[1:],
         what="recording" if all(a.effect.name == "time_delay" for a in faulty) else "sensor",
         arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
-        remedies=[remedy(a) for a in faulty],
+        remedies=[a.effect.remedy(a.parameters) for a in faulty],
     )
     return say.paragraphs("blame")
 

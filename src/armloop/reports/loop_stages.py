@@ -78,7 +78,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
         Stage(
             "Measure",
             counted(count, "sample"),
-            listed([_plain(name) for name in result.logs]).replace("_", " "),
+            listed([name.removesuffix("_velocity") for name in result.logs]).replace("_", " "),
             lines(
                 time,
                 list((q / np.abs(q).max(axis=0)).T),
@@ -152,10 +152,6 @@ def _piece(samples: Samples) -> slice:
     run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
     time = samples.motion.time[run] - samples.motion.time[run.start]
     return slice(run.start, run.start + max(2, int(np.searchsorted(time, _SPARK_SECONDS))))
-
-
-def _plain(name: str) -> str:
-    return name.removesuffix("_velocity")
 
 
 def _short(name: str) -> str:

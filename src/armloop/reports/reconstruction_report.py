@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from armloop.data.blocks import stretch
 from armloop.data.log import MotionLog
-from armloop.data.motion import Motion, Samples
+from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters, sort_samples
 from armloop.data.signals import as_torque, preprocess
-from armloop.identification.reconstruction import Reconstruction, StepReport
+from armloop.identification.reconstruction import Reconstruction
 from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
@@ -44,10 +44,14 @@ def mean_nrmse(score: Score) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-def conditions_section(clusters: Clusters, title: str = "Sorting the samples") -> Section:
+def conditions_section(clusters: Clusters) -> Section:
     """How the samples were sorted into the three working conditions."""
     say = Prose("reconstruction")
-    return Section(title, say.paragraphs("conditions"), [Picture(clusters_figure(clusters), say["clusters"])])
+    return Section(
+        "Sorting the samples",
+        say.paragraphs("conditions"),
+        [Picture(clusters_figure(clusters), say["clusters"])],
+    )
 
 
 def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionLog]) -> str:
@@ -77,11 +81,7 @@ def _parts_card(reconstruction: Reconstruction) -> list[Card]:
 
 def _longest_run(samples: Samples) -> Samples:
     run = max(samples.motion.runs(), key=lambda run: run.stop - run.start)
-    motion = samples.motion
-    part = Motion(motion.time[run], motion.q[run], motion.v[run], motion.vdot[run], np.array([0]))
-    return replace(
-        samples, motion=part, tau=samples.tau[run], moving=samples.moving[run], spans=None, unknown=None
-    )
+    return stretch(samples, run.start, run.stop)
 
 
 def reconstruction_sections(
@@ -144,13 +144,10 @@ def comparison(ours: Reconstruction, reference: Reconstruction) -> Table:
     rows = []
     for name, made in (("stepwise", ours), ("one-shot SINDy", reference)):
         errors = [percent(x) for x in made.held_out.moving["nrmse"]]
-        rows.append([name, *errors, " / ".join(map(str, _terms(made.reports)))])
+        terms = np.sum([report.terms for report in made.reports], axis=0)
+        rows.append([name, *errors, " / ".join(map(str, terms))])
     headers = ["method", *(f"joint {j + 1}" for j in range(ours.model.arm.n)), "terms per joint"]
     return make_table(headers, rows, "Held-out nRMSE of moving samples, same data")
-
-
-def _terms(reports: Sequence[StepReport]) -> list[int]:
-    return [int(x) for x in np.sum([report.terms for report in reports], axis=0)]
 
 
 def _factor(error: float, other: float | None) -> float | None:

@@ -125,21 +125,21 @@ def named_eta_table(head: str, results: Mapping[str, TrackingResult], title: str
     return make_table([head, *(f"η{j + 1} [{u}]" for j, u in enumerate(units))], rows, title)
 
 
-def eta_table(
-    results: Mapping[str, TrackingResult], paper: bool = False, title: str | None = "Tracking error η"
-) -> Table:
+def eta_table(results: Mapping[str, TrackingResult], paper: bool = False) -> Table:
     """Mean absolute tracking error η per controller and joint, beside the paper's where it has one."""
-    made = named_eta_table("controller", {controller(name): run for name, run in results.items()}, title)
+    made = named_eta_table(
+        "controller", {controller(name): run for name, run in results.items()}, "Tracking error η"
+    )
     if not paper:
         return made
     n = len(made.headers) - 1
     theirs = [published.ETA_DEG.get(name, ()) for name in results]
     beside = [row if len(row) == n else [None] * n for row in theirs]
     rows = [[*own, *other] for own, other in zip(made.rows, beside, strict=True)]
-    return make_table([*made.headers, *(f"paper η{j + 1}" for j in range(n))], rows, title)
+    return make_table([*made.headers, *(f"paper η{j + 1}" for j in range(n))], rows, "Tracking error η")
 
 
-def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the reconstruction") -> Table:
+def steps_table(reports: Sequence[StepReport]) -> Table:
     """Orders, library sizes, terms kept per joint, samples per joint of each step, and the error that chose its orders.
 
     It is one on blocks that were not fitted, but it is the least of several: no measure of the model.
@@ -167,7 +167,7 @@ def steps_table(reports: Sequence[StepReport], title: str | None = "Steps of the
         "samples per joint",
         "error choosing orders",
     ]
-    return make_table(headers, rows, title)
+    return make_table(headers, rows, "Steps of the reconstruction")
 
 
 def _from_to(counts: Sequence[int]) -> str:
@@ -181,7 +181,7 @@ def compared(libraries: Sequence[Contender]) -> bool:
     return sum(one.checks is not None for one in libraries) > 1
 
 
-def libraries_table(libraries: Sequence[Contender], title: str | None = "Libraries compared") -> Table:
+def libraries_table(libraries: Sequence[Contender]) -> Table:
     """Error on the blocks that choose the library, number of coefficients, and the checks of physics of each library."""
     rows: list[list[object]] = []
     for one in libraries:
@@ -211,7 +211,7 @@ def libraries_table(libraries: Sequence[Contender], title: str | None = "Librari
         "friction",
         "torque by yaw",
     ]
-    return make_table(headers, rows, title)
+    return make_table(headers, rows, "Libraries compared")
 
 
 def _least(checks: PhysicsChecks) -> str | float:
@@ -241,9 +241,7 @@ def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") 
     return make_table(headers, rows, title, left=(0, 1))
 
 
-def parts_table(
-    parts: Sequence[Parts], arm: Arm, title: str | None = "Parts of the torque's energy"
-) -> Table:
+def parts_table(parts: Sequence[Parts], arm: Arm) -> Table:
     """What the model explains of each joint's torque on held-out data, what could be predicted besides, and noise."""
     rows = [
         [
@@ -264,7 +262,7 @@ def parts_table(
         "noise",
         "residual's memory",
     ]
-    return make_table(headers, rows, title)
+    return make_table(headers, rows, "Parts of the torque's energy")
 
 
 def _exact_percent(x: float | None) -> str:
@@ -272,10 +270,10 @@ def _exact_percent(x: float | None) -> str:
     return MISSING if x is None else f"{100 * x:.2f} %"
 
 
-def seconds_table(seconds: Mapping[str, float], title: str | None = "Time taken") -> Table:
+def seconds_table(seconds: Mapping[str, float]) -> Table:
     """Seconds per stage and in all."""
     rows = [[stage.replace("_", " "), f"{value:.1f} s"] for stage, value in seconds.items()]
-    return make_table(["stage", "time"], [*rows, ["in all", f"{sum(seconds.values()):.1f} s"]], title)
+    return make_table(["stage", "time"], [*rows, ["in all", f"{sum(seconds.values()):.1f} s"]], "Time taken")
 
 
 def formulas(model: ReconstructedModel, width: int = TERMINAL, most_terms: int | None = None) -> str:

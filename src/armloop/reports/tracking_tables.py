@@ -22,14 +22,14 @@ PHASES = {
 }
 
 
-def phases_table(
-    phases: Mapping[str, TrackingResult], title: str | None = "Tracking error η in one run"
-) -> Table:
+def phases_table(phases: Mapping[str, TrackingResult]) -> Table:
     """η per phase of a pickup and joint."""
-    return named_eta_table("phase", {PHASES[name]: phase for name, phase in phases.items()}, title)
+    return named_eta_table(
+        "phase", {PHASES[name]: phase for name, phase in phases.items()}, "Tracking error η in one run"
+    )
 
 
-def spread_table(result: WearResult, title: str | None = "Tracking error η over all draws") -> Table:
+def spread_table(result: WearResult) -> Table:
     """Mean, standard deviation, 5 % and 95 % quantile of η per controller and joint."""
     rows: list[list[object]] = []
     for name, eta in result.eta.items():
@@ -38,12 +38,14 @@ def spread_table(result: WearResult, title: str | None = "Tracking error η over
             rows.append(
                 [controller(name), j + 1, unit, eta[:, j].mean(), eta[:, j].std(ddof=1), low[j], high[j]]
             )
-    return make_table(["controller", "joint", "unit", "mean η", "std", "5 %", "95 %"], rows, title)
+    return make_table(
+        ["controller", "joint", "unit", "mean η", "std", "5 %", "95 %"],
+        rows,
+        "Tracking error η over all draws",
+    )
 
 
-def metrics_table(
-    results: Mapping[str, TrackingResult], title: str | None = "How the joints followed"
-) -> Table:
+def metrics_table(results: Mapping[str, TrackingResult]) -> Table:
     """RMS and largest error, RMS torque, share clipped, time in stick, settling after reversals, of joints by controller."""
     rows: list[list[object]] = []
     for name, result in results.items():
@@ -65,4 +67,4 @@ def metrics_table(
             rows.append(row)
     errors = ["RMS error", "largest error", "RMS torque [N·m, N]", "clipped [%]"]
     after = ["stuck [s]", "settled after [s]", "not settled [%]"]
-    return make_table(["controller", *errors, *after], rows, title)
+    return make_table(["controller", *errors, *after], rows, "How the joints followed")

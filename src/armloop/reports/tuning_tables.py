@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armloop.drake.tuning.tuned_loop import TunedLoop, Tuning
 
 
-def gains_table(tuning: Tuning, title: str | None = "Gains") -> Table:
+def gains_table(tuning: Tuning) -> Table:
     """k_p, k_i, k_d per joint."""
     rows = [
         [name, j + 1, *(float(x[j]) for x in (loop.gains.kp, loop.gains.ki, loop.gains.kd))]
@@ -22,11 +22,11 @@ def gains_table(tuning: Tuning, title: str | None = "Gains") -> Table:
     return make_table(
         ["gains", "joint", "kp [N·m/rad, N/m]", "ki [N·m/(rad·s), N/(m·s)]", "kd [N·m·s/rad, N·s/m]"],
         rows,
-        title,
+        "Gains",
     )
 
 
-def margins_table(tuning: Tuning, title: str | None = "Loops, the other joints' closed") -> Table:
+def margins_table(tuning: Tuning) -> Table:
     """Phase and gain margin, bandwidth and sensitivity peak per joint; the worst along the reference beside them."""
     rows: list[list[object]] = []
     for name, loop in _both(tuning):
@@ -44,10 +44,10 @@ def margins_table(tuning: Tuning, title: str | None = "Loops, the other joints' 
                 ]
             )
     headers = ["phase margin [deg]", "worst", "gain margin", "bandwidth [Hz]", "peak |S|", "worst"]
-    return make_table(["gains", "joint", *headers], rows, title)
+    return make_table(["gains", "joint", *headers], rows, "Loops, the other joints' closed")
 
 
-def verified_table(tuning: Tuning, title: str | None = "On the simulated arm") -> Table:
+def verified_table(tuning: Tuning) -> Table:
     """Per joint how far a small step is from the linear answer, and η by PID alone and with the exact model."""
     rows: list[list[object]] = []
     for name, loop in _both(tuning):
@@ -56,7 +56,9 @@ def verified_table(tuning: Tuning, title: str | None = "On the simulated arm") -
             off = percent(float(loop.deviation()[j]))
             rows.append([name, j + 1, off, float(pid.eta[j]), float(exact.eta[j]), unit])
     return make_table(
-        ["gains", "joint", "step off linear", "η PID", "η PID + exact model", "unit"], rows, title
+        ["gains", "joint", "step off linear", "η PID", "η PID + exact model", "unit"],
+        rows,
+        "On the simulated arm",
     )
 
 

@@ -20,7 +20,7 @@ from armloop.reports.watch_tables import (
     moment,
     named,
 )
-from armloop.reports.words import number, percent, place, unit
+from armloop.reports.words import effect_name, number, percent, place, unit
 from armloop.watch import Options, Outcome
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.store import Store
@@ -130,28 +130,16 @@ def _trends(outcome: Outcome, arm: str, tested: Tested) -> Section:
     alarms = [alarm for alarm in outcome.alarms if alarm["arm"] == arm]
     wanted = {place(item) for alarm in alarms for item in alarm["effects"]}
     most = tested.watched.evidence.max(axis=0)
-    order = sorted(range(len(most)), key=lambda s: (place(_item(tested, s)) not in wanted, -most[s]))
-    chosen: list[int] = []
-    for s in order:
-        if (
-            place(_item(tested, s)) not in {place(_item(tested, c)) for c in chosen}
-            and np.isfinite(tested.adjusted.values[:, s]).any()
-        ):
-            chosen.append(s)
-        if len(chosen) == _SHOWN:
-            break
-    shown = [
-        (place(_item(tested, s)), tested.adjusted.values[:, s], tested.watched.evidence[:, s]) for s in chosen
-    ]
+    names, values = [effect_name(*stream.place) for stream in tested.listed], tested.adjusted.values
+    chosen: dict[str, int] = {}
+    for s in sorted(range(len(most)), key=lambda s: (names[s] not in wanted, -most[s])):
+        if np.isfinite(values[:, s]).any():
+            chosen.setdefault(names[s], s)
+    shown = [(name, values[:, s], tested.watched.evidence[:, s]) for name, s in [*chosen.items()][:_SHOWN]]
     made = trend_figure(tested.history.units.when, shown, float(tested.watched.limits[-1]), alarms)
     return Section(
         f"Trends of {arm}", [], [Picture(made, Prose("watch")["trend"])], [], [], list(tested.notes)
     )
-
-
-def _item(tested: Tested, s: int) -> dict[str, Any]:
-    stream = tested.listed[s]
-    return {"effect": stream.name, "joint": stream.joint, "other_joint": stream.other_joint}
 
 
 def _alarm(alarm: dict[str, Any], new: bool) -> Section:

@@ -118,6 +118,16 @@ class Arm:
         return np.array([joint.kind == "revolute" for joint in self.joints])
 
     @property
+    def effort(self) -> NDArray[np.float64]:
+        """(n,) limits of the generalized forces, N·m (N); infinite where there is none."""
+        return np.array([joint.effort for joint in self.joints])
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Name of each joint, base to tip."""
+        return [joint.name for joint in self.joints]
+
+    @property
     def torque_units(self) -> list[str]:
         """Unit of each joint's generalized force."""
         return [joint.torque_unit for joint in self.joints]

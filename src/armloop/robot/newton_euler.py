@@ -37,7 +37,7 @@ def inverse_dynamics(
     fixed = [_matrix(arm.X_PF[i, :3, :3]) for i in range(n)]
     origins: list[Vector] = [_vector(arm.X_PF[i, :3, 3]) for i in range(n)]
     axes: list[Vector] = [_vector(arm.axis[i]) for i in range(n)]
-    turning = [joint.kind == "revolute" for joint in arm.joints]
+    turning = arm.revolute.tolist()
     bodies = [tuple(float(x) for x in parameters[10 * i : 10 * i + 10]) for i in range(n)]
     # Where a prismatic joint's axis points in the previous link: it does not turn with q.
     slides = [_times(fixed[i], axes[i]) for i in range(n)]
@@ -109,7 +109,7 @@ def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> Mas
     fixed = [_matrix(arm.X_PF[i, :3, :3]) for i in range(n)]
     origins: list[Vector] = [_vector(arm.X_PF[i, :3, 3]) for i in range(n)]
     axes: list[Vector] = [_vector(arm.axis[i]) for i in range(n)]
-    turning = [joint.kind == "revolute" for joint in arm.joints]
+    turning = arm.revolute.tolist()
     slides = [_times(fixed[i], axes[i]) for i in range(n)]
     bodies = []
     for i in range(n):

@@ -1,4 +1,4 @@
-"""Types of numpy arrays, as all numerics write them."""
+"""Types of numpy arrays, as all numerics write them, and stretches of a mask."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,3 +9,9 @@ Mask = NDArray[np.bool_]
 
 #: What is divided by, or taken the logarithm of, is at least this, so that nothing by nothing is nothing.
 TINY = 1e-300
+
+
+def stretches(mask: Mask) -> Index:
+    """(K, 2) first sample of every stretch of a mask (N,), and the one after its last."""
+    padded = np.concatenate([[False], mask, [False]])
+    return np.asarray(np.flatnonzero(padded[1:] != padded[:-1]).reshape(-1, 2), dtype=np.intp)

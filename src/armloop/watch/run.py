@@ -13,6 +13,7 @@ from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Cluster, Processes, Serial, Workers
 from armloop.watch.fleet import find_models, model_and_digest, model_for
 from armloop.watch.ingest import Counts, ingest
+from armloop.watch.running import stored
 from armloop.watch.sources import LogFile
 from armloop.watch.store import Store
 from armloop.watch.verdicts import Task, test_arm
@@ -100,22 +101,21 @@ def watch(
     options = options or Options()
     known = find_models(models)
     with contextlib.ExitStack() as held:
-        workers = held.enter_context(
-            _workers(options)
-        )  # what is wrong with it is said before a store is made
+        # what is wrong with them is said before a store is made
+        workers = held.enter_context(_workers(options))
         folder = Store(store)
         held.enter_context(_leaving_nothing(folder))
         held.enter_context(folder.locked(options.scheduler is not None))
         counts, places = ingest(folder, known, files, workers, progress)
-        stored = {log for log, _ in folder.known()}
-        places = {log: path.resolve() for log, path in places.items() if log in stored}
+        kept = {log for log, _ in folder.known()}
+        places = {log: path.resolve() for log, path in places.items() if log in kept}
         tasks = []
         for arm in folder.arms():
             path = model_for(known, arm)
             if path is None:
                 continue
             digest = model_and_digest(path)[1]
-            own = {file.stem.partition("-")[0] for file in folder.files(arm, digest)}
+            own = stored(folder, arm, digest)
             if own:
                 mine = {log: place for log, place in places.items() if log in own}
                 tasks.append(

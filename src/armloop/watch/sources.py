@@ -11,14 +11,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog, read_log
 from armloop.data.tables import CSV, PARQUET, kind_of, read_columns, read_header
 from armloop.model import ReconstructedModel
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError, LogError
-
-Array = NDArray[np.float64]
 
 _DATE = re.compile(
     r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T _-]?([0-2]\d)[-_.:hH]?([0-5]\d)(?:[-_.:mM]?([0-5]\d))?)?(?!\d)"

@@ -15,7 +15,7 @@ from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
-from armloop.monitoring.catalogue import Column
+from armloop.monitoring.catalogue import Column, Place
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
 from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.trend import course
@@ -296,7 +296,7 @@ def _identifier(arm: str, history: History, at: int) -> str:
 
 def _by_place(listed: Sequence[Stream], most: Array) -> list[dict[str, Any]]:
     """The most evidence that there ever was for each effect at each place, natural logarithm."""
-    found: dict[tuple[str, int | None, int | None], float] = {}
+    found: dict[Place, float] = {}
     for stream, value in zip(listed, most.tolist(), strict=True):
         found[stream.place] = max(found.get(stream.place, -np.inf), value)
     return [

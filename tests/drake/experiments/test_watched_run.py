@@ -85,6 +85,30 @@ def test_a_change_is_named_and_supplied(scenario, model, case) -> None:
     assert np.abs(np.diff(found.supplied, axis=0))[steady].max() < 0.05 * np.abs(found.supplied).max()
 
 
+def test_the_noise_of_a_run_is_drawn_from_the_scenarios_seed(
+    scenario, model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monitors: list[Named] = []
+
+    def monitor(model, learn: float) -> Named:
+        monitors.append(Named(model, learn))
+        return monitors[-1]
+
+    monkeypatch.setattr(watched_run, "ResidualMonitor", monitor)
+    instruments = dataclasses.replace(scenario.plant.config.instruments, torque_noise=0.02)
+    config = dataclasses.replace(scenario.plant.config, instruments=instruments)
+    brief = dataclasses.replace(
+        scenario,
+        plant=dataclasses.replace(scenario.plant, config=config),
+        reference=dataclasses.replace(scenario.reference, duration=0.2),
+    )
+    for seed in (brief.seed, brief.seed, brief.seed + 1):
+        run_watched(dataclasses.replace(brief, seed=seed), model, [], 0.1, learn=7.0)
+    first, again, other = (np.array([tau for tau, *_ in one.shown]) for one in monitors)
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.01
+
+
 @pytest.mark.slow
 def test_a_healthy_run_stays_untouched(scenario, model) -> None:
     found = run_watched(scenario, model, [], CHANGED, learn=LEARNED)

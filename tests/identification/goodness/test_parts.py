@@ -180,8 +180,7 @@ def test_correlation_time(seconds: float) -> None:
     noise = remembering(given, 2, seconds)[:, 0]
     place = given.motion.time
     keep = np.random.default_rng(0).random(len(place)) > 0.2  # samples at rest are missing
-    run = np.zeros(keep.sum(), dtype=np.intp)
-    found = correlation_time(noise[keep], place[keep], run, 10.0)
+    found = correlation_time(noise[keep], place[keep], 10.0)
     assert found == pytest.approx(-np.log(0.2) * seconds, rel=0.25)
 
 

@@ -9,7 +9,6 @@ from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion, Samples
 from armloop.identification.reconstruction import Options, reconstruct
-from armloop.identification.reconstruction.block_length import Blocks
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.tally import Tally
 from armloop.laws.friction import FrictionLaw
@@ -43,37 +42,19 @@ def test_easy_data_do_not_make_the_baseline_look_better():
     assert whole.samples == 400 and whole.baseline()["rmse"] == pytest.approx(together)
 
 
-@pytest.mark.parametrize("short", [False, True])
-def test_only_a_log_too_short_for_held_out_blocks_is_weighed_by_all_of_it(short, monkeypatch):
+def test_the_baseline_is_weighed_by_all_of_the_data(monkeypatch):
     motion = fourier_motion(15.0, 125.0, 3)
     log = measured(motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v, 3, 0.01)
     asked = []
-    monkeypatch.setattr(Blocks, "too_short", property(lambda self: short))
     monkeypatch.setattr(
         sys.modules[
             "armloop.identification.reconstruction.reconstruct"
         ],  # the function has its module's name
         "at_least",
-        lambda baseline, fitted: asked.append(fitted) or {**baseline, "rmse": [9.9] * 3},
+        lambda baseline, fitted: asked.append((baseline, fitted)) or {**baseline, "rmse": [9.9] * 3},
     )
     options = Options(parts=False, standard_errors=False)
     model = reconstruct([log], three_axis(), library="rigid-body", options=options).model
-    assert (model.baseline["rmse"] == [9.9] * 3) == short and None not in model.baseline["reversals"]
-    assert not short or asked[0].samples > 5 * model.baseline["samples"]
-
-
-def test_of_a_joint_that_turns_round_in_fitted_blocks_alone_it_is_known_from_these(monkeypatch):
-    motion = fourier_motion(15.0, 125.0, 3)
-    log = measured(motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + motion.v, 3, 0.01)
-    baseline = Tally.baseline
-
-    def without(self):
-        return {**baseline(self), "reversals": [0.5, None, 0.5]}
-
-    monkeypatch.setattr(Tally, "baseline", without)
-    monkeypatch.setattr(Tally, "yardsticks", lambda self: {"reversals": [7.0] * 3, "creeping": [8.0] * 3})
-    room = sys.modules["armloop.identification.reconstruction.reconstruct"]
-    monkeypatch.setattr(room.Attempt, "yardsticks", lambda self, sorter, seconds: {})
-    options = Options(parts=False, standard_errors=False)
-    model = reconstruct([log], three_axis(), library="rigid-body", options=options).model
-    assert model.baseline["reversals"] == [0.5, 7.0, 0.5]
+    assert model.baseline["rmse"] == [9.9] * 3
+    ((held_out, fitted),) = asked
+    assert fitted.samples > 3 * held_out["samples"] and held_out["samples"] == model.baseline["samples"]

@@ -192,7 +192,7 @@ class TestSearch:
         monkeypatch.setattr(catalogue, "permanent", lambda arm: effects)
         monkeypatch.setattr(catalogue, "_Columns", Columns)
         nothing: Any = None
-        laws = catalogue.search(nothing, nothing, bench, nothing, lambda text: None)
+        laws = catalogue.search(nothing, nothing, bench, lambda text: None)
         assert laws.tried == len([e for e in effects if not e.needs_model])
         return [(law.effect.place[0], law.shape, law.gain) for law in laws.chosen]
 

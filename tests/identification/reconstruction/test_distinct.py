@@ -5,9 +5,10 @@ from synthetic import fourier_motion, three_axis
 
 from armloop.data.motion import Motion, Samples
 from armloop.features.angle_sums import AngleSums
+from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.distinct import repeated, twins
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.stepwise import stepwise
+from armloop.identification.reconstruction.stepwise import stepwise_on
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.util.progress import silent
@@ -54,7 +55,8 @@ def test_viscous_friction_stands_once_where_all_steps_are_regressed_together() -
     tau = 0.5 * v + 0.3 * np.sign(v)
     samples = Samples(motion, tau, np.abs(v) > 0.05, 0.01, cutoff_hz=10.0)
     nothing = np.zeros(len(v), dtype=bool)
-    found = stepwise(three_axis(), samples, nothing, Options(max_order=1), silent)
+    options = Options(max_order=1)
+    found = stepwise_on(three_axis(), Data.of(samples, options, nothing), options, silent)
     for j in range(3):
         terms = [t for c in found.components if isinstance(c, SparseTerms) for t in c.terms(three_axis(), j)]
         assert f"v{j + 1}" not in {name for _, _, name in terms}

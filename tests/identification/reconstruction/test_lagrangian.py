@@ -176,6 +176,16 @@ def test_without_room_for_a_positive_mass_matrix_the_notes_say_so(monkeypatch: p
     assert any("try --library rigid-body" in note for note in notes)
 
 
+def test_where_no_positive_mass_matrix_is_found_the_notes_say_so(monkeypatch: pytest.MonkeyPatch):
+    def none(*_) -> PhysicalSolution:
+        raise ExcitationError("the motion tells too little")
+
+    monkeypatch.setattr("armloop.identification.reconstruction.lagrangian.physical_solution", none)
+    found = reconstruct([a_run(1)], three_axis(), library="lagrangian")
+    assert found.model.history["kept_positive"] == "unknown"
+    assert any("no coefficients with a positive definite M(q) were found" in note for note in found.notes)
+
+
 def test_the_weight_of_an_upright_slide_is_gravity_and_no_offset_of_its_friction():
     arm = load_arm("scara")
     motion = fourier_motion(40.0, 100.0, 3, arm)

@@ -15,7 +15,7 @@ from armloop.dynamics import check_physics
 from armloop.dynamics.physics import PhysicsChecks
 from armloop.features.lagrangian import candidates as energies
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
-from armloop.identification.reconstruction.data import Chunk
+from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.libraries import (
     LIBRARIES,
     Attempt,
@@ -28,7 +28,7 @@ from armloop.identification.reconstruction.libraries import (
     named,
 )
 from armloop.identification.reconstruction.rigid_body import RigidBodyLibrary
-from armloop.identification.reconstruction.stepwise import stepwise
+from armloop.identification.reconstruction.stepwise import stepwise_on
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
 from armloop.regression.sparse import Sparse
@@ -227,13 +227,9 @@ def test_a_condition_with_too_few_samples_does_not_end_it() -> None:
     samples = conditioned_samples((400, 400, 400), noise=0.01)
     moving = samples.moving.copy()
     moving[:398, 1] = False  # of the static samples joint 2 has two
-    found = stepwise(
-        three_axis(),
-        replace(samples, moving=moving),
-        np.zeros(len(moving), dtype=bool),
-        Options(max_order=1),
-        silent,
-    )
+    options, nothing = Options(max_order=1), np.zeros(len(moving), dtype=bool)
+    data = Data.of(replace(samples, moving=moving), options, nothing)
+    found = stepwise_on(three_axis(), data, options, silent)
     (note,) = [note for note in found.notes if "regressed together instead" in note]
     assert "step 1: joint 2 has 2 usable samples, at least 30 are needed" in note
     assert [report.step for report in found.reports] == [1, 2, 3]

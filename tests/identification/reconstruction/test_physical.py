@@ -268,7 +268,9 @@ class TestArmOfTwo:
 def test_what_is_left_free_is_said_with_the_inertias_that_are_negative() -> None:
     theta = np.zeros(1)
     wheres = (physical.EVERYWHERE, physical.LIMITS, physical.TRAINED, physical.FREE)
-    assert [PhysicalSolution(theta, 0, where).contradicted for where in wheres] == [False] * 3 + [True]
+    assert [PhysicalSolution(theta, 0, where).to_dict()["contradicted"] for where in wheres] == [
+        False
+    ] * 3 + [True]
     (plain,) = physics_notes({"kept_positive": physical.FREE})
     assert plain.endswith("M(q) was left free")
     (note,) = physics_notes({"kept_positive": physical.FREE, "negative": {"Izz3": -1.0, "m2": -2.0}})

@@ -159,7 +159,7 @@ def test_half_of_what_is_left_may_repeat(share: float, asked: bool, monkeypatch:
         raise LookupError
 
     monkeypatch.setattr(revision, "regress_step", regress)
-    monkeypatch.setattr(revision, "_model", lambda found: None)
+    monkeypatch.setattr(Found, "model", lambda found: None)
     monkeypatch.setattr(Leftover, "worst", lambda self: (share, 0, 1))
     samples = SimpleNamespace(cutoff_hz=1.0)
     data: Any = SimpleNamespace(
@@ -186,7 +186,7 @@ def test_what_is_regressed_together_must_be_worth_its_terms(
         for k, (report, own) in enumerate(zip(reports, orders, strict=True))
     ]
     monkeypatch.setattr(revision, "regress_step", lambda *_: (["terms"], [["law"]], new))
-    monkeypatch.setattr(revision, "_model", lambda found: None)
+    monkeypatch.setattr(Found, "model", lambda found: None)
     monkeypatch.setattr(revision, "_counts", lambda found: None)
     monkeypatch.setattr(revision, "refit", lambda *_: better)
     leftovers = iter(

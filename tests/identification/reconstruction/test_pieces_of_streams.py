@@ -153,3 +153,12 @@ def test_parts_of_a_chunk_choose_what_they_chose_in_the_whole() -> None:
         assert part.choosing is not None
         for name in ("choosing", "held_out", "validation", "independent", "blocks"):
             np.testing.assert_array_equal(getattr(part, name), getattr(chunk, name)[rows])
+
+
+def test_a_window_chooses_by_what_chose_in_the_chunks(asked: list[Any]) -> None:
+    data = Data.kept(logs(20, 20), HOW, OPTIONS).nested()
+    whole, window = data.window(40), data.window(20)
+    assert whole.choosing is not None and window.choosing is not None
+    rows = np.searchsorted(whole.samples.motion.time, window.samples.motion.time)
+    np.testing.assert_array_equal(window.choosing, whole.choosing[rows])
+    np.testing.assert_array_equal(window.judging("test"), whole.judging("test")[rows])

@@ -1,5 +1,6 @@
 """A record whose joints stand in another order, or whose angles are in another unit, is told by what it explains."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -52,6 +53,15 @@ def test_orders_and_units_are_named(seed: int, dry: float) -> None:
     for factor, unit in ((1 / (2 * np.pi), "revolutions"), (180 / np.pi, "degrees")):
         with pytest.raises(LogError, match=rf"angles seem to be in {unit}: .* times as well; give q in rad"):
             check_torques([misread(log, [0, 1, 2], factor)], arm, 10.0)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_friction_that_is_met_better_at_other_speeds_says_nothing_of_a_unit(seed: int) -> None:
+    """Joints that slide slower than the plain fit's Coulomb friction fades in: read as revolutions, it would be there."""
+    motion = fourier_motion(60.0, 100.0, seed)
+    slow = replace(motion, time=30.0 * motion.time, v=motion.v / 30.0, vdot=motion.vdot / 900.0)
+    tau = rigid_torque(three_axis(), slow.q, slow.v, slow.vdot) + 8 * np.sign(slow.v)
+    check_torques([measured(slow, tau, seed, 0.0)], three_axis(), 1.0)
 
 
 @pytest.mark.measured
@@ -116,7 +126,7 @@ class Given:
     def __init__(self, fits: list[Fit | None]) -> None:
         self.fits = iter(fits)
 
-    def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float) -> Any:
+    def of(self, logs: list[MotionLog], arm: object, cutoff_hz: float, unit: Any) -> Any:
         fit = next(self.fits)
         return None if fit is None else SimpleNamespace(fit=lambda signs, order: fit)
 

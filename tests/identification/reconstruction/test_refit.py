@@ -97,12 +97,8 @@ class TestWhatIsKept:
             ), falls
 
         monkeypatch.setattr(refits, "solve", solve)
-        monkeypatch.setattr(
-            refits,
-            "ReconstructedModel",
-            lambda arm, components, law: SimpleNamespace(components=components, friction=law),
-        )
-        found: Any = SimpleNamespace(arm=None, components=["bodies"], law=laws(0.1, 0.1), regressed_by=None)
+        before = SimpleNamespace(components=["bodies"], friction=laws(0.1, 0.1))
+        found: Any = SimpleNamespace(model=lambda: before, law=before.friction, regressed_by=None)
         data: Any = SimpleNamespace(
             reference=SimpleNamespace(samples=SimpleNamespace(cutoff_hz=of.get("cutoff", 1.0)))
         )

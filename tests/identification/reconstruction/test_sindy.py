@@ -8,9 +8,10 @@ import pytest
 from synthetic import conditioned_samples, three_axis
 
 from armloop.data.blocks import folds
+from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.sindy import sindy
-from armloop.identification.reconstruction.stepwise import stepwise
+from armloop.identification.reconstruction.stepwise import stepwise_on
 from armloop.regression.sparse import Sparse
 from armloop.util.progress import silent
 
@@ -42,9 +43,11 @@ def test_the_baseline_goes_through_pysindy(samples, monkeypatch):
 def test_the_baseline_has_more_terms_and_larger_errors(samples):
     held = folds(samples, 5, 1.0) == 0
     results = []
-    for method, max_order in ((sindy, 1), (stepwise, 2)):
-        options = Options(sparse=Sparse(correlation=1.0), max_order=max_order)
-        found = method(three_axis(), samples, held, options, silent)
+    one_shot, in_steps = (Options(sparse=Sparse(correlation=1.0), max_order=order) for order in (1, 2))
+    for found in (
+        sindy(three_axis(), samples, held, one_shot, silent),
+        stepwise_on(three_axis(), Data.of(samples, in_steps, held), in_steps, silent),
+    ):
         miss = (found.torque(samples.motion) - samples.tau)[held]
         terms = np.sum([report.terms for report in found.reports])
         results.append((terms, np.sqrt((miss**2).mean(axis=0))))

@@ -9,6 +9,7 @@ from synthetic import COULOMB, STATIC, STRIBECK_VELOCITY, VISCOUS, conditioned_s
 from armloop.data.blocks import folds
 from armloop.data.motion import Motion, Samples
 from armloop.data.regimes import Clusters, Condition
+from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.step import PARTS
@@ -17,7 +18,7 @@ from armloop.identification.reconstruction.stepwise import (
     _impure,
     _together,
     steps,
-    stepwise,
+    stepwise_on,
 )
 from armloop.identification.reconstruction.trials import HeldOut
 from armloop.model import ReconstructedModel
@@ -36,7 +37,8 @@ def held_out(samples: Samples) -> np.ndarray:
 
 def found_on(samples: Samples, max_order: int, held: np.ndarray | None = None) -> Found:
     options = Options(sparse=INDEPENDENT, max_order=max_order)
-    return stepwise(three_axis(), samples, held_out(samples) if held is None else held, options, silent)
+    held = held_out(samples) if held is None else held
+    return stepwise_on(three_axis(), Data.of(samples, options, held), options, silent)
 
 
 def model_of(found: Found) -> ReconstructedModel:

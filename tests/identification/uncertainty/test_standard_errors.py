@@ -203,12 +203,6 @@ def test_levels_of_stribeck_friction_are_sums_with_the_fewest_degrees_of_freedom
     assert standard._stribeck(model, [part], 0) == {}
 
 
-def test_of_no_blocks_the_sum_is_zero() -> None:
-    assert standard._summed(np.zeros((0, 2, 2)), 2).tolist() == [[0, 0], [0, 0]]
-    assert standard._summed(np.zeros((0, 3)), 3).tolist() == [0, 0, 0]
-    assert standard._summed(np.ones((2, 3)), 3).tolist() == [2, 2, 2]
-
-
 def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

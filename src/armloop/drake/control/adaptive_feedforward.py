@@ -87,8 +87,7 @@ class AdaptiveFeedforward(LeafSystem):
         require("a number above 0", ramp=ramp, trial=trial)
         super().__init__()
         n = self._n = model.arm.n
-        effort = np.array([joint.effort for joint in model.arm.joints])
-        limits = 0.5 * effort if bound is None else levels_of(bound, n, "bound")
+        limits = 0.5 * model.arm.effort if bound is None else levels_of(bound, n, "bound")
         if not (trial > _LOOK and (limits > 0).all()):
             raise InputError(f"trial {trial} s must be above {_LOOK} s and bound {limits} above 0")
         self._model, self._ramp, self._trial, self._bound = model, ramp, trial, limits
@@ -104,6 +103,11 @@ class AdaptiveFeedforward(LeafSystem):
         sources = {*kept, self.time_ticket(), *(port.ticket() for port in self._reference)}
         self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, sources)
         self.DeclareVectorOutputPort("given_back", 1, self._calc_given_back, kept)
+
+    @property
+    def settling(self) -> float:
+        """Seconds from a name until its effects are supplied in full, at most."""
+        return self._ramp + _LOOK
 
     def _taken(self, context: Context) -> _Taken:
         taken = context.get_abstract_state(int(self._memory)).get_value()

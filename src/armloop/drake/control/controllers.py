@@ -138,9 +138,9 @@ class Bounded(Pid):
 
         if not isinstance(model, ReconstructedModel):
             raise ValueError("bounded needs a reconstructed model")
-        effort = np.array([joint.effort for joint in scenario.plant.arm.joints])
+        effort = scenario.used * scenario.plant.arm.effort
         rate = None if scenario.rate is None else scenario.used * scenario.rate
-        return bounded_reference(scenario.reference, model, scenario.used * effort, rate)
+        return bounded_reference(scenario.reference, model, effort, rate)
 
 
 class Exact(Pid):

@@ -58,7 +58,7 @@ class ResidualMonitor(LeafSystem):
         self._slides = _SLIDES * (np.asarray(ranges[1], dtype=float) if ranges else np.ones(n))
         # the columns of any motion are the same: those of one at rest tell how many there are
         rest = np.zeros((count, n))
-        motion = Motion(period * np.arange(float(count)), rest, rest + 0.1, rest, np.array([0]))
+        motion = Motion(period * np.arange(float(count)), rest, rest + 0.1, rest)
         self._columns, _ = block_sums(model, motion, rest, np.ones((count, n), dtype=bool))
         self._tau = self.DeclareVectorInputPort("tau", n)
         self._state = self.DeclareVectorInputPort("state", 2 * n)
@@ -79,9 +79,7 @@ class ResidualMonitor(LeafSystem):
 
     def watch(self, root_context: Context) -> Watch:
         """The watch's state inside a diagram's context, to look at."""
-        watch = self.GetMyContextFromRoot(root_context).get_abstract_state(int(self._watch)).get_value()
-        assert isinstance(watch, Watch)
-        return watch
+        return self._memory(self.GetMyContextFromRoot(root_context))
 
     def _memory(self, context: Context) -> Watch:
         watch = context.get_abstract_state(int(self._watch)).get_value()
@@ -102,7 +100,7 @@ class ResidualMonitor(LeafSystem):
         tau, q, v, vdot = (rows[:, k * n : (k + 1) * n] for k in range(4))
         time = context.get_time() + self._period * np.arange(-float(self._count), 0.0)
         slides = np.abs(v) > self._slides
-        _, block = block_sums(self._model, Motion(time, q, v, vdot, np.array([0])), tau, slides)
+        _, block = block_sums(self._model, Motion(time, q, v, vdot), tau, slides)
         following = advance(self._model, self._columns, self._memory(context), block, self._learn)
         state.get_mutable_abstract_state(int(self._watch)).set_value(following)
 

@@ -23,7 +23,6 @@ from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
@@ -56,13 +55,9 @@ class ControlledArm:
         if self.drives is not None:
             # it was held there
             held = self.drives.GetMyMutableContextFromRoot(root_context)
-            law = self.controller
+            law, effort = self.controller, self.plant.arm.effort
             asked = law.GetOutputPort("tau").Eval(law.GetMyContextFromRoot(root_context))
-            self.drives.set_torque(held, np.clip(asked, *self._efforts()))
-
-    def _efforts(self) -> tuple[Array, Array]:
-        effort = np.array([joint.effort for joint in self.plant.arm.joints])
-        return -effort, effort
+            self.drives.set_torque(held, np.clip(asked, -effort, effort))
 
     def set_model(self, model: Any, step: int = 3) -> None:
         """Exchange the model in a running simulation, between two calls of `Simulator.AdvanceTo`.
@@ -186,8 +181,7 @@ def add_arm_under(
     builder.Connect(body.GetOutputPort("state"), law.GetInputPort("state"))
     drives = law
     if torque_rate is not None:
-        effort = [joint.effort for joint in plant.arm.joints]
-        drives = builder.AddNamedSystem("drives", RateLimiter(effort, torque_rate, period))
+        drives = builder.AddNamedSystem("drives", RateLimiter(plant.arm.effort, torque_rate, period))
         builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
     builder.Connect(drives.GetOutputPort("tau"), body.GetInputPort("tau"))
     return ControlledArm(body, source, law, drives if drives is not law else None, reference)

@@ -235,8 +235,7 @@ def _as_log(
         time.append(now + recording.time)
         now = float(time[-1][-1]) + 20 * period
     q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
-    rms = np.sqrt(np.mean(tau**2, axis=0))
-    tau = tau + instruments.torque_noise * rms * rng.standard_normal(tau.shape)
+    tau = instruments.sense(tau, rng)
     # No more digits than the instruments have: the files stay small.
     return MotionLog(
         np.concatenate(time).round(6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name

@@ -139,9 +139,5 @@ def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> M
     q = instruments.encode(arm, state[:, :n])
     v = (q[rows + half] - q[rows - half]) / (2 * half * config.time_step)
     # a torque is held over the step that follows: the mean of both steps is centred on the sample
-    measured = 0.5 * (tau[rows - 1] + tau[rows])
-    noise = np.random.default_rng(scenario.seed).standard_normal(measured.shape)
-    rms = np.sqrt((measured**2).mean(axis=0))
-    return MotionLog(
-        time[rows], q[rows], v, measured + instruments.torque_noise * rms * noise, name="since the grasp"
-    )
+    measured = instruments.sense(0.5 * (tau[rows - 1] + tau[rows]), np.random.default_rng(scenario.seed))
+    return MotionLog(time[rows], q[rows], v, measured, name="since the grasp")

@@ -1,4 +1,4 @@
-"""YAML files read into the descriptions of `scenario_data`: whatever is wrong is one line with file and field."""
+"""YAML files read into the descriptions of `armloop.schemas.scenarios`: what is wrong is a line with file and field."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Scenarios: plants, collection plans and tracking experiments as YAML data, checked at the door.
 
-Files are read into the descriptions of `scenario_data`, checked against each other and the arm, and turned into the
-frozen types of the simulation. Whatever is wrong raises `ScenarioError`, one line that names the file and the field.
+Files are read into the descriptions of `armloop.schemas.scenarios`, checked against each other and the arm, and turned
+into the frozen types of the simulation. What is wrong raises `ScenarioError`, one line that names the file and the field.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from armloop.schemas.scenarios import (
     PlanData,
     PlantData,
     TrackingData,
-    WearData,
 )
 from armloop.util.errors import ArmError, ScenarioError
 from armloop.util.resources import scenario_path, urdf_names
@@ -59,7 +58,7 @@ def plant_names() -> list[str]:
 def load_plant(name: str) -> Plant:
     """Return a plant of plants.yaml; raises `ScenarioError` when there is none of that name."""
     path = scenario_path("plants")
-    return _plant(name, entry(path, name, PlantData), path, str(path), name)
+    return _plant(name, entry(path, name, PlantData), f"{path}: {name}")
 
 
 def plant_for(spec: str | Path) -> Plant:
@@ -140,7 +139,7 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         data.random_seed,
         data.bandwidth,
         _pickup(data.pickup, plant.arm, reference, where),
-        _wear(data.wear, where),
+        None if data.wear is None else Wear(data.wear.samples, data.wear.spread),
         rate,
         used,
     )
@@ -175,12 +174,6 @@ def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str)
     return Pickup(data.at, data.diagnose_at, payload)
 
 
-def _wear(data: WearData | None, where: str) -> Wear | None:
-    if data is None:
-        return None
-    return Wear(data.samples, data.spread)
-
-
 def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | Path | None) -> Plant:
     if bool(data.plant) == (data.own_plant is not None):
         raise ScenarioError(f"{where}: plant: give either the name of a plant in plants.yaml or own_plant")
@@ -199,11 +192,10 @@ def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | 
         # a path from where the user stands, not from the scenario's folder
         given = Path(arm)
         own = replace(own, arm=str(given.resolve() if given.exists() else arm))
-    return _plant(name, own, path, where, "own_plant")
+    return _plant(name, own, f"{where}: own_plant")
 
 
-def _plant(name: str, data: PlantData, path: Path, file: str, field: str) -> Plant:
-    where = f"{file}: {field}"
+def _plant(name: str, data: PlantData, where: str) -> Plant:
     if not data.arm:
         raise ScenarioError(
             f"{where}: arm is missing; give a built-in name or the path of a URDF here, or by --arm"

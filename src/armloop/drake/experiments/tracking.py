@@ -129,11 +129,10 @@ def track_in_view(
     scenario: TrackingScenario,
     models: Mapping[str, FeedforwardModel],
     view: LiveView,
-    effects: Sequence[UndeclaredEffect] = (),
 ) -> dict[str, TrackingResult]:
     """Do as `run_tracking`, all controllers at once in one simulation that a live view shows and holds to its rate."""
     builder = DiagramBuilder()
-    runs = {name: RecordedArm(scenario, name, models, effects) for name in controllers_for(scenario, models)}
+    runs = {name: RecordedArm(scenario, name, models) for name in controllers_for(scenario, models)}
     for name, run in runs.items():
         builder.AddNamedSystem(name, run.diagram)
     view.add_to(builder, {name: run.diagram for name, run in runs.items()})

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.common import RandomDistribution
+from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import Adder, DiscreteDerivative, LogVectorOutput, MatrixGain, RandomSource
@@ -72,7 +72,6 @@ def run_watched(
     state = plant.GetOutputPort("state")
     builder.Connect(state, law.GetInputPort("state"))
     builder.Connect(law.GetOutputPort("tau"), plant.GetInputPort("tau"))
-    # what the monitor sees: the drives' torques with their noise, the state, and its derivative
     monitor = builder.AddNamedSystem("monitor", ResidualMonitor(model, learn=learn))
     derivative = builder.AddSystem(DiscreteDerivative(n, step))
     speeds = builder.AddSystem(MatrixGain(np.hstack([np.zeros((n, n)), np.eye(n)])))
@@ -88,7 +87,6 @@ def run_watched(
     builder.Connect(measured.get_output_port(), monitor.GetInputPort("tau"))
     builder.Connect(state, monitor.GetInputPort("state"))
     builder.Connect(derivative.get_output_port(), monitor.GetInputPort("vdot"))
-    # what is named joins the feedforward
     adaptive = builder.AddNamedSystem("adaptive", AdaptiveFeedforward(model))
     for port in ("q_ref", "v_ref", "vdot_ref"):
         builder.Connect(source.GetOutputPort(port), adaptive.GetInputPort(port))
@@ -107,6 +105,7 @@ def run_watched(
     logs = [LogVectorOutput(port, builder, step) for port in ports]
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
+    noise.SetRandomContext(noise.GetMyMutableContextFromRoot(context), RandomGenerator(scenario.seed))
     q, v, _ = (table[0] for table in source.tables)
     plant.set_state(context, q, v)
     moments = {"change": np.inf, "alarm": np.nan, "named": np.nan}
@@ -134,7 +133,7 @@ def run_watched(
         return score(part, "pid_step3", time, source.tables, x, tau, asked)
 
     end = scenario.reference.duration
-    full = moments["named"] + 1.0 + 0.05
+    full = moments["named"] + adaptive.settling
     during = scored(at, min(full, end)) if full > at else None
     given = adaptive.GetOutputPort("given_back").Eval(adaptive.GetMyContextFromRoot(context))
     return WatchedRun(

@@ -9,7 +9,7 @@ from typing import Any
 from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.given import require_model
-from armloop.drake.plant.friction_system import PreslidingFriction, Stop
+from armloop.drake.plant.friction_system import PreslidingFriction, Stop, presliding_of
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
@@ -91,12 +91,7 @@ BeyondBodies = with_signature(BeyondBodies_[None])
 
 def presliding_elements(model: ReconstructedModel) -> list[Stop]:
     """The elasto-plastic elements of a model's friction and of what a diagnosis added; those by load are left out."""
-    found = [
-        Stop(j + 1, float(t.coefficient), float(t.parameter))
-        for j, joint in enumerate(model.friction.terms)
-        for t in joint
-        if t.kind == "hysteresis"
-    ]
+    found = presliding_of(model.friction.terms)
     for added in model.effects:
         if added.effect.name == "presliding_hysteresis" and added.effect.joint is not None:
             level, width = (number(added.parameters[key].value) for key in ("level", "width"))

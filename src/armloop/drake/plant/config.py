@@ -37,6 +37,11 @@ class Instruments:
         step = self.resolution(arm)
         return np.round(q / step) * step if self.encoder_counts else q
 
+    def sense(self, tau: Array, rng: np.random.Generator) -> Array:
+        """Return torques (N, n) as the sensors read them."""
+        rms = np.sqrt(np.mean(tau**2, axis=0))
+        return np.asarray(tau + self.torque_noise * rms * rng.standard_normal(tau.shape))
+
 
 @dataclass(frozen=True, eq=False)
 class PlantConfig:

@@ -148,7 +148,7 @@ class ArmPlant(Diagram):
             raise ValueError("this plant's drives are in torque mode: it was built without a servo")
         n = self.arm.n
         error = desired_state - state
-        effort = np.array([joint.effort for joint in self.arm.joints])
+        effort = self.arm.effort
         return np.clip(self._servo.p * error[:, :n] + self._servo.d * error[:, n:], -effort, effort)
 
     def set_state(self, root_context: Context, q: Array, v: Array) -> None:

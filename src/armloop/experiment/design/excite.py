@@ -86,8 +86,7 @@ class Excitation:
     def period_motion(self, step: float) -> Motion:
         """One period of the reference, sampled."""
         motion = sampled(self.reference, step)
-        rows = motion.time < self.timing.period - 1e-9
-        return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], motion.starts)
+        return motion.take(motion.time < self.timing.period - 1e-9)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of ``armloop excite --json``, without the path."""
@@ -125,8 +124,7 @@ def excite(
         InputError: settings out of range, or limits that exclude any motion.
     """
     timing = settings.timing(arm.n)
-    stated = np.array([joint.effort for joint in arm.joints])
-    limits = Limits(ranges, (1 - settings.reserve) * stated, torque or nominal_torque(arm))
+    limits = Limits(ranges, (1 - settings.reserve) * arm.effort, torque or nominal_torque(arm))
     notes = _effort_notes(arm, limits.torque)
     check_rest(arm, limits)
     progress(f"{settings.random} random references of {timing.period:g} s within the limits")
@@ -201,10 +199,9 @@ def _noise(arm: Arm, limits: Limits, settings: Settings, typical: list[Motion]) 
     """(n,) standard deviations of the torque noise, N*m (N)."""
     if settings.noise is not None:
         return np.array(settings.noise, dtype=float)
-    effort = np.array([joint.effort for joint in arm.joints])
     rms = np.sqrt(np.mean([np.mean(limits.torque(motion) ** 2, axis=0) for motion in typical], axis=0))
     rms = np.where(rms > 1e-6 * rms.max(initial=1e-6), rms, 1.0)
-    return np.asarray(_NOISE * np.where(np.isfinite(effort), effort, rms))
+    return np.asarray(_NOISE * np.where(np.isfinite(arm.effort), arm.effort, rms))
 
 
 def _effort_notes(arm: Arm, torque: TorqueLaw) -> list[str]:

@@ -113,8 +113,7 @@ def _scaled(reference: FourierReference, size: Array, shift: Array) -> FourierRe
 def _motion(reference: FourierReference, step: float) -> Motion:
     # the end belongs to the motion: a ramp, or a duration that is no whole period, may end at its extreme
     t = np.append(np.arange(0.0, reference.duration, step), reference.duration)
-    q, v, vdot = reference.evaluate(t)
-    return Motion(t, q, v, vdot, np.array([0]))
+    return Motion(t, *reference.evaluate(t))
 
 
 def nominal_torque(arm: Arm) -> TorqueLaw:
@@ -127,7 +126,7 @@ def check_rest(arm: Arm, limits: Limits) -> None:
     """Raise ``InputError`` if a drive is too weak to hold the arm still anywhere in its ranges."""
     poses = static_poses(limits.ranges, 400, 0)
     still = np.zeros_like(poses)
-    rest = Motion(np.arange(float(len(poses))), poses, still, still, np.array([0]))
+    rest = Motion(np.arange(float(len(poses))), poses, still, still)
     need = np.abs(limits.torque(rest))
     if np.any(np.all(need <= limits.effort, axis=1)):
         return

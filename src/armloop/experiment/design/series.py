@@ -76,5 +76,4 @@ class Series:
 def sampled(reference: FourierReference, step: float) -> Motion:
     """A reference at times 0, step, ... before its end."""
     t = np.arange(0.0, reference.duration - 1e-9, step)
-    q, v, vdot = reference.evaluate(t)
-    return Motion(t, q, v, vdot, np.array([0]))
+    return Motion(t, *reference.evaluate(t))

@@ -98,7 +98,7 @@ def _of_joint(joint: int, rows: JointRows) -> Parts:
     whole = max(energy, left)
     if whole <= 0:
         return Parts(joint)
-    memory = correlation_time(residual, rows.place, rows.run, _LONGEST)
+    memory = correlation_time(residual, rows.place, _LONGEST)
     cut = split(rows.place, rows.run, memory)
     rest = residual - left_out(rows.X, residual, cut)
     removed = block_sums((residual**2 - rest**2)[judged], cut.block[judged])

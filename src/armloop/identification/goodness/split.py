@@ -55,7 +55,7 @@ class Split:
         return np.asarray(~judged & ~near)
 
 
-def split(place: Array, run: Index, gap: float, folds: int = FOLDS) -> Split:
+def split(place: Array, run: Index, gap: float) -> Split:
     """Deal samples into folds by blocks of each run.
 
     Args:
@@ -76,14 +76,14 @@ def split(place: Array, run: Index, gap: float, folds: int = FOLDS) -> Split:
         block[first:end] = following + np.minimum(own, pieces - 1)
         following += pieces
     _, block = np.unique(block, return_inverse=True)
-    return Split(block % folds, block, place, gap, enough)
+    return Split(block % FOLDS, block, place, gap, enough)
 
 
-def correlation_time(residual: Array, place: Array, run: Index, longest: float) -> float:
+def correlation_time(residual: Array, place: Array, longest: float) -> float:
     """Time after which a residual (M,) has forgotten itself, s: where its autocorrelation first falls below 0.2.
 
     Args:
-        place, run: as of :func:`split`; samples may be missing.
+        place: as of :func:`split`; samples may be missing.
         longest: s beyond which nobody looks.
     """
     step = float(np.median(np.diff(place))) if len(place) > 1 else 0.0

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.goodness.features import Scales, features
-from armloop.util.arrays import Array
-
-Rows = NDArray[np.bool_]
+from armloop.util.arrays import Array, Mask
 
 #: Most rows of a joint, and seconds that runs of different logs lie apart.
 MOST, APART = 2500, 1e4
@@ -35,7 +33,7 @@ class JointRows:
     torque: Array
     place: Array
     run: NDArray[np.intp]
-    judged: Rows
+    judged: Mask
 
     def __add__(self, other: JointRows) -> JointRows:
         after = (float(self.place[-1]) + APART if len(self.place) else 0.0) - (
@@ -66,7 +64,7 @@ def witness(
     residual: Array,
     samples: Samples,
     load: Array | None = None,
-    judged: Rows | None = None,
+    judged: Mask | None = None,
     scales: Scales | None = None,
     most: int = MOST,
 ) -> Witness:

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.filters import LowPass, filter_reach
+from armloop.data.filters import filter_reach
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, uniform_period
+from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, smooth
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -94,7 +94,7 @@ def choose_bandwidth(
     chosen = even_selection(logs)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
-    highest = highest_corner(logs, how)
+    highest = highest_corner(chosen, how)
     corners = [highest, *(round(part * highest, 3) for part in _PARTS)]
     # every corner must see the same logs: those that are long enough for the lowest
     long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
@@ -183,9 +183,8 @@ class Table:
 
     def every(self, step: int) -> Table:
         """Every so many instants."""
-        thin, motion = slice(None, None, step), self.motion
-        starts = -(-motion.starts // step)
-        some = Motion(motion.time[thin], motion.q[thin], motion.v[thin], motion.vdot[thin], starts)
+        thin = slice(None, None, step)
+        some = self.motion.take(thin, -(-self.motion.starts // step))
         return Table(
             self.columns[thin], self.tau[thin], self.blocks[thin], self.moving[thin], some, self.stride * step
         )
@@ -199,10 +198,12 @@ def table_at(
     corner: float,
     corners: list[float],
     aside: Sequence[Array] | None = None,
+    unit: Array | float = 1.0,
 ) -> Table | None:
     """Columns at one corner, at the instants that all corners share; None where no run is long enough.
 
     Args:
+        unit: (n,) that of the positions, in rad (m): so that dry friction fades at the same speeds in any.
         aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
     """
     parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
@@ -214,7 +215,7 @@ def table_at(
             samples = as_torque(preprocess([log], replace(how, cutoff_hz=corner, oversampling=1e9)))
         except ShortRunError:
             continue
-        motion, period = samples.motion, uniform_period(log.time)
+        motion, period = samples.motion, samples.period
         elapsed = motion.time - log.time[0]
         margin, length = filter_reach(lowest) + period, float(log.time[-1] - log.time[0])
         used = (elapsed > margin) & (elapsed < length - margin)
@@ -226,11 +227,9 @@ def table_at(
         inside = inside[numbers % stride == 0]
         if len(inside) == 0:
             continue
-        fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / _FADES))
-        dry = LowPass(corner, period)(fading)[inside]
-        part = Motion(
-            motion.time[inside], motion.q[inside], motion.v[inside], motion.vdot[inside], np.array([0])
-        )
+        fading = np.sign(motion.v) * -np.expm1(-np.square(motion.v / (_FADES * unit)))
+        dry = smooth(samples, fading)[inside]
+        part = motion.take(inside)
         N, n = part.q.shape
         columns = np.zeros((N, n, base.count + 3 * n))
         columns[:, :, : base.count] = base.columns(arm, part)

@@ -21,7 +21,6 @@ from scipy.stats import t as student
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.projected import Projected, Trial
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
@@ -123,7 +122,7 @@ class Laws:
                 continue
             both = []
             for vdot in (pushed, still):
-                motion = Motion(np.arange(float(len(still))), repeated, still, vdot, np.array([0]))
+                motion = Motion(np.arange(float(len(still))), repeated, still, vdot)
                 both.append(law.effect.full_columns(Context(arm, motion), law.shape))
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
             parts.append(added.transpose(0, 2, 1, 3))
@@ -168,7 +167,6 @@ def search(
     arm: Arm,
     samples: Samples,
     bench: Callable[[Sequence[Law]], Projected],
-    options: Options,
     progress: Progress,
 ) -> Laws:
     """Forward search over the catalogue, fitted together with the model's own columns.
@@ -176,7 +174,8 @@ def search(
     Args:
         bench: the regression with the model's own columns and some laws', from which further ones are judged.
     """
-    listed = [effect for effect in permanent(arm) if _usable(effect)]
+    # its coefficients are its free parameters: so it is one of the columns of a regression
+    listed = [effect for effect in permanent(arm) if not effect.needs_model]
     chosen: list[Law] = []
     columns = _Columns(arm, samples)
     tried = len(listed)
@@ -204,7 +203,7 @@ def search(
 def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, samples: Samples) -> Laws:
     """The laws without those to which the others, and the friction chosen beside them, leave nothing."""
     for k in reversed(range(len(laws.chosen))):
-        others = [law for i, law in enumerate(laws.chosen) if i != k]
+        others = laws.chosen[:k] + laws.chosen[k + 1 :]
         own = bench(others)
         trial = own.trial(Laws([laws.chosen[k]]).columns(arm, samples))
         if trial is None or not is_worth(trial, laws.tried):
@@ -217,11 +216,6 @@ def is_worth(trial: Trial, tried: int) -> bool:
     # of a single block it is no number, which nothing exceeds
     enough = float(student.isf(_CHANCE / tried, trial.blocks - 1))
     return trial.share > WORTH and trial.score > enough and trial.everywhere
-
-
-def _usable(effect: Effect) -> bool:
-    """Whether its coefficients are its free parameters, so that it is one of the columns of a regression."""
-    return not effect.needs_model
 
 
 def _plausible(arm: Arm, effect: Effect, shape: float, found: Trial) -> bool:

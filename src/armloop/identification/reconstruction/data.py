@@ -93,32 +93,23 @@ class Chunk:
 
     def cut(self, low: int, high: int) -> Chunk:
         """Consecutive samples."""
-        own = slice(low, high)
-        return Chunk(
-            stretch(self.samples, low, high),
-            self.blocks[own],
-            self.held_out[own],
-            self.validation[own],
-            self.independent[own],
-            self.folds,
-            None if self.choosing is None else self.choosing[own],
-        )
+        return self._of(stretch(self.samples, low, high), slice(low, high))
 
     def take(self, rows: NDArray[np.intp]) -> Chunk:
         """Some samples, in order; each run keeps at least one."""
         old, motion = self.samples, self.samples.motion
-        starts = np.searchsorted(rows, motion.starts).astype(np.intp)
-        taken = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], starts)
+        taken = motion.take(rows, np.searchsorted(rows, motion.starts).astype(np.intp))
         samples = replace(old, motion=taken, tau=old.tau[rows], moving=old.moving[rows], unknown=None)
-        return Chunk(
-            samples,
-            self.blocks[rows],
-            self.held_out[rows],
-            self.validation[rows],
-            self.independent[rows],
-            self.folds,
-            None if self.choosing is None else self.choosing[rows],
-        )
+        return self._of(samples, rows)
+
+    def _of(self, samples: Samples, rows: slice | NDArray[np.intp]) -> Chunk:
+        """Samples, which are some of these, with the parts they play."""
+        return replace(self, samples=samples, **{k: x[rows] for k, x in self.roles().items()})
+
+    def roles(self) -> dict[str, Any]:
+        """What is said of each sample, (N,) each, by name."""
+        names = ("blocks", "held_out", "validation", "independent", "choosing")
+        return {name: x for name in names if (x := getattr(self, name)) is not None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,11 +343,6 @@ def _joined(chunks: Sequence[Chunk]) -> Chunk:
         spans=np.concatenate(spans) if len(spans) == len(samples) else None,
         unknown=None,
     )
-    return Chunk(
-        whole,
-        np.concatenate([c.blocks for c in chunks]),
-        np.concatenate([c.held_out for c in chunks]),
-        np.concatenate([c.validation for c in chunks]),
-        np.concatenate([c.independent for c in chunks]),
-        chunks[0].folds,
-    )
+    roles = [chunk.roles() for chunk in chunks]
+    joined: dict[str, Any] = {k: np.concatenate([own[k] for own in roles]) for k in roles[0]}
+    return replace(chunks[0], samples=whole, **joined)

@@ -191,22 +191,22 @@ class _Mixed:
     def solve(self, kind: str, used: Mask) -> tuple[Array, Array, Array]:
         """Coefficients (P,), random effects (L, n) of the logs and their spread (n,), from some instants (N,)."""
         n, P = len(self.scale), self.table.columns.shape[2]
-        rows = [(j, np.flatnonzero(used & own)) for j, own in self.judged]
-        X = np.concatenate([self.table.columns[own, j] / self.scale[j] for j, own in rows])
-        y = np.concatenate([self.table.tau[own, j] / self.scale[j] for j, own in rows])
+        rows = used[:, None] & self.table.moving
+        X, y, joint = self.table.weighed(self.table.tau, rows, self.scale)
+        instant = np.nonzero(rows.T)[1]
         A, b = X.T @ X, X.T @ y
         ridge = np.diag(_RIDGE * np.maximum(np.diag(A), 1e-12))
-        theta, found, spread = np.linalg.solve(A + ridge, b), np.zeros((self.logs, n)), np.full(n, _BEGIN)
+        theta: Any = np.linalg.solve(A + ridge, b)
+        found, spread = np.zeros((self.logs, n)), np.full(n, _BEGIN)
         variances = np.zeros(n)
         if not kind:
             return theta, found, spread
-        log = np.concatenate([self.log[own] for _, own in rows])
+        log = self.log[instant]
         order = np.argsort(log, kind="stable")
         edges = np.searchsorted(log[order], np.arange(self.logs + 1))
         parts = [order[first:end] for first, end in pairwise(edges)]
         for _ in range(_ROUNDS):
-            slopes = self._per_log(kind, theta)
-            Z = np.concatenate([slopes[own, j] / self.scale[j] for j, own in rows])
+            Z = self._per_log(kind, theta)[instant, joint] / self.scale[joint, None]
             G, g = np.zeros((P, P)), np.zeros(P)
             solved = []
             for part in parts:

@@ -1,4 +1,4 @@
-"""Laws of the catalogue beside base parameters or energies: found, fitted together with them and their friction."""
+"""Joint least squares of base parameters or energies, friction, and the laws of the catalogue that are found there."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Fitting:
         """The laws that the training data show, and every joint's friction chosen beside them."""
         self._progress("choosing each joint's friction on held-out data")
         ladder, samples = self._selected(), self._training.window.samples
-        laws = search(self._arm, samples, self._bench(ladder), self._options, self._progress)
+        laws = search(self._arm, samples, self._bench(ladder), self._progress)
         while laws.chosen:
             ladder = self._beside(laws, ladder)
             fewer = pruned(laws, self._bench(ladder), self._arm, samples)

@@ -12,7 +12,7 @@ from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.options import StepReport
 from armloop.laws.effects import Context
 from armloop.laws.friction import FrictionLaw, FrictionTerm
-from armloop.model import AddedEffect
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import Component
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
@@ -49,6 +49,10 @@ class Found:
     def law(self) -> FrictionLaw:
         """The friction found so far."""
         return FrictionLaw(tuple(map(tuple, self.friction)))
+
+    def model(self, **kept: Any) -> ReconstructedModel:
+        """What was found as a model, with what else it keeps."""
+        return ReconstructedModel(self.arm, tuple(self.components), self.law, effects=self.effects, **kept)
 
     def rigid(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far but friction."""

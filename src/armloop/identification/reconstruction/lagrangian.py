@@ -14,7 +14,6 @@ from functools import partial
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
@@ -29,7 +28,13 @@ from armloop.identification.reconstruction.fitting import Fitting
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.library import Find, Library
 from armloop.identification.reconstruction.options import Options, StepReport
-from armloop.identification.reconstruction.physical import Body, physical_solution, physics_notes, postures
+from armloop.identification.reconstruction.physical import (
+    UNKNOWN,
+    Body,
+    physical_solution,
+    physics_notes,
+    postures,
+)
 from armloop.identification.reconstruction.shared import (
     FRICTION,
     SHARED_CONDITIONING,
@@ -43,11 +48,9 @@ from armloop.identification.reconstruction.training import Survey, Training, fit
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
-
-Rows = NDArray[np.bool_]
 
 #: Most terms tried beside the joints' own inertias, and additions without a gain after which the search ends.
 _MOST, _PATIENCE = 80, 8
@@ -110,10 +113,9 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
                 physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
                 theta = physical.theta
                 physics = physical.to_dict()
-            except (
-                ExcitationError
-            ):  # terms found in little data may leave no room for M; the notes then say so
-                pass
+            except ExcitationError:
+                # terms found in little data may leave no room for M
+                physics = {"kept_positive": UNKNOWN}
         body = Lagrangian(energy, theta[: energy.count])
         history = {"friction_ladder": [one.to_dict() for one in ladder.comparisons], **physics}
         effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
@@ -239,7 +241,7 @@ def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Inde
     return np.sort(support[support < library.count])
 
 
-def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
+def _problem(library: EnergyTerms, samples: Samples, rows: Mask) -> _Problem:
     motion, acts, p, f = as_torque(samples).motion, library.acts, library.count, len(FRICTION)
     wheres = [
         np.concatenate([np.flatnonzero(acts[j]), np.arange(p + f * j, p + f * (j + 1))])
@@ -253,8 +255,7 @@ def _problem(library: EnergyTerms, samples: Samples, rows: Rows) -> _Problem:
     used = np.flatnonzero(rows.any(axis=1))
     for start in range(0, len(used), _CHUNK):
         index = used[start : start + _CHUNK]
-        part = Motion(motion.time[index], motion.q[index], motion.v[index], motion.vdot[index], np.array([0]))
-        columns = library.columns(part)
+        columns = library.columns(motion.take(index))
         for j, where in enumerate(wheres):
             own = rows[index, j]
             X = np.hstack([columns[own, j][:, where[: len(where) - f]], friction[j][index[own]]])
@@ -311,17 +312,10 @@ def _prune(
 ) -> Index:
     """Drop, weakest first, the terms that later ones have made superfluous."""
     while True:
-        _, losses = fit.losses(support)
-        for weakest in np.argsort(losses):
-            if support[weakest] in forced:
-                continue
-            shorter = np.delete(support, weakest)
-            if held_out(shorter) <= enough:
-                support = shorter
-                break
+        free = [k for k in np.argsort(fit.losses(support)[1]) if support[k] not in forced]
+        if not free or not held_out(shorter := np.delete(support, free[0])) <= enough:
             return support
-        else:
-            return support
+        support = shorter
 
 
 class LagrangianLibrary(Library):

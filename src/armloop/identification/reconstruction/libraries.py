@@ -106,15 +106,8 @@ class Attempt:
 
     def model(self) -> ReconstructedModel:
         """What was fitted without the held-out blocks: a model that has seen those that judge must choose nothing."""
-        found, history = self.found, {"range": motion_range(self.data.reference.samples.motion)}
-        return ReconstructedModel(
-            found.arm,
-            tuple(found.components),
-            found.law,
-            self.conditioning,
-            effects=found.effects,
-            history=history,
-        )
+        history = {"range": motion_range(self.data.reference.samples.motion)}
+        return self.found.model(conditioning=self.conditioning, history=history)
 
     def coefficients(self) -> int:
         """Number of coefficients; those that serve all joints count once."""

@@ -35,8 +35,8 @@ _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
 _CHANCE = 0.999
 #: Where M(q) was kept positive definite: at every posture, for its links are bodies; over the joint limits; at the
-#: postures of the motion alone; nowhere.
-EVERYWHERE, LIMITS, TRAINED, FREE = "everywhere", "limits", "trained", "free"
+#: postures of the motion alone; nowhere, for the data contradict it; nowhere, for no such coefficients were found.
+EVERYWHERE, LIMITS, TRAINED, FREE, UNKNOWN = "everywhere", "limits", "trained", "free", "unknown"
 
 
 def postures(motion: Motion) -> Array:
@@ -86,15 +86,10 @@ class PhysicalSolution:
         """What a model keeps of it."""
         return {
             "constraints": self.binding,
-            "contradicted": self.contradicted,
+            "contradicted": self.where == FREE,
             "kept_positive": self.where,
             **({} if self.left is None else {"left": self.left.tolist()}),
         }
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether the data speak against a positive definite M(q) where the arm was: then M is free."""
-        return self.where == FREE
 
 
 def physical_solution(
@@ -281,6 +276,8 @@ def physics_notes(history: dict[str, Any]) -> list[str]:
         free = "the data contradict a positive definite M(q) by more than noise (sensors that lag?): M(q) was left free"
         below = ", ".join(history.get("negative", {}))
         return [free + (f"; negative, as for no arm: {below}" if below else "")]
+    if where == UNKNOWN:
+        return ["no coefficients with a positive definite M(q) were found in these data: M(q) was left free"]
     notes = []
     if history.get("bodies"):
         cost, chance, name, off = (

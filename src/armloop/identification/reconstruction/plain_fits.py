@@ -75,10 +75,12 @@ class PlainFits:
     shared: int
 
     @classmethod
-    def of(cls, logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float) -> Self | None:
-        """None where there is too little motion to judge."""
+    def of(
+        cls, logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float, unit: Array | float = 1.0
+    ) -> Self | None:
+        """None where there is too little motion to judge; positions are in a unit (n,) of rad (m)."""
         base = BaseParameters.of_arm(arm, rotors=True)
-        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz])
+        table = table_at(list(logs), arm, base, Conditioning(), cutoff_hz, [cutoff_hz], unit=unit)
         if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
             return None
         q = np.concatenate([log.q for log in logs])

@@ -215,9 +215,8 @@ class Pooled:
             bound[self.shared :] = [kind != "offset" for kind in kinds]
         factor = cho_factor(G[np.ix_(~bound, ~bound)])
         theta = np.zeros(len(b))
-        if (
-            bound.any()
-        ):  # the free coefficients are eliminated, the others are a problem of non-negative squares
+        # the free coefficients are eliminated, the others are a problem of non-negative squares
+        if bound.any():
             link = cho_solve(factor, G[np.ix_(~bound, bound)])
             H = G[np.ix_(bound, bound)] - G[np.ix_(bound, ~bound)] @ link
             # Differences of nearly equal numbers are neither symmetric nor positive to the last digit.

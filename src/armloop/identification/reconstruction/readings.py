@@ -17,7 +17,7 @@ import numpy as np
 from armloop.data.log import MotionLog, unchecked_log
 from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Index
+from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands.
 _GOOD_ENOUGH = 0.02
@@ -39,10 +39,14 @@ class Reading(NamedTuple):
 
     def of(self, log: MotionLog, arm: Arm) -> MotionLog:
         """The log as it would be, read so."""
-        scale = np.where(arm.revolute, _ANGLES.get(self.unit, 1.0), 1.0)
+        scale = self.scale(arm)
         signals = {name: getattr(log, name)[:, self.order] for name in ("q", "v", "tau")}
         signals |= {name: scale * signals[name] for name in ("q", "v")}
         return unchecked_log(time=log.time, name=log.name, **signals)
+
+    def scale(self, arm: Arm) -> Array:
+        """(n,) rad (m) of a joint's unit."""
+        return np.where(arm.revolute, _ANGLES.get(self.unit, 1.0), 1.0)
 
     def words(self, times: float) -> str:
         """What is wrong with a record that is explained so many times as well when read so, and what would be right."""
@@ -88,7 +92,9 @@ def meant(logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float, plain: Fit) -> 
         return None
     found: list[tuple[float, int, Reading]] = []
     for number, reading in enumerate(readings(arm)):
-        problem = PlainFits.of([reading.of(log, arm) for log in logs], arm, cutoff_hz)
+        read = [reading.of(log, arm) for log in logs]
+        # a law of friction that is met badly may be met better at other speeds, and says nothing of a unit
+        problem = PlainFits.of(read, arm, cutoff_hz, reading.scale(arm))
         if problem is None:
             continue
         other = problem.fit(np.ones(arm.n), np.arange(arm.n))

@@ -41,7 +41,7 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
-from armloop.identification.reconstruction.tally import Part, Tally, at_least, lacks_places, with_places
+from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
 from armloop.model import ReconstructedModel
@@ -266,9 +266,7 @@ def _finished(
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
     if not METHODS[method].reference:
-        bare = ReconstructedModel(
-            arm, tuple(found.components), found.law, tried.conditioning, effects=found.effects
-        )
+        bare = found.model(conditioning=tried.conditioning)
         if data.in_memory:
             recorded_logs, chunk = [log.read() for log in logs], data.reference
         else:
@@ -283,11 +281,7 @@ def _finished(
             f"the residual remembers for {blocks.correlation:.2g} s, and the logs are too short for held-out blocks of more "
             f"than {blocks.seconds:.2g} s: the held-out error may be too good"
         )
-    model = ReconstructedModel(
-        arm=arm,
-        components=tuple(found.components),
-        friction=found.law,
-        effects=found.effects,
+    model = found.model(
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
@@ -309,16 +303,16 @@ def _finished(
     model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
         history = {**model.history, **found.final.history}
-        components = tuple(found.final.components)
         last = found.final
         model = replace(
-            model, components=components, friction=last.law, effects=last.effects, history=history
+            model,
+            components=tuple(last.components),
+            friction=last.law,
+            effects=last.effects,
+            history=history,
         )
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
-    if blocks.too_short:
-        model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
-    elif lacks_places(model.baseline):
-        model = replace(model, baseline=with_places(model.baseline, data.sum(whole)))
+    model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)
     notes += checks.faults()
     history = {**model.history, "physics": checks.to_dict(), "notes": notes}

@@ -38,7 +38,7 @@ def refit(found: Found, data: Data, estimator: Estimator) -> bool:
     """
     if data.reference.samples.cutoff_hz <= 0 or not estimator.least_squares:
         return False
-    before = ReconstructedModel(found.arm, tuple(found.components), found.law)
+    before = found.model()
     try:
         after, falls = solve(
             before, lambda model: data.sum(partial(_assembled, model=model, sorter=found.regressed_by))

@@ -45,7 +45,7 @@ def revised(
     filtered = data.reference.samples.cutoff_hz > 0
     if found.sorter is None or not filtered or not options.sparse.how.least_squares:
         return found
-    left = data.sum(partial(Leftover.of, model=_model(found), sorter=found.sorter))
+    left = data.sum(partial(Leftover.of, model=found.model(), sorter=found.sorter))
     share, joint, condition = left.worst()
     if share <= _MOST:
         return found
@@ -56,7 +56,7 @@ def revised(
     terms, friction, reports = regress_step(data, revolute, choice, plan, options)
     new = replace(found, components=list(terms), friction=friction, together=True, notes=[])
     was_refit = refit(new, data, options.sparse.how)
-    again = data.sum(partial(Leftover.of, model=_model(new), sorter=found.sorter))
+    again = data.sum(partial(Leftover.of, model=new.model(), sorter=found.sorter))
     correlation = options.sparse.correlation
     if again.criterion(_counts(new), correlation) >= left.criterion(_counts(found), correlation):
         return found
@@ -73,10 +73,6 @@ def revised(
     if was_refit:
         new.notes.append(REFITTED)
     return new
-
-
-def _model(found: Found) -> ReconstructedModel:
-    return ReconstructedModel(found.arm, tuple(found.components), found.law)
 
 
 def _counts(found: Found) -> Array:

@@ -167,7 +167,7 @@ def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     repeated = np.repeat(q, arm.n, axis=0)
     still, unit = np.zeros_like(repeated), np.tile(np.eye(arm.n), (len(q), 1))
     weightless = replace(arm, gravity=np.zeros(3))
-    accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit, np.array([0]))
+    accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit)
     columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
     return columns.transpose(0, 2, 1, 3)
 

@@ -13,7 +13,7 @@ import pysindy
 from numpy.typing import NDArray
 
 from armloop.data.blocks import folds
-from armloop.data.motion import Motion, Samples
+from armloop.data.motion import Samples
 from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.identification.reconstruction.excitation import check_excitation
 from armloop.identification.reconstruction.found import Found
@@ -61,7 +61,7 @@ def sindy(
         if library.size > options.max_candidates:
             break
         progress(f"sindy: {library.size} candidates of order ({N1}, 2)")
-        X, signs = library.columns(_take(samples.motion, rows)), np.sign(samples.motion.v[rows])
+        X, signs = library.columns(samples.motion.take(rows)), np.sign(samples.motion.v[rows])
         X = np.hstack([X, signs])
         names = [*library.names, *(f"sign(v{j + 1})" for j in range(arm.n))]
         inside, outside = np.isin(rows, fit), np.isin(rows, check)
@@ -99,7 +99,3 @@ def _stlsq(X: Array, tau: Array, names: list[str], threshold: float, ridge: floa
         warnings.simplefilter("ignore")
         model.fit(X / size, t=1.0, x_dot=tau, feature_names=names)
     return np.asarray(model.coefficients()) / size
-
-
-def _take(motion: Motion, rows: NDArray[np.intp]) -> Motion:
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))

@@ -216,7 +216,8 @@ def regress_step(
     trials = [(list(o), error) for (o, _), error in zip(subsets, errors, strict=True)]
     final = [_fit(joint, joint.all, chosen, options) for joint in joints]
     if not options.sparse.how.shrinks:
-        final = _corrected(final, joints, partial(_gradients, data, choice, columns))
+        correction = partial(Correction.of, choice=choice, columns=columns)
+        final = _corrected(final, joints, lambda fits: data.sum(partial(correction, fits=fits)).gradients)
     if options.snr is not None:
         final = without_attenuation(data, choice, columns, final, options.snr)
     terms, friction = _collect(final, candidates.step, columns, plan)
@@ -275,10 +276,6 @@ def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> F
         return joint.select(moments, library, options.sparse)
     except ArithmeticError as error:
         raise InputError(f"{error}; choose another estimator, or another penalty") from error
-
-
-def _gradients(data: Data, choice: Choice, columns: Columns, fits: list[Fit]) -> tuple[Array, ...]:
-    return data.sum(partial(Correction.of, choice=choice, columns=columns, fits=fits)).gradients
 
 
 def _corrected(

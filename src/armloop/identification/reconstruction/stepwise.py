@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.data.motion import Motion, Samples
+from armloop.data.motion import Motion
 from armloop.data.regimes import Clusters, Condition, sort_samples
 from armloop.data.signals import Conditioning, as_torque
 from armloop.features.double_feature_set import DoubleFeatureSet
@@ -31,13 +30,6 @@ from armloop.util.progress import Progress
 _PURITY = 0.1
 # Joints up to which the double feature set is compared with other libraries.
 _MOST_JOINTS = 4
-
-
-def stepwise(
-    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
-) -> Found:
-    """Reconstruct in three steps from samples in memory; ``held_out`` (N,) must not be fitted."""
-    return stepwise_on(arm, Data.of(samples, options, held_out), options, progress)
 
 
 def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:

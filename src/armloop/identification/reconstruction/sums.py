@@ -7,9 +7,10 @@ share them. The columns of the library never exist.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -55,16 +56,8 @@ class Usable:
 
     def take(self, rows: Mask | Index) -> Usable:
         """Some samples."""
-        return Usable(
-            self.whole,
-            self.places[rows],
-            _rows(self.motion, rows),
-            self.tau[rows],
-            self.rest[rows],
-            self.moving[rows],
-            self.validation[rows],
-            self.blocks[rows],
-        )
+        names = ("places", "tau", "rest", "moving", "validation", "blocks")
+        return replace(self, motion=self.motion.take(rows), **{k: getattr(self, k)[rows] for k in names})
 
     def smoothed(self, joint: int, terms: Sequence[FrictionTerm]) -> Array:
         """(M, f) columns of a joint's friction, filtered like the torque: they step where the joint reverses."""
@@ -103,7 +96,7 @@ class Choice:
         if self.sorter is not None:
             rows &= np.isin(self.sorter(samples), self.conditions)
         places = np.flatnonzero(rows).astype(np.intp)
-        part, tau = _rows(motion, places), samples.tau[places]
+        part, tau = motion.take(places), samples.tau[places]
         usable = Usable(
             samples,
             places,
@@ -185,7 +178,7 @@ class StepSums:
                 if len(rows):
                     cell = (int(code), chooses)
                     given = np.hstack([usable.rest[rows], beside[rows]])
-                    cells[cell] = columns.library.sums(_rows(usable.motion, rows), given)
+                    cells[cell] = columns.library.sums(usable.motion.take(rows), given)
                     power[cell] = (usable.tau[rows] ** 2).sum(axis=0)
         return StepSums(cells, power)
 
@@ -208,10 +201,7 @@ class Problems:
 
     columns: Columns
     sums: StepSums
-
-    @cached_property
-    def _grams(self) -> dict[tuple[Cell, ...], Array]:
-        return {}
+    _grams: dict[tuple[Cell, ...], Array] = field(default_factory=dict, repr=False)
 
     def moments(self, joint: int, choosing: bool | None = None) -> Moments:
         """Normal equations of a joint: all samples, or those that choose orders, or the others."""
@@ -222,7 +212,7 @@ class Problems:
         p = size + len(given) - 1
         if not cells:
             return Moments.none(p)
-        whole = _total(self.sums.cells[cell] for cell in cells)
+        whole = reduce(add, (self.sums.cells[cell] for cell in cells))
         if tuple(cells) not in self._grams:
             self._grams[tuple(cells)] = self.columns.library.gram(whole)
         cross, square = whole.cross[:, given], whole.given[np.ix_(given, given)]
@@ -232,14 +222,3 @@ class Problems:
         G[size:, size:] = square[1:, 1:]
         b = np.concatenate([cross[:, 0], square[1:, 0]])
         return Moments(G, b, float(square[0, 0]), float(whole.count))
-
-
-def _total(parts: Iterable[WaveSums]) -> WaveSums:
-    first, *others = parts
-    for other in others:
-        first = first + other
-    return first
-
-
-def _rows(motion: Motion, rows: Mask | Index) -> Motion:
-    return Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))

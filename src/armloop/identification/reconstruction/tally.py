@@ -125,10 +125,7 @@ class Tally:
         ]
         rms = self.score().rms
         nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        return {
-            **{"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks()},
-            "samples": self.samples,
-        }
+        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks(), "samples": self.samples}
 
     def yardsticks(self) -> dict[str, list[float | None]]:
         """RMSE per joint that one block in ten exceeds (``worst``), and at the places that are apart."""
@@ -182,33 +179,23 @@ def _root(total: float, count: float) -> float | None:
     return float(np.sqrt(total / count)) if count else None
 
 
-def lacks_places(baseline: dict[str, Any]) -> bool:
-    """Whether no held-out sample shows some joint turn round, or creep."""
-    return any(x is None for key in PLACES for x in baseline.get(key) or ())
-
-
-def with_places(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
-    """A baseline that takes from all samples what no held-out one shows: how a joint turns round, and how it creeps."""
-    of_all = fitted.yardsticks()
-    both = {key: zip(baseline[key], of_all[key], strict=True) for key in PLACES if baseline.get(key)}
-    return {**baseline, **{key: [b if a is None else a for a, b in pairs] for key, pairs in both.items()}}
-
-
 def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:
     """A baseline, joint by joint no better than what the model leaves of all its data.
 
-    Of a log that is too short for held-out blocks that tell, few may miss the rarer motion.
+    A model errs no less on samples that it was not fitted to, unless these are few and miss the rarer motion: where some
+    joint turns round, say.
 
     Args:
         baseline: of held-out samples, with ``worst`` and what stands beside it.
         fitted: of the model, over all samples.
     """
     pair = [baseline, fitted.baseline()]
-    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst", *PLACES)}
+    places = [key for key in PLACES if key in baseline]  # none, of samples that are no time series
+    more = {key: list(baseline[key]) for key in ("rmse", "rms", "nrmse", "worst", *places)}
     for j in range(len(more["rmse"])):
         own = max(pair, key=lambda one: one["rmse"][j] or 0.0)
         for key in ("rmse", "rms", "nrmse"):
             more[key][j] = own[key][j]
-        for key in ("worst", *PLACES):
+        for key in ("worst", *places):
             more[key][j] = max((one[key][j] for one in pair if one[key][j] is not None), default=None)
     return {**baseline, **more}

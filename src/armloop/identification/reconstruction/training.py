@@ -153,18 +153,16 @@ def fitted_rows(chunk: Chunk) -> NDArray[np.bool_]:
     return np.asarray(sliding_rows(chunk.samples) & ~chunk.held_out[:, None])
 
 
-def _everybody(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return np.ones(len(rows), dtype=bool)
-
-
 def _by_speed(chunk: Chunk) -> Dealt:
     rows = fitted_rows(chunk)
-    return Dealt(np.where(rows, np.where(fast_rows(chunk.samples), 0, 1), -1), 2, _everybody(rows))
+    return Dealt(
+        np.where(rows, np.where(fast_rows(chunk.samples), 0, 1), -1), 2, np.ones(len(rows), dtype=bool)
+    )
 
 
 def _at_once(chunk: Chunk) -> Dealt:
     rows = fitted_rows(chunk)
-    return Dealt(np.where(rows, 0, -1), 1, _everybody(rows))
+    return Dealt(np.where(rows, 0, -1), 1, np.ones(len(rows), dtype=bool))
 
 
 def _by_fold(chunk: Chunk, folds: dict[int, InnerFolds]) -> Dealt:

@@ -56,7 +56,7 @@ def _directions(rows: Sequence[str]) -> Array:
 def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, r) torque of independent errors of the model, one standard deviation each, through the samples' filter.
 
-    None (r = 0) of a model that keeps no directions of its unknowns: made by hand, or by an earlier version.
+    None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
     known = {tuple(one["unknowns"]): _directions(one["directions"]) for one in kept}

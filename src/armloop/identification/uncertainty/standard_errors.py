@@ -162,9 +162,7 @@ def covariances(
     correlation = max(
         correlation_time(residual[:, j], rows[:, j], samples.motion, step) for j in range(model.arm.n)
     )
-    covered = [
-        covered_time(samples.motion.time, np.any(one.rows, axis=1, keepdims=True)[:, 0]) for one in fitted
-    ]
+    covered = [covered_time(samples.motion.time, np.asarray(one.rows.any(axis=1))) for one in fitted]
     seconds = block_length(correlation, min(covered))
     blocks = independent_blocks(samples.motion, seconds)
     found = []
@@ -217,8 +215,8 @@ class Assembled:
         rows = np.logical_or.reduce([one.rows for one in fitted])
         return Assembled(
             [problem.unknowns for problem in todo],
-            [_summed(e.jacobian, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
-            [_summed(e.score, len(problem.unknowns)) for e, problem in zip(sums, todo, strict=True)],
+            [e.jacobian.sum(axis=0) for e in sums],
+            [e.score.sum(axis=0) for e in sums],
             squares,
             (samples.tau**2 * rows).sum(axis=0),
         )
@@ -246,11 +244,6 @@ class Assembled:
     def misfit(self) -> float:
         """Sum over the joints of mean squared residual relative to mean squared torque."""
         return float((self.squares / np.maximum(self.power, TINY)).sum())
-
-
-def _summed(blocks: Array, p: int) -> Array:
-    # Where no sample was fitted there is no block; its sum has the right shape all the same.
-    return blocks.sum(axis=0) if len(blocks) else np.zeros((p,) * (blocks.ndim - 1))
 
 
 @dataclass(frozen=True, eq=False)

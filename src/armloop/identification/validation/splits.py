@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_numbers
 from armloop.data.log import GAP_PERIODS, MotionLog
 from armloop.data.motion import Motion, Samples
+from armloop.util.arrays import Mask
 from armloop.util.errors import InputError
 
-Rows = NDArray[np.bool_]
 #: Seconds since 1970 are known to 0.24 µs; no two samples are so near.
 _ROUNDING = 1e-6
 
@@ -85,7 +85,7 @@ def by_blocks(logs: Sequence[MotionLog], seconds: float) -> list[Split]:
     return splits
 
 
-def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np.float64]) -> Rows:
+def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np.float64]) -> Mask:
     """(N,) samples inside the blocks (R, 2), those left aside that the filter may have mixed with others.
 
     Args:
@@ -104,7 +104,7 @@ def _blocks(log: MotionLog, seconds: float) -> NDArray[np.intp]:
     return block_numbers(Motion(log.time, log.q, log.v, log.q, starts), seconds)
 
 
-def _intervals(time: NDArray[np.float64], numbers: NDArray[np.intp], rows: Rows) -> NDArray[np.float64]:
+def _intervals(time: NDArray[np.float64], numbers: NDArray[np.intp], rows: Mask) -> NDArray[np.float64]:
     """(R, 2) first and last instant of the blocks that the rows make up."""
     found = [time[numbers == number][[0, -1]] for number in np.unique(numbers[rows])]
     return np.array(found).reshape(-1, 2)

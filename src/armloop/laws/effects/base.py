@@ -282,7 +282,7 @@ class Effect(ABC):
             return (lambda q, v, vdot: dynamics(q, rest, rest)) if body.weight_only else dynamics
 
         def torque(q: Array, v: Array, vdot: Array) -> Array:
-            motion = Motion(np.zeros(1), q[None], v[None], vdot[None], np.zeros(1, dtype=np.intp))
+            motion = Motion(np.zeros(1), q[None], v[None], vdot[None])
             return self.torque(Context(arm, motion, inertial), parameters)[0]
 
         return torque

@@ -70,5 +70,5 @@ def friction_curves(model: ReconstructedModel, joint: int, speeds: Array, postur
 def _at_rest(model: ReconstructedModel, q: Array) -> Array:
     """(n,) what holds the arm up, by the model without friction."""
     still = np.zeros((1, len(q)))
-    motion = Motion(np.zeros(1), q[None], still, still, np.array([0]))
+    motion = Motion(np.zeros(1), q[None], still, still)
     return model.rigid_body(motion)[0]

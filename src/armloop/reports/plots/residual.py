@@ -62,7 +62,7 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
         axes.margins(x=0.01)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         u = unit(joint.torque_unit)
-        polish(axes, clock if j == n - 1 else "", f"residual [{u}]", _title(diagnosis, series, j))
+        polish(axes, clock if j == n - 1 else "", f"residual [{u}]", _title(series, j))
     legend(made, 5)
     return made
 
@@ -89,7 +89,7 @@ def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> F
             _band(axes, float(scale[j]))
             for values, color, label in series:
                 _cloud(axes, x[rows], values[:, j], color, label)
-            title = _title(diagnosis, series, j) if k == 0 else ""
+            title = _title(series, j) if k == 0 else ""
             polish(axes, names[k] if mixed or last else "", f"residual [{u}]" if k == 0 else "", title)
             if k:
                 axes.sharey(line[0])
@@ -114,7 +114,7 @@ def _series(diagnosis: Diagnosis) -> tuple[NDArray[np.intp], Series]:
     return shown.rows, both
 
 
-def _title(diagnosis: Diagnosis, series: Series, j: int) -> str:
+def _title(series: Series, j: int) -> str:
     """The joint's number; where it is so, that it does not move, or that the effects leave it as it was."""
     if not np.isfinite(series[0][0][:, j]).any():
         return f"Joint {j + 1}: at rest"
