@@ -45,8 +45,9 @@ def test_without_a_folder_nothing_is_kept() -> None:
 def test_what_was_kept_of_input_at_fault_is_forgotten_and_what_was_kept_before_stays(tmp_path: Path) -> None:
     Kept(tmp_path, 1).put("before", 1)
     kept = Kept(tmp_path, 1)
-    kept.put("now", 2)
-    kept.give_up()
+    with pytest.raises(InputError), kept.unless_at_fault():
+        kept.put("now", 2)
+        raise InputError("at fault")
     assert kept.get("before") == 1 and kept.get("now") is None
 
 

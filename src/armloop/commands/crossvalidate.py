@@ -100,15 +100,12 @@ def run(options: Crossvalidate) -> None:
         "kept": kept,
         "workers": Processes(options.jobs),
     }
-    try:
+    with kept.unless_at_fault():
         if options.compare_physical:
             comparison = compare_physical(logs, arm, **how)
             result = comparison.runs["physical"]
         else:
             comparison, result = None, crossvalidate(logs, arm, **how)
-    except InputError:
-        kept.give_up()
-        raise
     compared = {} if comparison is None else {"physical_consistency": comparison.to_dict()}
     answer = {**result.to_dict(), **compared}
     if folder is not None:

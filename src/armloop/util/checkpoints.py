@@ -9,8 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -64,9 +64,14 @@ class Kept:
         """Forget all items: the command has come to its end."""
         self._remove(self._files())
 
-    def give_up(self) -> None:
-        """Forget the items that were kept since this began: the input is at fault, and the call leaves nothing behind."""
-        self._remove(self._files() - self._earlier)
+    @contextmanager
+    def unless_at_fault(self) -> Iterator[None]:
+        """Forget what was kept since this began where the block finds the input at fault: such a call leaves nothing."""
+        try:
+            yield
+        except InputError:
+            self._remove(self._files() - self._earlier)
+            raise
 
     def _files(self) -> set[Path]:
         if self._folder is None or not self._folder.is_dir() or self._folder.is_symlink():
