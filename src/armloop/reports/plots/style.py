@@ -39,8 +39,8 @@ DASHES, HATCHES = ("-", (0, (5, 2)), (0, (1.5, 1.5))), ("", "////", "....")
 #: More points than this on a line cannot be seen.
 MOST_POINTS = 2000
 _LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9.5}
-#: Sizes of a figure's legend in inches: of a row, of a letter, and of what stands before a label and after it.
-_ROW, _LETTER, _HANDLE = 0.21, 0.08, 0.5
+#: Sizes of a figure's legend in inches: of a row, of a letter, what stands before a label and what between columns.
+_ROW, _LETTER, _HANDLE, _BETWEEN = 0.21, 0.07, 0.34, 0.24
 
 
 def controller_colors(names: Sequence[str]) -> dict[str, str]:
@@ -138,7 +138,7 @@ def _fitting(labels: Sequence[str], columns: int, width: float) -> int:
     """How many columns, at most ``columns``, fit into ``width`` inches; each is as wide as its longest label."""
     for count in range(min(columns, len(labels)), 1, -1):
         longest = [max(map(len, labels[first::count])) for first in range(count)]
-        if _LETTER * sum(longest) + _HANDLE * count <= width - 0.3:
+        if _LETTER * sum(longest) + _HANDLE * count + _BETWEEN * (count - 1) <= width - 0.3:
             return count
     return 1
 
@@ -189,7 +189,7 @@ def legend_above(made: Figure, width: float) -> float:
         shown.remove()
         artists, labels = [artist for artist, _ in entries], [text.get_text() for _, text in entries]
         letters = max(map(len, labels), default=1)
-        columns = min(max(1, int((width - 0.3) / (_LETTER * letters + _HANDLE))), max(len(labels), 1))
+        columns = min(max(1, int((width - 0.3) / (0.08 * letters + 0.5))), max(len(labels), 1))
         legend_row(made, [artist for artist in artists if artist is not None], labels, columns)
         top += _ROW * -(-len(labels) // columns)
     return top
