@@ -227,6 +227,17 @@ def test_tracking_and_excitation_show_themselves(model, tmp_path):
         al.track("payload_pickup")
 
 
+def test_a_simulated_arm_follows_an_exciting_reference() -> None:
+    from pydrake.systems.framework import DiagramBuilder
+
+    from armloop.drake import PidGains, add_arm_with_controller
+
+    reference = al.excite("three_axis", library="rigid-body", duration=10, starts=1, random=3)
+    arm = add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), reference)
+    assert reference.duration == 10.0
+    np.testing.assert_array_equal(arm.reference.tables[0][[0, -1]], reference.evaluate([0.0, 10.0])[0])
+
+
 def test_the_bare_import_is_cheap():
     program = "import armloop, sys; dir(armloop); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -1,13 +1,21 @@
 """Every system that users can take says what Drake's own say: its ports by name, its scalar types, what it cannot do."""
 
 import inspect
+import re
+from pathlib import Path
 
+import numpy as np
 import pytest
+from exact_parts import ARMS, model_of, rigid_body
 from pydrake.systems.framework import Diagram, LeafSystem
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 import armloop.drake as room
+from armloop.commands.collect import Collect
+from armloop.drake.experiments.scenarios import plant_for
+from armloop.util.resources import urdf_path
 
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "drake.md"
 SYSTEMS = {
     name: value
     for name in room.__all__
@@ -34,3 +42,26 @@ def test_its_documentation_is_complete(name: str) -> None:
 def test_its_signature_names_its_arguments(name: str) -> None:
     parameters = inspect.signature(SYSTEMS[name]).parameters
     assert parameters and not {"args", "kwargs", "self", "converter"} & set(parameters)
+
+
+def test_what_the_page_shows_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    model_of(ARMS["three_axis"], rigid_body(ARMS["three_axis"])).save(tmp_path / "model.json")
+    diagram, arrays = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    made: dict[str, object] = {}
+    exec(diagram, made)
+    system = made["builder"].Build()  # type: ignore[attr-defined]
+    assert [system.get_input_port(k).get_name() for k in range(3)] == ["q_ref", "v_ref", "vdot_ref"]
+    exec(arrays, made)
+    assert np.shape(made["tau"]) == (1000, 3) and np.shape(made["M"]) == (3, 3)
+
+
+def test_the_help_says_which_friction_a_urdfs_joints_get() -> None:
+    plant = plant_for(urdf_path("scara"))
+    kinds = dict(zip(plant.arm.revolute.tolist(), plant.config.friction, strict=True))
+    said = vars(Collect)["arm"].more["help"]
+    for friction, text in (
+        (kinds[True], "static {}, Coulomb {} N·m and viscous {} N"),
+        (kinds[False], "{}, {} N and {} N"),
+    ):
+        assert text.format(*(f"{x:g}" for x in (friction.static, friction.coulomb, friction.viscous))) in said

@@ -84,6 +84,15 @@ def test_what_a_target_can_say_reads_back(tmp_path, target, name, rotors):
         assert found.missing == [] and (found.unsaid < 1e-6 * found.rms).all()
 
 
+@pytest.mark.parametrize("target", ["urdf", "sdf", "drake"])
+def test_what_becomes_of_the_links_names_is_said(tmp_path, target):
+    arm = replace(ARMS["three_axis"], X_tool=np.eye(4))
+    found = export(model_of(arm, disguised(arm, False), friction=PLAIN), target, tmp_path / "arm")
+    links = re.findall(r'<link name="(\w+)"', found.files[0].read_text())
+    assert [name for name in links if name not in ("world", "base_link")] == ["link_1", "link_2", "link_3"]
+    assert any("links are named link_1, link_2, .." in note for note in found.notes)
+
+
 @pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
 def test_energies_and_terms_become_the_bodies_they_are(tmp_path, target):
     if target == "mjcf":

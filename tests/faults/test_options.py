@@ -7,6 +7,7 @@ import pytest
 from faults.conftest import contents, one_line
 
 from armloop.cli import main
+from armloop.data.log import MotionLog, read_log, write_log
 
 RECONSTRUCT = "reconstruct run.csv --arm three_axis --out m.json"
 EXCITE = "excite three_axis --out r.csv"
@@ -99,7 +100,10 @@ WRONG: dict[str, tuple[str, str]] = {
     "noise without end": (f"{EXCITE} --noise 1e300,1,1", "noise must be 3 positive numbers"),
     "a log twice": ("cluster run.csv ./run.csv", "holds the measurement of run once more"),
     "half a seed": ("collect three_axis --out c --seed 0.5", "no seed"),
-    "an unknown plan": ("collect three_axis --out c --plan huge", "there are: dwell, paper, quick"),
+    "an unknown plan": (
+        "collect three_axis --out c --plan huge",
+        "there are: dwell, paper, quick, simulation$",
+    ),
     "an unknown arm": ("collect puma --out c", "puma: no such file and no built-in arm"),
     "the run held out, too": (f"{DIAGNOSE} --held-out run.csv", "is one of the logs diagnosed"),
     "a run held out twice": (f"{DIAGNOSE} --held-out other.csv other.csv", "measurement of other once more"),
@@ -108,6 +112,15 @@ WRONG: dict[str, tuple[str, str]] = {
     "a next run that is no table": (f"{DIAGNOSE} --next-run n.txt", "a reference ends in"),
     "no block": ("crossvalidate run.csv other.csv --arm three_axis --block 0", "--block 0"),
     "a block of nan": ("crossvalidate run.csv --arm three_axis --block nan", "--block nan"),
+    "blocks that are not used": (
+        "crossvalidate run.csv other.csv --arm three_axis --block 2",
+        "of several logs each is left out whole; add --leave-out blocks",
+    ),
+    "a packed log": ("cluster run.csv.gz", r"run\.csv\.gz: is packed; unpack it first"),
+    "a packed log to learn from": (
+        "reconstruct RUN.CSV.GZ --arm three_axis --out m.json",
+        r"RUN\.CSV\.GZ: is packed; unpack it first",
+    ),
     "no draws": ("reproduce table2 --out r --draws 0", "--draws 0"),
     "a million draws": ("reproduce table2 --out r --draws 1000000", "--draws 1000000"),
     "an unknown item": ("reproduce fig99 --out r", "unknown item 'fig99'"),
@@ -136,7 +149,10 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "no command": ("", "required: COMMAND"),
     "an unknown command": ("magic", "magic"),
-    "an arm that is a folder": ("collect . --out c", "no such file"),
+    "an arm that is a folder": (
+        "collect . --out c",
+        r"^armloop: \.: is a folder; give the path of a URDF in it$",
+    ),
     "an arm that is a device": ("collect /dev/null --out c", "no such file"),
 }
 
@@ -151,6 +167,21 @@ def test_an_option_that_cannot_be(name: str, place: Path, capsys: pytest.Capture
     assert answer.err.startswith("armloop: ") and answer.err.count("\n") == 1, answer.err
     assert re.search(said, answer.err), answer.err
     assert contents(place) == before
+
+
+def test_a_log_of_fewer_joints_is_told_the_arms(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = read_log(place / "run.csv")
+    write_log(place / "two.csv", MotionLog(log.time, log.q[:, :2], log.v[:, :2], log.tau[:, :2], name="two"))
+    said = r"^armloop: two\.csv: the columns are those of 2 joints; the arm has 3: joint_1, joint_2, joint_3, base to tip"
+    lock = "; fix those that the log has not with --lock JOINT=VALUE$"
+    for command, more in (
+        ("reconstruct two.csv --arm arm.urdf --out m.json", lock),
+        ("crossvalidate two.csv --arm arm.urdf", lock),
+        ("evaluate model.json two.csv", "$"),
+        ("export model.json --to urdf --out e.urdf --log two.csv", "$"),
+    ):
+        assert main(command.split()) == 2
+        one_line(capsys.readouterr().err, said + more)
 
 
 def test_a_variable_of_the_shell_that_is_not_set(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

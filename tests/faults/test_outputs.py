@@ -54,6 +54,7 @@ def full_of_armloops(name: str) -> Callable[[Place], None]:
 
 
 READ, THERE, DEVICE = "is read by this command", "has not written it", "is a device or a pipe"
+NO_ROOM = r"cannot be written to; choose another folder for --(report|next-run)"
 # what lies there, the command, what its one line says
 REFUSED: dict[str, tuple[Callable[[Place], None], str, str]] = {
     "reconstruct: out is the log": (nothing, f"{RECONSTRUCT} --out run.csv", READ),
@@ -99,6 +100,31 @@ REFUSED: dict[str, tuple[Callable[[Place], None], str, str]] = {
         lambda place: (place / "me.json").symlink_to(place / "me.json"),
         f"{RECONSTRUCT} --out me.json",
         "cannot be written",
+    ),
+    "reconstruct: a report where nothing can be made": (
+        nothing,
+        f"{RECONSTRUCT} --out m.json --report /proc/r.html",
+        NO_ROOM,
+    ),
+    "excite: a report where nothing can be made": (
+        nothing,
+        f"{EXCITE} --out r.csv --report /proc/r.html",
+        NO_ROOM,
+    ),
+    "diagnose: a next run where nothing can be made": (
+        nothing,
+        f"{DIAGNOSE} --out d --next-run /proc/n.csv",
+        NO_ROOM,
+    ),
+    "watch: a report where nothing can be made": (
+        nothing,
+        "watch --models model.json --logs run.csv --store s --report /proc/r.html",
+        NO_ROOM,
+    ),
+    "watch: a model that is none": (
+        nothing,
+        "watch --models arm.urdf --logs run.csv --store s",
+        r"arm\.urdf: ",
     ),
     "diagnose: out is the model's folder": (nothing, f"{DIAGNOSE} --out .", r"model\.json: is read"),
     "diagnose: somebody's report": (somebody("d/report.html"), f"{DIAGNOSE} --out d", THERE),

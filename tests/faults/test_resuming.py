@@ -4,11 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from faults.conftest import one_line
 
 from armloop.cli import main
 from armloop.reports.html import Picture, Section, render
 from armloop.reports.tables import make_table
 from armloop.util.checkpoints import FOLDER, Kept
+from armloop.util.errors import InputError
 from armloop_paper import Outcome
 
 
@@ -38,6 +40,28 @@ def test_without_a_folder_nothing_is_kept() -> None:
     kept.put("a", [1])
     assert kept.get("a") is None
     kept.clear()
+
+
+def test_what_was_kept_of_input_at_fault_is_forgotten_and_what_was_kept_before_stays(tmp_path: Path) -> None:
+    Kept(tmp_path, 1).put("before", 1)
+    kept = Kept(tmp_path, 1)
+    with pytest.raises(InputError), kept.unless_at_fault():
+        kept.put("now", 2)
+        raise InputError("at fault")
+    assert kept.get("before") == 1 and kept.get("now") is None
+
+
+def test_a_cross_validation_of_input_at_fault_leaves_nothing(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def half(*_: object, kept: Kept, **how: object) -> None:
+        kept.put("first fold", 1)
+        raise InputError("the second fold's log is at fault")
+
+    monkeypatch.setattr("armloop.identification.validation.crossvalidate", half)
+    assert main("crossvalidate run.csv other.csv --arm arm.urdf --out x".split()) == 2
+    one_line(capsys.readouterr().err, "the second fold's log is at fault")
+    assert not (place / "x").exists()
 
 
 def test_a_section_survives_with_its_pictures() -> None:

@@ -87,6 +87,10 @@ SCENARIOS: dict[str, tuple[str, str]] = {
     "all of ten times": ("plant: three_axis\nlimits: {effort: [9], used: 10}\n", "used is 10"),
     "no bandwidth": ("plant: three_axis\nbandwidth: 0\n", "bandwidth is 0"),
     "controllers that are a word": ("plant: three_axis\ncontrollers: pid\n", "controllers is 'pid'"),
+    "a controller twice": (
+        "plant: three_axis\ncontrollers: [pid, pid_step1, pid]\n",
+        "controllers: pid stands there twice; name each once",
+    ),
     "no controllers": ("plant: three_axis\ncontrollers: []\n", "controllers: empty"),
     "an unknown field": ("plant: three_axis\nKp: [80]\n", "field 'Kp' is unknown; there are: plant"),
     "an unknown field within": (

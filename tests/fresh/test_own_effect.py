@@ -61,6 +61,9 @@ def done(site, tmp_path_factory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("run")
     keep = (
         "from armloop.data.log import write_log\nwrite_log('run.csv', log)\n"
+        "from armloop.reports.diagnosis_tables import effects_table\n"
+        "likely = diagnosis.to_dict()['effects'][0]['probability']\n"
+        "open('found.txt', 'w').write(f'{likely}\\n{effects_table(diagnosis)}')\n"
         "print(diagnosis.verdict, diagnosis.errors()['after'][1], len(diagnosis.outcome.found))\n"
     )
     answer = python("-c", SCRIPT + keep, cwd=folder, installed=site)
@@ -80,6 +83,13 @@ def test_the_effect_is_found_with_its_parameters_and_compensated(done):
     assert words.startswith("joint 2 needs 2 T / (v/w + w/v) in addition, with peak 1.5")
     # at the critical speed it is the peak
     np.testing.assert_allclose([float(x) for x in supplied.strip("[]").split()], [0, 1.5, 0], atol=0.01)
+
+
+def test_no_blind_test_says_how_often_it_is_there(done):
+    probability, *table = (done[0] / "found.txt").read_text().splitlines()
+    assert probability == "None"
+    (row,) = [line for line in table if "eddy" in line]
+    assert "%" in row and row.split()[-2:] == ["–", "arm"]
 
 
 def test_the_command_line_knows_it_where_it_is_installed_and_says_so_where_not(done, site):

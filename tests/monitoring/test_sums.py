@@ -1,5 +1,7 @@
 """Sums add, whatever the cut; a change is named from them alone; step and drift are told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from operation import Change, healthy_model, operate
@@ -34,6 +36,19 @@ def test_the_columns_of_every_log_are_the_same(model: ReconstructedModel) -> Non
     names = {effect.name for effect, _ in watched(model)}
     assert {"payload", "viscous_friction", "coulomb_friction", "gravity_tilt", "time_delay"} <= names
     assert "friction_drift" not in names  # it has memory
+
+
+def test_an_arm_with_a_sliding_joint_is_watched_without_what_it_cannot_have(
+    model: ReconstructedModel,
+) -> None:
+    joints = (*model.arm.joints[:2], replace(model.arm.joints[2], kind="prismatic"))
+    places = {
+        (e.name, e.joint, e.other_joint)
+        for e, _ in watched(replace(model, arm=replace(model.arm, joints=joints)))
+    }
+    assert ("viscous_friction", 3, None) in places and ("transmission_coupling", 1, 2) in places
+    assert ("transmission_coupling", 2, 3) not in places  # a turning and a sliding joint share no gears
+    assert ("torque_ripple", 3, None) not in places
 
 
 def test_least_squares_from_sums_are_those_of_the_samples(model: ReconstructedModel) -> None:

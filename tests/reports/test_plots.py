@@ -39,6 +39,51 @@ def test_tracking_has_a_column_per_joint_and_a_line_per_controller(loop: SimpleN
     assert labels(figure) == {"reference", "PID", "PID + Step I", "PID + Step III"}
 
 
+def test_many_controllers_have_a_legend_of_rows_above_the_titles_and_lines_of_their_own(
+    loop: SimpleNamespace,
+) -> None:
+    names = [
+        "pid",
+        "pid_step1",
+        "pid_step2",
+        "pid_step3",
+        "computed_torque",
+        "exact",
+        "pid_mine",
+        "pid_other",
+    ]
+    run = next(iter(loop.tracking.values()))
+    figure = plots.tracking_figure(dict.fromkeys(names, run))
+    figure.draw_without_rendering()
+    looks = {(line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    assert len(looks) == len(names) + 1
+    (legend,) = figure.legends
+    read = sorted(
+        ((-round(box.y1), box.x0), text.get_text())
+        for text in legend.get_texts()
+        for box in [text.get_window_extent()]
+    )
+    rows = {y for (y, _), _ in read}
+    assert len(rows) == 2 and [label for _, label in read][:4] == [
+        "reference",
+        "PID",
+        "PID + Step I",
+        "PID + Step II",
+    ]
+    frame, top = legend.get_window_extent(), figure.axes[0]._left_title.get_window_extent().y1  # type: ignore[attr-defined]
+    assert frame.y0 > top and frame.x1 < figure.bbox.x1
+    assert stack(figure)
+    order = [text.get_text() for text in drawn(figure).legends[0].get_texts()]
+    assert order[:3] == ["reference", "PID", "PID + Step I"]  # one column on a narrow page
+
+
+def test_bars_of_one_colour_are_hatched(loop: SimpleNamespace) -> None:
+    names = ["pid", "pid_step1", "pid_step2", "pid_step3", "computed_torque", "exact", "pid_mine"]
+    run = next(iter(loop.tracking.values()))
+    axes = drawn(plots.eta_figure(dict.fromkeys(names, run))).axes[0]
+    assert len({(bar.get_facecolor(), bar.get_hatch()) for bar in axes.patches}) == len(names)
+
+
 def test_joints_of_different_units_get_axes_of_their_own(loop: SimpleNamespace) -> None:
     mixed = {name: replace(run, unit=("deg", "mm", "deg")) for name, run in loop.tracking.items()}
     assert len(drawn(plots.eta_figure(mixed)).axes) == 2

@@ -35,6 +35,7 @@ def test_every_field_of_a_number_is_bounded(name: str) -> None:
 class Leaf(Struct, forbid_unknown_fields=True):
     size: Annotated[float, Meta(gt=0)]
     kind: str = ""
+    width: Annotated[float, Meta(le=0.005)] = 0.0
 
 
 class Tree(Struct):
@@ -49,11 +50,12 @@ class Tree(Struct):
             r"leaves\.b\[1\]\.size is 'x'; it must be a finite number",
         ),
         ({"a": [{"size": 1}], "b": [{"size": 1}, {"size": 0}]}, r"leaves\.b\[2\]\.size is 0; .* above 0"),
+        ({"a": [{"size": 1, "width": 1}]}, r"width is 1; it must be a finite number of at most 0\.005$"),
         ({"a": [{"size": 1}] * 3}, r"leaves\.a is .*; it must be a list .*at most 2"),
         ({"a": [{}]}, r"leaves\.a\[1\]: field 'size' is missing"),
         (
             {"a": [{"size": 1, "shape": 2}]},
-            r"leaves\.a\[1\]: field 'shape' is unknown; there are: size, kind",
+            r"leaves\.a\[1\]: field 'shape' is unknown; there are: size, kind, width",
         ),
         ([], r"leaves is \[\]; it must be a mapping of fields"),
     ],

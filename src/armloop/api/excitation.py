@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from numpy.typing import ArrayLike
+
 from armloop.api.reading import as_arm, require_model
 from armloop.api.shown import displayed, page
 from armloop.commands.excite import Excite as Command
@@ -16,6 +18,7 @@ from armloop.identification.reconstruction.reconstruct import default_conditioni
 from armloop.model import ReconstructedModel
 from armloop.reports.excitation_tables import measures_table, use_table
 from armloop.robot.arm import Arm, load_arm
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.given import numbers_of, path_of, require
 from armloop.util.progress import Progress, silent
@@ -34,6 +37,15 @@ class Reference:
 
     def __init__(self, result: Excitation) -> None:
         self.result = result
+
+    @property
+    def duration(self) -> float:
+        """Length in seconds."""
+        return self.result.reference.duration
+
+    def evaluate(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return q, v, vdot, each (N, n), at the times ``t`` (N,): a motion that a simulated arm can follow."""
+        return self.result.reference.evaluate(t)
 
     def save(self, path: str | Path, *, rate: float = Command.rate) -> int:
         """Write it as a table (CSV or Parquet) with so many rows per second; returns their number."""

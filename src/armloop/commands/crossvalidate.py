@@ -76,11 +76,17 @@ def run(options: Crossvalidate) -> None:
         physical_table,
     )
     from armloop.util.checkpoints import Kept
+    from armloop.util.errors import InputError
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
 
+    if options.block != Crossvalidate.block and len(options.logs) > 1 and options.leave_out != "blocks":
+        raise InputError(
+            "--block is the length of blocks, but of several logs each is left out whole; add --leave-out blocks, or leave "
+            "it out"
+        )
     arm = arm_of(options)
-    logs = read_logs(options.logs, arm.n, recorded_as(options, TORQUE))
+    logs = read_logs(options.logs, arm, recorded_as(options, TORQUE))
     folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
     kept = Kept(folder, "crossvalidate")
     how: dict[str, Any] = {
@@ -94,11 +100,12 @@ def run(options: Crossvalidate) -> None:
         "kept": kept,
         "workers": Processes(options.jobs),
     }
-    if options.compare_physical:
-        comparison = compare_physical(logs, arm, **how)
-        result = comparison.runs["physical"]
-    else:
-        comparison, result = None, crossvalidate(logs, arm, **how)
+    with kept.unless_at_fault():
+        if options.compare_physical:
+            comparison = compare_physical(logs, arm, **how)
+            result = comparison.runs["physical"]
+        else:
+            comparison, result = None, crossvalidate(logs, arm, **how)
     compared = {} if comparison is None else {"physical_consistency": comparison.to_dict()}
     answer = {**result.to_dict(), **compared}
     if folder is not None:

@@ -51,7 +51,7 @@ def run(options: Export) -> None:
     model = load_model(options.model, load_arm(options.arm) if options.arm else None)
     motion = None
     if options.log:
-        samples = preprocess(read_logs(options.log, model.arm.n, model.recorded), model.conditioning)
+        samples = preprocess(read_logs(options.log, model.arm, model.recorded), model.conditioning)
         motion = states_of(samples.motion, samples.moving)
     found = export(model, options.to, options.out, motion)
     if options.json:

@@ -74,7 +74,15 @@ class Reconstruct(Logs, Chain, Recorded, Json):
 
 def run(options: Reconstruct) -> None:
     """Reconstruct a model and write it."""
-    from armloop.commands.shared import TORQUE, arm_of, out_file, print_json, progress, recorded_as
+    from armloop.commands.shared import (
+        TORQUE,
+        arm_of,
+        check_columns,
+        out_file,
+        print_json,
+        progress,
+        recorded_as,
+    )
     from armloop.data.pieces import IN_MEMORY, first_samples, log_sources
     from armloop.data.signals import Conditioning
     from armloop.identification.reconstruction import Options
@@ -95,6 +103,7 @@ def run(options: Reconstruct) -> None:
     for name in ("out", "report"):
         out_file(getattr(options, name), f"--{name}")
     arm = arm_of(options)
+    check_columns(options.logs, arm)
     recorded = recorded_as(options, TORQUE)
     most = 0 if options.scheduler else IN_MEMORY
     logs = log_sources(options.logs, arm.n, recorded, most)

@@ -10,16 +10,19 @@ from typing import Any
 
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
 from armloop.commands.options import Options
-from armloop.data.log import GAINS, MotionLog, read_log
+from armloop.data.log import GAINS, MotionLog, check_header, read_log
 from armloop.data.repeats import require_not_fitted
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.doubts import said
-from armloop.util.errors import InputError, ModelError
+from armloop.util.errors import InputError, LogError, ModelError
 from armloop.util.files import strict
 from armloop.util.outputs import take_file, take_folder
 from armloop.util.progress import Progress, silent, with_time_left
+
+#: Ends of names of packed files.
+_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")
 
 
 def progress(options: Options) -> Progress:
@@ -105,12 +108,29 @@ def recorded_as(options: Recorded, default: dict[str, Any]) -> dict[str, Any]:
     return {"unit": unit, "drive_gains": default["drive_gains"] if unit == "A" else None}
 
 
-def read_logs(paths: list[str], joints: int | None, recorded: dict[str, Any]) -> list[MotionLog]:
-    """The logs, with currents turned into torques where gains are known."""
-    return [
-        read_log(path, joints=joints, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"])
-        for path in paths
-    ]
+def read_logs(paths: list[str], arm: Arm | None, recorded: dict[str, Any]) -> list[MotionLog]:
+    """The logs, of an arm if one is known, with currents turned into torques where gains are known."""
+    check_columns(paths, arm)
+    return [read_log(path, tau_unit=recorded["unit"], drive_gains=recorded["drive_gains"]) for path in paths]
+
+
+def check_columns(paths: list[str], arm: Arm | None) -> None:
+    """Refuse logs that are packed, or that are not of an arm's joints, before any is read; raises ``LogError``."""
+    for path in paths:
+        if path.lower().endswith(_PACKED):
+            raise LogError(
+                f"{path}: is packed; unpack it first (gzip -d, unzip): a motion log ends in .csv or .parquet"
+            )
+        n, _ = check_header(Path(path))
+        if arm is not None and n != arm.n:
+            names = ", ".join(arm.joint_names)
+            # of a model's arm there is no URDF in which a joint could be locked
+            lock = (
+                "; fix those that the log has not with --lock JOINT=VALUE" if arm.urdf and n < arm.n else ""
+            )
+            raise LogError(
+                f"{path}: the columns are those of {n} joints; the arm has {arm.n}: {names}, base to tip{lock}"
+            )
 
 
 TORQUE = {"unit": "N*m", "drive_gains": None}
@@ -122,12 +142,12 @@ def model_and_logs(options: OfModel) -> tuple[ReconstructedModel, list[MotionLog
     recorded = recorded_as(options, model.recorded)
     if recorded["unit"] == "A" and recorded["drive_gains"] is None and model.recorded["unit"] != "A":
         raise ModelError(f"{options.model}: predicts torque in N·m; currents in A need --drive-gains")
-    return model, read_logs(options.logs, model.arm.n, recorded)
+    return model, read_logs(options.logs, model.arm, recorded)
 
 
 def held_out_logs(options: HeldOut, model: ReconstructedModel, fitted: list[MotionLog]) -> list[MotionLog]:
     """The logs of ``--held-out``; raises ``InputError`` for one that is to be fitted, too, or does not fit."""
-    logs = read_logs(options.held_out, model.arm.n, recorded_as(options, model.recorded))
+    logs = read_logs(options.held_out, model.arm, recorded_as(options, model.recorded))
     require_not_fitted(logs, fitted, options.held_out)
     for log in logs:
         preprocess([log], model.conditioning)  # what is wrong with a log is said before the long work

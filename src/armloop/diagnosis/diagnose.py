@@ -38,6 +38,7 @@ from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.base import entry
+from armloop.laws.effects.listed import listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array, Mask
@@ -158,7 +159,9 @@ class Diagnosis:
                     **added.to_dict(),
                     "share": found.share,
                     "when": "event" if added.effect.event else "always" if found.always else "changed",
-                    "probability": probability.of_effect(found.share, strength.times),
+                    "probability": probability.of_effect(found.share, strength.times)
+                    if listed(found.effect)
+                    else None,
                     "strength": strength.to_dict(),
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),

@@ -16,7 +16,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.drake.plant.beyond_bodies import explicit_part, presliding_elements, widened
 from armloop.dynamics import ModelEquations
-from armloop.export.exported import Exported, rms_of, whole_torque
+from armloop.export.exported import NAMES, Exported, rms_of, whole_torque
 from armloop.export.expressible import Said, random_motion, said
 from armloop.export.robot_xml import urdf_text
 from armloop.export.round_trip import drake_torque
@@ -106,7 +106,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
         np.abs(tau - expected).max(axis=0),
         np.abs(tau - whole).max(axis=0),
         missing,
-        notes + what.notes,
+        [*notes, *what.notes, NAMES],
     )
 
 

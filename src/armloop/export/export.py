@@ -11,7 +11,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.export.c_code import c_source
 from armloop.export.drake_bundle import as_drake
-from armloop.export.exported import Exported, rms_of, whole_torque
+from armloop.export.exported import NAMES, Exported, rms_of, whole_torque
 from armloop.export.expressible import Said, random_motion, said
 from armloop.export.mjcf import FEATURES as MJCF_FEATURES
 from armloop.export.mjcf import mjcf_text
@@ -59,7 +59,7 @@ def export(
 def _described(model: ReconstructedModel, target: str, path: Path, motion: Motion) -> Exported:
     text, features, consumer, read = _FORMATS[target]
     what = said(model)
-    notes = list(what.notes)
+    notes = [*what.notes, NAMES]
     names = model.arm.joint_names
     whole = whole_torque(model, motion)
     difference = unsaid = None

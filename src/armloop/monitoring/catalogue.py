@@ -82,9 +82,10 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     """The effects whose columns are kept, each with one value of its nonlinear parameter.
 
     They are those of a diagnosis that depend on the state alone. Left out are effects with memory (their columns need
-    the whole path), spectra, and couplings of joints that are not neighbours. The nonlinear parameter is the middle one
-    of those tried on a motion that fills the ranges the model was fitted on: it must not depend on the log, or sums of
-    different logs would not add.
+    the whole path), spectra, couplings of joints that are not neighbours, and effects whose search grid is empty (they
+    cannot be there, such as the ripple of a sliding joint). The nonlinear parameter is the middle one of those tried on
+    a motion that fills the ranges the model was fitted on: it must not depend on the log, or sums of different logs
+    would not add.
     """
     kept = [
         e
@@ -100,7 +101,7 @@ def watched(model: ReconstructedModel) -> tuple[tuple[Effect, float], ...]:
     motion = Motion(period * np.arange(400.0), q + size[3], v, vdot)
     known = replace(model.context(motion, kept), period=period)
     shapes = [(e, list(e.shapes(known))) for e in kept]
-    return tuple((e, float(s[len(s) // 2])) for e, s in shapes if len(s) <= _SPECTRUM)
+    return tuple((e, float(s[len(s) // 2])) for e, s in shapes if 0 < len(s) <= _SPECTRUM)
 
 
 def stays_nonlinear(e: Effect, coefficients: int) -> bool:

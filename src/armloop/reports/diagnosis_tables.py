@@ -9,6 +9,7 @@ import numpy as np
 
 from armloop.diagnosis import probability
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.listed import listed
 from armloop.reports.findings import all_added, blame, confounded, findings, nothing_to_supply, reasons
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
@@ -27,7 +28,7 @@ def effects_table(diagnosis: Diagnosis) -> Table:
     rows: list[list[object]] = []
     every = zip(diagnosis.outcome.found, diagnosis.outcome.added(), diagnosis.strengths, strict=True)
     for found, added, strength in every:
-        chance = probability.of_effect(found.share, strength.times)
+        chance = probability.of_effect(found.share, strength.times) if listed(found.effect) else None
         known = {key: e for key, e in added.parameters.items() if key not in _WHEN}
         for k, (key, e) in enumerate(known.items()):
             first = [effect_label(found.effect), "sensor" if found.effect.sensor else "arm"]

@@ -209,6 +209,8 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ArmError(f"{text_spec[:200]}: cannot be read ({reason}); give the path of a URDF") from error
+    if not found and path.is_dir():
+        raise ArmError(f"{text_spec[:200]}: is a folder; give the path of a URDF in it")
     if not found:
         hint = "" if "/" in text_spec or text_spec.endswith(".urdf") else " and no built-in arm"
         known = ", ".join(urdf_names())

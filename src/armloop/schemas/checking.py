@@ -136,4 +136,5 @@ def _expected(message: str) -> str:
     )
     message = message.replace(">=", "of at least").replace("<=", "of at most")
     message = re.sub(r"(?<= )> ?", "above ", re.sub(r"(?<= )< ?", "below ", message))
-    return message.replace("of length of at", "with a length of at").replace(".0", "")
+    message = message.replace("of length of at", "with a length of at")
+    return re.sub(r"(?<=\d)\.0(?!\d)", "", message)  # 5.0 is 5, 0.005 is itself

@@ -9,8 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -35,6 +35,7 @@ class Kept:
     def __init__(self, folder: Path | None, depends: Any) -> None:
         self._folder = None if folder is None else folder / FOLDER
         self._depends = json.dumps([depends, _program()], sort_keys=True)
+        self._earlier = frozenset(self._files())
 
     def get(self, item: Any) -> Any | None:
         """What was kept of an item (JSON-ready); None if nothing can be read of it."""
@@ -61,9 +62,26 @@ class Kept:
 
     def clear(self) -> None:
         """Forget all items: the command has come to its end."""
-        if self._folder is not None and self._folder.is_dir() and not self._folder.is_symlink():
-            for path in self._folder.glob("*.json"):
-                path.unlink(missing_ok=True)
+        self._remove(self._files())
+
+    @contextmanager
+    def unless_at_fault(self) -> Iterator[None]:
+        """Forget what was kept since this began where the block finds the input at fault: such a call leaves nothing."""
+        try:
+            yield
+        except InputError:
+            self._remove(self._files() - self._earlier)
+            raise
+
+    def _files(self) -> set[Path]:
+        if self._folder is None or not self._folder.is_dir() or self._folder.is_symlink():
+            return set()
+        return set(self._folder.glob("*.json"))
+
+    def _remove(self, files: set[Path]) -> None:
+        for path in files:
+            path.unlink(missing_ok=True)
+        if self._folder is not None and not self._folder.is_symlink() and not self._files():
             with suppress(OSError):
                 (self._folder / ".armloop").unlink(missing_ok=True)
                 self._folder.rmdir()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import fcntl
 import os
 import stat
+import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -181,8 +182,11 @@ def _existing(folder: Path, option: str, must: str) -> Path:
         folder = folder.parent
     if not folder.is_dir():
         raise InputError(f"{folder}: is a file; {option} must {must} a folder")
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: cannot be written to; choose another folder for {option}")
+    try:
+        # Tried, not asked for: /proc grants its superuser all rights, and yet nothing can be made in it.
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written to; choose another folder for {option}") from error
     return folder
 
 

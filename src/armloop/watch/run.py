@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Cluster, Processes, Serial, Workers
 from armloop.watch.fleet import find_models, model_and_digest, model_for
@@ -103,6 +104,7 @@ def watch(
         # what is wrong with them is said before a store is made
         workers = held.enter_context(_workers(options))
         folder = Store(store)
+        held.enter_context(_leaving_nothing(folder))
         held.enter_context(folder.locked(options.scheduler is not None))
         counts, places = ingest(folder, known, files, workers, progress)
         kept = {log for log, _ in folder.known()}
@@ -127,6 +129,15 @@ def watch(
         told = folder.announced()
         new = [alarm["id"] for alarm in alarms if alarm["id"] not in told]
         return Outcome(counts, arms, alarms, new, folder.aside(), options.hours)
+
+
+@contextlib.contextmanager
+def _leaving_nothing(store: Store) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        store.give_up()
+        raise
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ import os
 import secrets
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -47,6 +47,7 @@ class Store:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
+        self._new = False
         mark = self.folder / "store.json"
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"{self.folder}: is a file; --store must name a folder")
@@ -64,6 +65,15 @@ class Store:
             )
         else:
             _write(mark, json.dumps({"schema": SCHEMA}) + "\n")
+            self._new = True
+
+    def give_up(self) -> None:
+        """Remove what this call has made of a store whose input is at fault; sums and reasons once stored stay."""
+        if self._new and not any(path.is_dir() for path in self.folder.iterdir()):
+            for path in self.folder.iterdir():
+                path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self.folder.rmdir()
 
     @contextmanager
     def locked(self, shared_drafts: bool = False) -> Iterator[None]:

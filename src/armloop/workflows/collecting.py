@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from armloop.data.log import MotionLog
 from armloop.drake.experiments.collection import collect
-from armloop.drake.experiments.scenarios import load_plan, plant_for
+from armloop.drake.experiments.scenarios import load_plan, plan_names, plant_for
 from armloop.experiment.sampling import inverse_dynamics_samples
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, ScenarioError
 from armloop.util.progress import Progress
 
 SIMULATION = "simulation"
@@ -27,6 +27,10 @@ def collect_logs(arm: str, plan: str, seed: int, progress: Progress) -> dict[str
     """
     if seed < 0:
         raise InputError(f"--seed {seed}: give a whole number from 0")
+    if plan not in (SIMULATION, *plan_names()):
+        raise ScenarioError(
+            f"--plan {plan}: there is no such plan; there are: {', '.join([*plan_names(), SIMULATION])}"
+        )
     plant = plant_for(arm)
     if plan == SIMULATION:
         counts = _COUNTS.get(plant.arm.n, (2000, 10000, 10000))

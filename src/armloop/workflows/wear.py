@@ -32,7 +32,8 @@ def run_wear_scenario(
     assert scenario.wear is not None
     progress(f"tracking {scenario.wear.samples} times with each controller, on all cores")
     kept = Kept(folder, _depends(scenario, chosen))
-    result = run_wear(scenario, chosen, kept=kept)
+    with kept.unless_at_fault():
+        result = run_wear(scenario, chosen, kept=kept)
     answer = {
         "schema": SCHEMA,
         "scenario": scenario.name,

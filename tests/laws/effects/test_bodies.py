@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from synthetic import fourier_motion
 
 from armloop.data.motion import Motion
-from armloop.laws.effects import Context, effect
+from armloop.laws.effects import Context, Estimate, effect
 from armloop.laws.effects.payload import Payload
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
@@ -138,3 +138,12 @@ def test_a_tilt_is_found_from_its_columns(context):
     found = tilt.estimates(context.arm, x, np.zeros((2, 2)), 0.0)
     for key, value in TILT.items():
         assert found[key].value == pytest.approx(value, rel=1e-4)
+
+
+def test_the_words_say_in_which_frame_the_centre_is():
+    body = {"mass": Estimate(0.5, 0.01, "kg"), "com": Estimate([0.1, 0.0, 0.2], [0.01] * 3, "m")}
+    frame = "centre at (0.100, 0.000, 0.200) m in the frame of the link tool (of the last moving link if "
+    assert frame in effect("payload", None).sentence(body)
+    carried = {**body, "picked_up": Estimate([1.0], [0.0], "s"), "put_down": Estimate([2.0], [0.0], "s")}
+    words = effect("carried_load", None).sentence(carried)
+    assert frame in words and words.endswith(", carried from 1.0 to 2.0 s")

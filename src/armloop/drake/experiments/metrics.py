@@ -25,7 +25,7 @@ class Metrics:
         was asked, or too soon
     stick : s during which the joint rested though its reference moved
     settling : s from a reversal of the reference until the error last leaves `BAND`, the mean over the interval's
-        reversals; one that does not settle before the next counts up to the next. NaN without a reversal
+        reversals; one that does not settle before the next counts up to the next. NaN where none settles
     unsettled : share of the reversals that did not settle, 0 to 1; NaN without a reversal
     """
 
@@ -48,7 +48,7 @@ def measure(period: float, error: Array, v: Array, v_ref: Array, tau: Array, ask
         effort=np.sqrt((tau**2).mean(axis=0)),
         clipped=(np.abs(asked - tau) > _SAME * np.maximum(np.abs(asked), 1.0)).mean(axis=0),
         stick=period * sticking.sum(axis=0),
-        settling=np.array([period * steps.mean() if len(steps) else np.nan for steps, _ in settled]),
+        settling=np.array([np.nan if never.all() else period * steps.mean() for steps, never in settled]),
         unsettled=np.array([never.mean() if len(never) else np.nan for _, never in settled]),
     )
 

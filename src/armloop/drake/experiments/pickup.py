@@ -13,7 +13,13 @@ from armloop.data.log import MotionLog
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController
 from armloop.drake.experiments.scenarios import TrackingScenario
-from armloop.drake.experiments.tracking import MAIN_MODEL, RecordedArm, TrackingResult, score
+from armloop.drake.experiments.tracking import (
+    MAIN_MODEL,
+    RecordedArm,
+    TrackingResult,
+    refusing_divergence,
+    score,
+)
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
@@ -103,7 +109,8 @@ class _Run:
     def advance(self, until: float) -> None:
         # real time goes on from here, however long the diagnosis took
         self._simulator.ResetStatistics()
-        self._simulator.AdvanceTo(until)
+        with refusing_divergence({CONTROLLER: self._arm}, self.context):
+            self._simulator.AdvanceTo(until)
 
     def integral(self) -> Array:
         """Return what PID's integrator holds, (n,)."""

@@ -41,6 +41,7 @@ __all__ = [
     "load_plan",
     "load_plant",
     "load_tracking",
+    "plan_names",
     "plant_for",
     "plant_names",
 ]
@@ -72,6 +73,11 @@ def plant_for(spec: str | Path) -> Plant:
     turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
     friction = tuple(turning if turns else sliding for turns in arm.revolute)
     return Plant(arm.name, arm, PlantConfig(friction, MotionRanges.of(arm)))
+
+
+def plan_names() -> list[str]:
+    """Return the names of the plans in collection.yaml."""
+    return sorted(read(scenario_path("collection")))
 
 
 def load_plan(name: str) -> CollectionPlan:
@@ -107,6 +113,11 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
             f"{where}: controllers: {given}; there are: {', '.join([*LISTED, *REGISTRY.own_names()])}; "
             "one of your own is known once its package is installed (entry points armloop.controllers)"
         )
+    twice = {name for name in data.controllers if data.controllers.count(name) > 1}
+    if twice:
+        raise ScenarioError(
+            f"{where}: controllers: {', '.join(sorted(twice))} stands there twice; name each once"
+        )
     score = data.score or [0.0, reference.duration]
     least = _FEWEST_STEPS * period
     if len(score) != 2 or not 0 <= score[0] <= score[1] - least < score[1] <= reference.duration + 1e-9:
@@ -124,7 +135,7 @@ def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingSc
         PidGains(*gains),
         reference,
         (score[0], score[1]),
-        tuple(dict.fromkeys(data.controllers)),
+        tuple(data.controllers),
         data.random_seed,
         data.bandwidth,
         _pickup(data.pickup, plant.arm, reference, where),

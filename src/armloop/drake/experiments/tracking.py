@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,11 @@ from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
+from armloop.util.errors import InputError
 from armloop.util.workers import Pool
+
+_RUNAWAY = 1e3
+"""A joint faster than this has run away, rad/s (m/s): no log with such a speed would be read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +114,14 @@ def track(
     """Run one controller over the scenario's reference, starting on it.
 
     The diagram is that of `add_arm_with_controller`, with loggers. Raises `ValueError` when `models` has none
-    for the controller.
+    for the controller, `InputError` when the loop diverges.
     """
     run = RecordedArm(scenario, controller, models, effects)
     simulator = Simulator(run.diagram)
     run.systems.start_on_reference(simulator.get_mutable_context())
-    simulator.Initialize()
-    simulator.AdvanceTo(scenario.reference.duration)
+    with refusing_divergence({controller: run}, simulator.get_context()):
+        simulator.Initialize()
+        simulator.AdvanceTo(scenario.reference.duration)
     return run.result(simulator.get_context())
 
 
@@ -134,8 +140,9 @@ def track_in_view(
     for run in runs.values():
         run.systems.start_on_reference(simulator.get_mutable_context())
     view.pace(simulator)
-    simulator.Initialize()
-    simulator.AdvanceTo(scenario.reference.duration)
+    with refusing_divergence(runs, simulator.get_context()):
+        simulator.Initialize()
+        simulator.AdvanceTo(scenario.reference.duration)
     return {name: run.result(simulator.get_context()) for name, run in runs.items()}
 
 
@@ -179,6 +186,37 @@ class RecordedArm:
         if self.systems.followed is not asked_for:
             tables = asked_for.evaluate(time)
         return score(self._scenario, self._controller, time, tables, state, tau, asked)
+
+
+@contextmanager
+def refusing_divergence(runs: Mapping[str, RecordedArm], root_context: Context) -> Iterator[None]:
+    """Raise `InputError` when a loop diverged while the block simulated, or what the block raised when none did.
+
+    runs : by controller, recorded in the context
+
+    It is looked for afterwards, in what was recorded: a look at every step would cost a tenth of the simulation. What
+    ends a simulation whose numbers have ended is any system's error, and none of them says why.
+    """
+    try:
+        yield
+    except Exception as error:
+        _require_no_divergence(runs, root_context, error)
+        raise
+    _require_no_divergence(runs, root_context)
+
+
+def _require_no_divergence(
+    runs: Mapping[str, RecordedArm], root_context: Context, cause: Exception | None = None
+) -> None:
+    for name, run in runs.items():
+        time, state, _, _ = run.recorded(root_context)
+        speeds = np.abs(state[:, state.shape[1] // 2 :])
+        away = ~(speeds < _RUNAWAY).all(axis=1)  # a speed that is no number is not below it, either
+        if away.any():
+            raise InputError(
+                f"the loop under `{name}` diverges at t = {time[np.argmax(away)]:.3f} s: a joint is faster than "
+                f"{_RUNAWAY:g} rad/s (m/s); give it other gains"
+            ) from cause
 
 
 def add_controlled_arm(

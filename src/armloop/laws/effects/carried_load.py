@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Value, number
+from armloop.laws.effects.base import Array, Context, Effect, Estimate, Value
 from armloop.laws.effects.events import during
-from armloop.laws.effects.payload import Payload
+from armloop.laws.effects.payload import Payload, on_the_last_link
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Mask
 
@@ -95,10 +95,7 @@ class CarriedLoad(Effect):
         mass, com = parameters["mass"], np.asarray(parameters["com"].value)
         at = ", ".join(f"{x:.3f}" for x in com)
         when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in zip(first, last, strict=True))
-        return (
-            f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m, "
-            f"carried from {when} s"
-        )
+        return f"{on_the_last_link(mass, at)}, carried from {when} s"
 
 
 def _during(motion: Motion, intervals: Sequence[Interval]) -> Mask:

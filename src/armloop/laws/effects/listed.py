@@ -40,3 +40,8 @@ EFFECTS: dict[str, type[Effect]] = {
         key=lambda k: (bool(k.looks_like), k.needs_model, k.sensor, k.name),
     )
 }
+
+
+def listed(effect: Effect) -> bool:
+    """Whether an effect is one of these. How often what is named is there, is known of these alone."""
+    return EFFECTS.get(effect.name) is type(effect)

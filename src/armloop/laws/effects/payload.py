@@ -114,7 +114,15 @@ class Payload(Effect):
             f"{x:.3f}" if one else "not determined"
             for x, one in zip(np.asarray(com.value), known, strict=True)
         )
-        return f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({at}) m"
+        return on_the_last_link(mass, at)
+
+
+def on_the_last_link(mass: Estimate, centre: str) -> str:
+    """A body in words; the words know no arm, so they say by which rule its link is chosen."""
+    return (
+        f"a body of {number(mass.value):.3f} ± {number(mass.std_error):.2g} kg on the last link, centre at ({centre}) m "
+        "in the frame of the link tool (of the last moving link if the URDF has no tool)"
+    )
 
 
 def link_parameters(arm: Arm, parameters: Mapping[str, Value]) -> Array:

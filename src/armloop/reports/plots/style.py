@@ -7,7 +7,8 @@ exchanges exactly these.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
+from itertools import cycle
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
@@ -26,22 +28,37 @@ Grid = Literal["both", "x", "y"]
 
 INK, MUTED, GRID, SURFACE = "#1b2430", "#5d6877", "#e3e7ec", "#fefefe"
 BLUE, ORANGE, GREEN, PINK, GREY = "#2f7fd1", "#e8833a", "#12a284", "#c566a5", "#8791a1"
+VIOLET, BROWN = "#6a2ff0", "#8c3e1c"
 
 BEFORE, AFTER, BASELINE = ORANGE, BLUE, GREY
 STEPS = {1: ORANGE, 2: GREEN, 3: BLUE}
 CONDITIONS = {1: ORANGE, 2: GREEN, 3: BLUE}
 CYCLE = (BLUE, ORANGE, GREEN, PINK, GREY)
+#: Line styles and hatches of the first that has a colour, of the second and so on.
+DASHES, HATCHES = ("-", (0, (5, 2)), (0, (1.5, 1.5))), ("", "////", "....")
 
 #: More points than this on a line cannot be seen.
 MOST_POINTS = 2000
-_LEGEND: dict[str, Any] = {"frameon": False, "fontsize": 9.5}
+_LETTERS = 9.5  # points
+_LEGEND: dict[str, Any] = {"frameon": False, "fontsize": _LETTERS}
+#: Sizes of a figure's legend in inches: of a row, what stands before a label, between columns, and left and right of all.
+_ROW, _HANDLE, _BETWEEN, _SIDES = 0.21, 0.37, 0.27, 0.17
 
 
 def controller_colors(names: Sequence[str]) -> dict[str, str]:
-    """A colour per controller; the paper's three always have the same."""
+    """A colour per controller; the paper's three always have the same.
+
+    No more than six stay apart for colour-blind eyes and on a dark page: what comes after has them again, see
+    :func:`rounds`.
+    """
     fixed = {"pid": ORANGE, "pid_step1": GREEN, "pid_step3": BLUE}
-    spare = iter([PINK, GREY, *CYCLE] * (1 + len(names)))
+    spare = cycle([PINK, VIOLET, BROWN, GREEN, ORANGE, BLUE])
     return {name: fixed.get(name) or next(spare) for name in names}
+
+
+def rounds(colors: Sequence[str]) -> list[int]:
+    """How many before each have its colour: their lines are :data:`DASHES` apart, their bars :data:`HATCHES`."""
+    return [colors[:k].count(color) for k, color in enumerate(colors)]
 
 
 def figure(width: float = 10.0, height: float = 4.0) -> Figure:
@@ -107,20 +124,59 @@ def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float
 
 
 def legend_row(made: Figure, artists: Sequence[Artist], labels: Sequence[str], columns: int) -> Legend:
-    """Add a frameless legend in a row above a figure's axes."""
+    """Add a frameless legend above a figure's axes, row by row; matplotlib fills it column by column."""
     where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 1.0)}
-    return made.legend(artists, labels, ncols=columns, labelcolor=INK, **_LEGEND, **where)
+    order = _by_columns(len(labels), columns)
+    names = [labels[k] for k in order]
+    return made.legend([artists[k] for k in order], names, ncols=columns, labelcolor=INK, **_LEGEND, **where)
+
+
+def _by_columns(count: int, columns: int) -> list[int]:
+    """Which of ``count`` items that stand row by row is the first, second, .. if one reads column by column."""
+    return [k for first in range(min(columns, count)) for k in range(first, count, columns)]
+
+
+def _fitting(labels: Sequence[str], columns: int, width: float) -> int:
+    """How many columns, at most ``columns``, fit into ``width`` inches; each is as wide as its longest label."""
+    wide = [_width(label) for label in labels]
+    for count in range(min(columns, len(labels)), 1, -1):
+        longest = [max(wide[first::count]) for first in range(count)]
+        if (
+            sum(longest) + _HANDLE * count + _BETWEEN * (count - 1) + _SIDES <= 0.96 * width
+        ):  # hinted letters are a little wider
+            return count
+    return 1
+
+
+@lru_cache(maxsize=256)
+def _width(label: str) -> float:
+    """Width of a label, inches; letters fitted to pixels are a little wider than their outlines."""
+    return 1.07 * float(TextPath((0, 0), label, size=_LETTERS).get_extents().width) / 72
+
+
+def _add_room(made: Figure, rows: int) -> None:
+    """Make a figure higher above its axes, which keep their size, by so many rows of a legend."""
+    width, height = made.get_size_inches()
+    higher = height + _ROW * rows
+    kept = made.subplotpars
+    made.subplots_adjust(
+        bottom=kept.bottom * height / higher, top=kept.top * height / higher, hspace=kept.hspace
+    )
+    made.set_size_inches(width, higher)
 
 
 def legend(target: Axes | Figure, columns: int = 4) -> None:
-    """Add a frameless legend, each label once; on a figure it stands in a row above the axes."""
+    """Add a frameless legend, each label once; on a figure it stands above the axes, which keep their size."""
     handles: dict[str, Artist] = {}
     for axes in target.axes if isinstance(target, Figure) else [target]:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     artists, labels = list(handles.values()), list(handles)
     if isinstance(target, Figure):
+        columns = _fitting(labels, columns, float(target.get_size_inches()[0]))
         made = legend_row(target, artists, labels, columns)
+        if len(labels) > columns:
+            _add_room(target, -(-len(labels) // columns) - 1)
     else:
         made = target.legend(artists, labels, loc="best", ncols=columns, **_LEGEND)
     for shown in made.legend_handles:
@@ -138,12 +194,15 @@ def legend_above(made: Figure, width: float) -> float:
     """Lay a figure's legends out anew within ``width`` inches; returns the room they take above the axes, inches."""
     top = 0.1
     for shown in list(made.legends):
-        artists, labels = list(shown.legend_handles), [text.get_text() for text in shown.get_texts()]
+        entries = list(zip(shown.legend_handles, shown.get_texts(), strict=True))
+        order = _by_columns(len(entries), shown._ncols)  # type: ignore[attr-defined]
+        entries = [entries[order.index(k)] for k in range(len(entries))]
         shown.remove()
+        artists, labels = [artist for artist, _ in entries], [text.get_text() for _, text in entries]
         letters = max(map(len, labels), default=1)
         columns = min(max(1, int((width - 0.3) / (0.08 * letters + 0.5))), max(len(labels), 1))
         legend_row(made, [artist for artist in artists if artist is not None], labels, columns)
-        top += 0.21 * -(-len(labels) // columns)
+        top += _ROW * -(-len(labels) // columns)
     return top
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,15 +11,19 @@ from matplotlib.figure import Figure
 
 from armloop.reports import paper as published
 from armloop.reports.plots.style import (
+    DASHES,
     GRID,
+    HATCHES,
     INK,
     MUTED,
+    SURFACE,
     annotate,
     controller_colors,
     figure,
     legend,
     panels,
     polish,
+    rounds,
     thin,
 )
 from armloop.reports.words import controller, number
@@ -62,10 +66,11 @@ def tracking_figure(
             alpha=0.45,
             label="reference",
         )
-        for name, result in results.items():
+        turns = rounds([colors[name] for name in results])
+        for turn, (name, result) in zip(turns, results.items(), strict=True):
             rows = result.scored
             label = (names or {}).get(name) or controller(name)
-            line = {"color": colors[name], "linewidth": 1.3, "label": label}
+            line = {"color": colors[name], "linewidth": 1.3, "label": label, "linestyle": _of(DASHES, turn)}
             follow.plot(*thin(result.time[rows], scale * result.q[rows, j]), **line)
             deviation = scale * (result.q_ref[rows, j] - result.q[rows, j])
             error.plot(*thin(result.time[rows], deviation), **line)
@@ -76,6 +81,10 @@ def tracking_figure(
         error.axhline(0, color=GRID, linewidth=1)
     legend(made, 5)
     return made
+
+
+def _of(styles: Sequence[Any], turn: int) -> Any:
+    return styles[turn % len(styles)]
 
 
 def eta_figure(
@@ -112,11 +121,22 @@ def _bars(
     paper: bool,
 ) -> None:
     width = 0.8 / len(results)
+    turns = rounds([colors[name] for name in results])
     for k, (name, result) in enumerate(results.items()):
         x = np.arange(len(joints)) + (k - 0.5 * (len(results) - 1)) * width
         values = [float(result.eta[j]) for j in joints]
         label = names.get(name) or controller(name)
-        axes.bar(x, values, 0.88 * width, color=colors[name], label=label)
+        hatch = _of(HATCHES, turns[k])
+        axes.bar(
+            x,
+            values,
+            0.88 * width,
+            color=colors[name],
+            label=label,
+            hatch=hatch,
+            edgecolor=SURFACE,
+            linewidth=0,
+        )
         theirs = published.ETA_DEG.get(name, ()) if paper else ()
         tops = list(values)
         if len(theirs) == len(result.eta):
