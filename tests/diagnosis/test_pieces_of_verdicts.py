@@ -204,16 +204,22 @@ class TestReasons:
         assert reasons._range(1, 0.03, 0.01) == [f"{start}; 1% {beyond}"]
 
     def test_a_residual_is_real_if_it_can_be_foretold_or_nothing_is_known_of_it(self) -> None:
-        def real(left: float | None, error: float | None, noise: float | None) -> bool:
-            words, real = reasons._multiple(Parts(1, 0.5, left, noise, error), 0, 2.5)
+        def real(
+            left: float | None, error: float | None, noise: float | None, apart: bool = True
+        ) -> bool | None:
+            words, real = reasons._multiple(Parts(1, 0.5, left, noise, error, None, apart), 0, 2.5)
             assert words.startswith("joint 1: the residual is 2.5 times the baseline")
-            assert ("something is there" in words) == real
+            assert ("something is there" in words) == (real is True)
+            assert ("nothing in it can be predicted" in words) == (real is False)
             return real
 
         assert real(None, 0.1, 0.1) and real(0.1, None, 0.1) and real(0.1, 0.1, None)
         # by more than three standard errors, and than a fifth of what is left
-        assert real(0.31, 0.1, 0.1) and not real(0.29, 0.1, 0.1)
-        assert real(0.26, 0.01, 1.0) and not real(0.24, 0.01, 1.0)
+        assert real(0.31, 0.1, 0.1) and real(0.29, 0.1, 0.1) is None
+        assert real(0.26, 0.01, 1.0) and real(0.24, 0.01, 1.0) is None
+        # noise is what is known to be next to nothing else, of blocks that lie apart
+        assert real(0.1, 0.05, 0.9) is False and real(0.1, 0.11, 0.9) is None
+        assert real(0.1, 0.05, 0.9, apart=False) is None
 
     @pytest.mark.parametrize(("moves", "blocks", "still"), [(20, 8, ""), (19, 8, "[1, 2]"), (20, 7, "[2]")])
     def test_too_little_motion(self, moves: int, blocks: int, still: str) -> None:
@@ -251,7 +257,9 @@ class TestReasons:
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
         monkeypatch.setattr(reasons, "too_slow", lambda model, motion: np.zeros((50, 3), dtype=bool))
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
-        monkeypatch.setattr(reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", j == 1))
+        monkeypatch.setattr(
+            reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", (False, True, None)[j])
+        )
         augmented: Any = 0.75
         found = reasons.standing(evidence, augmented, after, of.get("explained", []))
         assert (seen[0] == 0.75).all()
@@ -261,7 +269,9 @@ class TestReasons:
     def test_twice_the_baseline_is_no_baseline(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.standing(monkeypatch, [1.0, None, 0.99]) == (["1 2"], False)
         assert self.standing(monkeypatch, [0.0, 2.0, np.nan]) == (["2 4"], True)
-        # the second joint's can be predicted, the first one's is noise
+        # the second joint's can be predicted, the first one's is noise, and of the third nobody knows
+        assert self.standing(monkeypatch, [0.0, None, 1.5]) == (["3 3"], True)
+        assert self.standing(monkeypatch, [0.0, None, 1.5], left=True) == ()
         assert self.standing(monkeypatch, [2.0, 2.0, 0.5], left=True) == (1,)
         assert self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3]) == (["1 18"], False)
 

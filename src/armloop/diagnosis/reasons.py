@@ -17,8 +17,8 @@ from armloop.model import ReconstructedModel
 TOO_POOR = 0.5
 #: Part of the samples outside the trained range that is worth a word, and the part that leaves too little.
 _WORTH_A_WORD, _MOSTLY = 0.02, 0.8
-#: Standard errors by which a part must be predictable to be no noise.
-_SURE = 3.0
+#: Standard errors by which a part of what is left must be predictable, and how large a part, to be no noise.
+_SURE, _PART = 3.0, 0.2
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
 
@@ -75,7 +75,8 @@ def standing(
             words, real = _multiple(part, j, ratio)
             reasons.append(words)
             unexplained += [j] if real else []
-    return Standing(reasons, merged(parts, outside), unknown or bool(unexplained), tuple(unexplained))
+            unknown |= real is not False
+    return Standing(reasons, merged(parts, outside), unknown, tuple(unexplained))
 
 
 def too_still(evidence: Evidence) -> str:
@@ -131,17 +132,19 @@ def _too_poor(model: ReconstructedModel, j: int) -> str:
     return f"joint {j + 1}: the model leaves {share:.0%} of the torque on its own training logs: it judges nothing there"
 
 
-def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool]:
-    """A sentence on a residual that nothing accounts for, and whether it is more than noise."""
+def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
+    """A sentence on a residual that nothing accounts for, and whether it is more than noise; None if nobody knows."""
+    size = f"joint {j + 1}: the residual is {ratio:.1f} times the baseline"
     left, error, noise = part.predictable_left, part.std_error, part.noise
-    if left is None or error is None or noise is None or left > max(_SURE * error, 0.2 * (left + noise)):
+    if left is None or error is None or noise is None or left > max(_SURE * error, _PART * (left + noise)):
         return (
-            f"joint {j + 1}: the residual is {ratio:.1f} times the baseline: something is there, too weak or too short on "
-            "this run to be named; the motion of --next-run would show it",
+            f"{size}: something is there, too weak or too short on this run to be named; the motion of --next-run would "
+            "show it",
             True,
         )
-    return (
-        f"joint {j + 1}: the residual is {ratio:.1f} times the baseline, but nothing in it can be predicted from the "
-        "motion: noise, or what happened once",
-        False,
-    )
+    if part.separated and left + error <= _PART * (left + noise):
+        return (
+            f"{size}, but nothing in it can be predicted from the motion: noise, or what happened once",
+            False,
+        )
+    return f"{size}; whether it can be predicted from the motion, this run does not tell", None
