@@ -61,6 +61,7 @@ class Answers:
         samples = SimpleNamespace(tau=np.ones((4, 3)))
         parts: dict[str, Any] = {
             "require_different": lambda logs: None,
+            "misrecorded": lambda *_: "",
             "settled": lambda model, logs: (logs, np.full((1, 3), 0.1)),
             "sentences": lambda model, names, zeros: [f"zeros of {names}"],
             "preprocess": lambda logs, how: samples,

@@ -20,13 +20,18 @@ def run(options: Evaluate) -> None:
     from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import score
+    from armloop.identification.validation.misrecorded import misrecorded
     from armloop.reports.tables import score_table
     from armloop.robot.plausibility import say_beyond_limits
+    from armloop.util.doubts import warn
 
     model, logs = model_and_logs(options)
     require_different(logs)
     say_beyond_limits(model.arm, logs)
-    result = score(model, preprocess(logs, model.conditioning))
+    samples = preprocess(logs, model.conditioning)
+    if wrong := misrecorded(model, logs, samples):
+        warn(f"{', '.join(log.name for log in logs)}: {wrong}")
+    result = score(model, samples)
     if options.json:
         print_json(result.to_dict())
         return

@@ -36,6 +36,7 @@ from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted
 from armloop.diagnosis.whereabouts import whereabouts
 from armloop.diagnosis.zeros import sentences, settled
+from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.base import entry
 from armloop.laws.effects.listed import listed
@@ -250,6 +251,9 @@ def diagnose(
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)
     samples = preprocess(logs, model.conditioning)
+    wrong = misrecorded(model, logs, samples)
+    if wrong:
+        raise InputError(f"{', '.join(log.name for log in logs)}: {wrong}")
     for j in range(model.arm.n):
         if not samples.tau[:, j].any():
             raise InputError(

@@ -1,0 +1,86 @@
+"""Logs that contradict a model as a whole are refused with what would be right; effects on the arm are none of these."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rubbing_arm import model_with_baseline, run
+from synthetic import three_axis
+
+from armloop.cli import main
+from armloop.data.log import MotionLog, unchecked_log, write_log
+from armloop.data.signals import preprocess
+from armloop.diagnosis import diagnose
+from armloop.identification.validation.misrecorded import misrecorded
+from armloop.laws.effects.payload import Payload
+from armloop.model import ReconstructedModel
+from armloop.util.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def model() -> ReconstructedModel:
+    return model_with_baseline()
+
+
+def said(model: ReconstructedModel, log: MotionLog) -> str:
+    return misrecorded(model, [log], preprocess([log], model.conditioning))
+
+
+def exchanged(log: MotionLog, order: list[int], torques: bool, angle: float = 1.0) -> MotionLog:
+    tau = log.tau[:, order] if torques else log.tau
+    q, v = (angle * x[:, order] for x in (log.q, log.v))
+    return unchecked_log(time=log.time, q=q, v=v, tau=tau, name=log.name)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_units_signs_and_orders_are_told(model: ReconstructedModel, seed: int) -> None:
+    log = run(seed, 15.0)
+    assert said(model, log) == ""
+    milli = replace(log, tau=1000.0 * log.tau)
+    assert said(model, milli).startswith(
+        "all torques are about 1000 times what the model gives, as if tau were in mN·m"
+    )
+    assert said(model, replace(log, tau=5.0 * log.tau)).startswith(
+        "all torques are about 5 times what the model gives; give"
+    )
+    assert said(model, replace(log, tau=-log.tau)).startswith("the sign of all joints' tau is turned")
+    assert said(model, exchanged(log, [2, 1, 0], True)).startswith(
+        "joints are in another order: taken as 3, 2, 1"
+    )
+    assert said(model, exchanged(log, [1, 0, 2], False)).startswith(
+        "q and v are those of other joints than tau: taken as 2, 1, 3"
+    )
+    turns = exchanged(log, [0, 1, 2], True, 1 / (2 * np.pi))
+    assert said(model, turns) == "angles seem to be in revolutions; give q in rad and v in rad/s"
+
+
+def test_effects_on_the_arm_are_no_other_record(model: ReconstructedModel) -> None:
+    log = run(3, 15.0)
+    samples = preprocess([log], model.conditioning)
+    assert (
+        said(model, replace(log, tau=log.tau * [1.0, -1.0, 1.0])) == ""
+    )  # one sensor's sign is its own fault
+    assert said(model, replace(log, tau=2.0 * log.tau)) == ""
+    load = Payload().torque(
+        model.context(samples.motion), {"mass": 30.0, "com": [0.1, 0.0, 0.0], "own_inertia": 0.1}
+    )
+    heavy = replace(samples, tau=samples.tau + load)
+    assert misrecorded(model, [log], heavy) == ""
+    assert said(model, replace(log, tau=np.random.default_rng(1).normal(size=log.tau.shape))) == ""
+
+
+def test_a_diagnosis_refuses_and_an_evaluation_warns(
+    model: ReconstructedModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    turned = replace(run(4, 15.0), name="turned")
+    turned = replace(turned, tau=-turned.tau)
+    with pytest.raises(InputError, match=r"turned: the sign of all joints' tau is turned"):
+        diagnose(model, [turned], jobs=1)
+    model.save(tmp_path / "model.json")
+    write_log(tmp_path / "turned.csv", turned)
+    assert main(["evaluate", str(tmp_path / "model.json"), str(tmp_path / "turned.csv")]) == 0
+    assert "warning: turned: the sign of all joints' tau is turned" in capsys.readouterr().err
+    assert model.arm.n == three_axis().n
