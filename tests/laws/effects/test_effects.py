@@ -360,6 +360,11 @@ def test_a_ripple_is_sought_above_the_harmonics_of_gravity_and_on_turning_joints
     assert not effect("torque_ripple", 2).shapes(replace(context, arm=replace(context.arm, joints=sliding)))
 
 
+def test_a_number_without_an_error_is_stated_without_one():
+    assert Estimate(0.25, 0.011, "s").words(3) == "0.25 ± 0.011 s"
+    assert Estimate(0.25, 0.0, "s").words(3) == "0.25 s" and Estimate(1.0, 0.0, "1").words() == "1"
+
+
 def test_units_are_those_of_the_joint():
     arm = an_arm()
     sliding = replace(arm, joints=tuple(replace(joint, kind="prismatic") for joint in arm.joints))

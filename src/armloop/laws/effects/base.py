@@ -80,10 +80,10 @@ class Estimate:
         return {"value": self.value, "std_error": self.std_error, "unit": self.unit}
 
     def words(self, digits: int = 4) -> str:
-        """A scalar with its standard error and unit."""
-        return f"{number(self.value):.{digits}g} ± {number(self.std_error):.2g} {self.unit}".removesuffix(
-            " 1"
-        )
+        """A scalar with its standard error, where it has one, and unit."""
+        error = number(self.std_error)
+        stated = f" ± {error:.2g}" if error else ""
+        return f"{number(self.value):.{digits}g}{stated} {self.unit}".removesuffix(" 1")
 
 
 def entry(name: str, joint: int | None, other_joint: int | None = None) -> dict[str, Any]:
