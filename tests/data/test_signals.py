@@ -376,3 +376,14 @@ def test_a_late_speed_is_moved_run_by_run_and_never_beyond_its_end() -> None:
         np.testing.assert_allclose(moved[inside], expected, atol=1e-3 * np.abs(expected).max())
         np.testing.assert_allclose(moved[run][-2:], np.tile(log.v[run][-1], (2, 1)), rtol=1e-9)
     np.testing.assert_array_equal(moved[-2:], log.v[-2:])
+
+
+def test_a_lag_that_is_not_felt_below_the_corner_is_left() -> None:
+    log = filtered_by_its_driver(sines(np.arange(0, 20, 0.002)), 60.0)
+    in_time = replace(log)
+    vars(in_time)["velocity_lag"] = 0.0
+    assert 0.0015 < log.velocity_lag < 0.0024
+    for corner, felt in ((3.0, False), (8.0, True)):
+        how = Conditioning(cutoff_hz=corner)
+        (own, left) = (preprocess([x], how).motion.v for x in (log, in_time))
+        assert (np.abs(own - left).max() > 1e-3) == felt, corner

@@ -72,5 +72,5 @@ def test_of_a_clean_run(model: ReconstructedModel) -> None:
 def test_taken_as_it_is_a_stuck_torque_would_be_events(
     model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(signals, "repaired", lambda log: Repaired(log.q, log.v, log.tau, None))
+    monkeypatch.setattr(signals, "repaired", lambda log, lag: Repaired(log.q, log.v, log.tau, None))
     assert len(diagnose(model, [stuck(run(6, 0.5))], jobs=1).contacts) > 1

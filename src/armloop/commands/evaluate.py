@@ -20,12 +20,14 @@ def run(options: Evaluate) -> None:
     from armloop.data.repeats import require_different
     from armloop.data.signals import preprocess
     from armloop.identification.scoring import score
-    from armloop.identification.validation.misrecorded import misrecorded
     from armloop.reports.tables import score_table
     from armloop.robot.plausibility import say_beyond_limits
     from armloop.util.doubts import warn
 
     model, logs = model_and_logs(options)
+    # here, for it needs what takes longer to import than a fault of the input to be told
+    from armloop.identification.validation.misrecorded import misrecorded
+
     require_different(logs)
     say_beyond_limits(model.arm, logs)
     samples = preprocess(logs, model.conditioning)

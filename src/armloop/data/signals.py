@@ -25,6 +25,8 @@ from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
 _SHORTEST = 6
+#: A lag of v that is a smaller part of a period of the corner is not felt below it.
+_FELT = 0.01
 #: Periods that differ by less than this part are one.
 _ALIKE = 0.01
 #: Hz; a filter of a lower corner would need hours of a log.
@@ -112,7 +114,8 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
     parts, spans = [], []
     for log in logs:
-        fresh = repaired(recorded(log), log.velocity_lag)
+        lag = log.velocity_lag
+        fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= _FELT else 0.0)
         for run in log.runs():
             part = _condition_run(log.select(run), fresh.part(run), how, how.dead_zone * noise)
             if part is not None:

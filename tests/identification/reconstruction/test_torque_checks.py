@@ -465,7 +465,7 @@ def test_each_joint_has_two_hundred_instants(
     table = Table(
         np.zeros((300, 2, 8)), np.zeros((300, 2)), np.zeros(300, np.intp), moving, standing(300, 2), 1
     )
-    monkeypatch.setattr(plain_fits, "table_at", lambda *_: table)
+    monkeypatch.setattr(plain_fits, "table_at", lambda *_, **how: table)
     problem = torque_checks.Problem.of([run(seconds=2.0)], three_axis(), 10.0)
     assert (problem is not None) == enough
     if problem is not None:
