@@ -1,7 +1,7 @@
 """A double pendulum with quasi-direct drives: encoders that are zeroed by hand, and torque pulses of known time and joint.
 
 What came out: zeros that differ by two hundredths of a radian, without which 27 and 12 % of the torque are left and with
-which 17 and 7.7 %; 13 of 18 pulses, 12 with their joint, and no event in twenty clean runs. Four of the others act
+which 17 and 7.7 %; 14 of 18 pulses, 12 with their joint, and no event in twenty clean runs. Four of the others act
 while their joint stands still, held by its friction.
 """
 
