@@ -387,3 +387,12 @@ def test_a_lag_that_is_not_felt_below_the_corner_is_left() -> None:
         how = Conditioning(cutoff_hz=corner)
         (own, left) = (preprocess([x], how).motion.v for x in (log, in_time))
         assert (np.abs(own - left).max() > 1e-3) == felt, corner
+
+
+def test_joints_that_do_not_agree_have_no_lag_in_common() -> None:
+    log = sines(np.arange(0, 20, 0.004))
+    early, late = (
+        np.stack([np.interp(log.time - lag, log.time, v) for v in log.v.T], axis=1) for lag in (0.002, 0.006)
+    )
+    assert replace(log, v=late).velocity_lag == pytest.approx(0.006, abs=2e-4)
+    assert replace(log, v=np.column_stack([early[:, 0], late[:, 1]])).velocity_lag == 0.0

@@ -263,7 +263,6 @@ class TestReasons:
         augmented: Any = 0.75
         found = reasons.standing(evidence, augmented, after, of.get("explained", []))
         assert (seen[0] == 0.75).all()
-        assert all(found.unknown for _ in found.left)
         return (found.reasons, found.unknown) if of.get("left") is None else found.left
 
     def test_twice_the_baseline_is_no_baseline(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -273,6 +272,10 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.0, None, 1.5]) == (["3 3"], True)
         assert self.standing(monkeypatch, [0.0, None, 1.5], left=True) == ()
         assert self.standing(monkeypatch, [2.0, 2.0, 0.5], left=True) == (1,)
+        # what is left counts from the baseline on, though less than twice that is not told of
+        assert self.standing(monkeypatch, [0.9, 0.51, 0.9], left=True) == (1,)
+        assert self.standing(monkeypatch, [0.9, 0.51, 0.9]) == ([], False)
+        assert self.standing(monkeypatch, [0.9, 0.5, 0.9], left=True) == ()
         assert self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3]) == (["1 18"], False)
 
     def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(

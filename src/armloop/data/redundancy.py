@@ -26,6 +26,8 @@ _WINDOWS = 5_000
 _LAGS, _LAG, _SURE = np.arange(-0.03, 0.0301, 0.001), 0.0035, 5.0
 # Mean square error at the largest lags over the least, from which on a joint's motion tells of a lag.
 _PLAIN = 4.0
+# Joints agree whose own lags are so near the common one, and most of them, this part, must.
+_AGREE, _MOST = 0.25, 0.75
 # v that is proportional to the rate of q, at such a correlation, by a factor so far from one.
 _ALIKE, _OFF = 0.998, 0.05
 
@@ -234,7 +236,8 @@ def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     """The lag of largest likelihood, s, one for all joints, for they share a controller; 0 if the gain may be chance.
 
     Errors are normal with a variance of each joint's own; each window's length is one observation. Only joints count at
-    which the largest lags would be plain: a steady speed fits every lag, and what it errs by is no noise.
+    which the largest lags would be plain: a steady speed fits every lag, and what it errs by is no noise. Where the joints
+    do not agree, it is no lag of theirs.
     """
     told = [e for e in errors.values() if min(e[0], e[-1]) > _PLAIN * e.min()]
     if not told:
@@ -245,7 +248,10 @@ def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     best, none = int(np.argmax(likelihood)), len(_LAGS) // 2
     if not 0 < best < len(_LAGS) - 1 or likelihood[best] - likelihood[none] < 0.5 * _SURE**2:
         return 0.0
-    return _vertex(_LAGS, np.sum([e / max(e[best], TINY) for e in told], axis=0), best)
+    lag = _vertex(_LAGS, np.sum([e / max(e[best], TINY) for e in told], axis=0), best)
+    inner = [int(np.clip(np.argmin(e), 1, len(_LAGS) - 2)) for e in told]
+    own = np.array([_vertex(_LAGS, e, k) for e, k in zip(told, inner, strict=True)])
+    return lag if np.mean(np.abs(own - lag) <= _AGREE * abs(lag)) >= _MOST else 0.0
 
 
 def _far_from_the_ends(log: Recorded, windows: Windows) -> Mask:

@@ -31,7 +31,7 @@ class Standing:
         reasons: sentences.
         joints: entries of ``joints`` in ``diagnosis.json``.
         unknown: whether neither "nothing is there" nor "something is" can be said.
-        left: joints (0-based) of which something predictable is left that nothing accounts for.
+        left: joints (0-based) of which more than the baseline, and predictable, is left that nothing accounts for.
     """
 
     reasons: list[str]
@@ -71,10 +71,12 @@ def standing(
             unknown = True
         of = after[j]
         ratio = np.nan if of is None else of / float(evidence.scale[j])
-        if j + 1 not in explained and not poor and ratio >= MULTIPLE:
-            words, real = _multiple(part, j, ratio)
+        if j + 1 in explained or poor or not ratio > 1:
+            continue
+        words, real = _multiple(part, j, ratio)
+        unexplained += [j] if real else []
+        if ratio >= MULTIPLE:
             reasons.append(words)
-            unexplained += [j] if real else []
             unknown |= real is not False
     return Standing(reasons, merged(parts, outside), unknown, tuple(unexplained))
 
