@@ -84,7 +84,12 @@ class Answers:
         }
         for name, part in parts.items():
             monkeypatch.setattr(module, name, part)
-        monkeypatch.setattr(module.Evidence, "of", lambda *_: whole)
+
+        def of(model: Any, *_: Any) -> Evidence:
+            whole.model = model
+            return whole
+
+        monkeypatch.setattr(module.Evidence, "of", of)
         monkeypatch.setattr(Diagnosis, "errors", lambda self: {"after": "errors"})
 
     def note(self, name: str, asked: Any, answer: Any) -> Any:
@@ -121,9 +126,8 @@ class Answers:
         self.asked["carried"] = (whole.name, account.outcome.name, jobs)
         if not self.given["carried"]:
             return None
-        evidence = Evidence(name="loaded", rows=ROWS.copy())
-        other = SimpleNamespace(contacts=[], unlisted=None, evidence=None, outcome=None)
-        return evidence, other, self.outcome("with the load")
+        evidence, outcome = Evidence(name="loaded", rows=ROWS.copy()), self.outcome("with the load")
+        return SimpleNamespace(contacts=[], unlisted=None, evidence=evidence, outcome=outcome)
 
     def reversals(self, evidence: Evidence, outcome: Any, kept: Any, progress: Any) -> Any:
         self.asked["kept"] = kept

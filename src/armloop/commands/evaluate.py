@@ -31,7 +31,7 @@ def run(options: Evaluate) -> None:
     require_different(logs)
     say_beyond_limits(model.arm, logs)
     samples = preprocess(logs, model.conditioning)
-    if wrong := misrecorded(model, logs, samples):
+    if wrong := misrecorded(model, samples):
         warn(f"{', '.join(log.name for log in logs)}: {wrong}")
     result = score(model, samples)
     if options.json:

@@ -28,7 +28,7 @@ from armloop.laws.effects.payload import Payload
 from armloop.model import AddedEffect
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import Array, Index, Mask, stretches
 from armloop.util.progress import Progress
 
 #: Price of a change, as log-likelihood: some ten samples of a torque three times the model's shortcomings.
@@ -44,14 +44,11 @@ _WINDOW = 0.5
 
 def account_with_load(
     whole: Evidence, account: Account, progress: Progress, jobs: int | None
-) -> tuple[Evidence, Account, Outcome] | None:
+) -> Account | None:
     """The account of a run in which a load is carried at times; None where that leaves no far less.
 
     Args:
         account: that without such a load.
-
-    Returns:
-        The run's samples that count, what happened beside the load, and the outcome with it.
     """
     if not _much_is_left(account):
         return None
@@ -90,7 +87,10 @@ def account_with_load(
     share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
     every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
     together = Outcome(every, nothing.fit, _with(evidence, load, other).fit, nothing.residual)
-    return evidence, other, clear(evidence, pruned(evidence, together))
+    # of the model as it is: the load is among the effects found
+    run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
+    outcome = clear(evidence, pruned(evidence, together))
+    return replace(other, whole=run, evidence=evidence, outcome=outcome)
 
 
 def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:
@@ -220,9 +220,7 @@ def _intervals(evidence: Evidence, carried: Mask, run: Index, better: Array) -> 
     for number, rows in enumerate(motion.runs(), 1):
         mine = np.flatnonzero(run == number)
         ends = []
-        for edge in np.flatnonzero(
-            np.diff(np.concatenate([[0], carried[mine].astype(np.int8), [0]]))
-        ).tolist():
+        for edge in stretches(carried[mine]).ravel().tolist():
             if edge in (0, len(mine)):  # it is carried from the run's start, or to its end
                 ends.append(rows.start if edge == 0 else rows.stop - 1)
                 continue

@@ -14,7 +14,7 @@ from armloop.data.motion import Samples
 from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
-from armloop.diagnosis.account import best_account
+from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
@@ -251,7 +251,7 @@ def diagnose(
     logs, zeros = settled(model, logs)
     own_zeros = sentences(model, [log.name for log in logs], zeros)
     samples = preprocess(logs, model.conditioning)
-    wrong = misrecorded(model, logs, samples)
+    wrong = misrecorded(model, samples)
     if wrong:
         raise InputError(f"{', '.join(log.name for log in logs)}: {wrong}")
     for j in range(model.arm.n):
@@ -263,35 +263,44 @@ def diagnose(
     contacts = find_contacts(whole, whole.residual([]))
     evidence = without(whole, contacts)
     if too_still(evidence):
-        left = evidence.residual([])
-        nothing = fit(evidence, left, [], [])
-        added = [contact.added for contact in contacts]
-        augmented = model.with_effects(added)
-        found = Diagnosis(
-            "effects_found" if contacts else "no_effect" if known_contacts(whole).any() else "cannot_tell",
-            Outcome([], nothing, nothing, left),
-            augmented,
-            None,
-            evidence,
-            contacts,
-            evidence.rows,
-        )
-        stand = standing(evidence, augmented, found.errors()["after"], range(1, model.arm.n + 1))
-        why = [too_still(evidence), *stand.reasons, *own_zeros]
-        return replace(found, standing=replace(stand, reasons=why), zeros=zeros)
-    blocks = len(np.unique(evidence.blocks))
-    progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
-    with Hypotheses(whole, jobs) as panel:
-        account = best_account(whole, contacts, not too_still(whole), progress, panel)
-    evidence, outcome = account.evidence, account.outcome
-    loaded = account_with_load(whole, account, progress, jobs)
-    if loaded is not None:
-        evidence, account, outcome = loaded
-    contacts, unlisted = account.contacts, account.unlisted
+        found = _by_events_alone(whole, evidence, contacts)
+    else:
+        blocks = len(np.unique(evidence.blocks))
+        progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
+        with Hypotheses(whole, jobs) as panel:
+            account = best_account(whole, contacts, not too_still(whole), progress, panel)
+        account = account_with_load(whole, account, progress, jobs) or account
+        found = _concluded(whole, account, progress)
+    stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])
+    return replace(found, standing=stand, zeros=zeros)
+
+
+def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact]) -> Diagnosis:
+    """The verdict on a run in which too little moves to look for anything but events."""
+    left = evidence.residual([])
+    nothing = fit(evidence, left, [], [])
+    augmented = whole.model.with_effects([contact.added for contact in contacts])
+    found = Diagnosis(
+        "effects_found" if contacts else "no_effect" if known_contacts(whole).any() else "cannot_tell",
+        Outcome([], nothing, nothing, left),
+        augmented,
+        None,
+        evidence,
+        contacts,
+        evidence.rows,
+    )
+    stand = standing(evidence, augmented, found.errors()["after"], range(1, whole.model.arm.n + 1))
+    return replace(found, standing=replace(stand, reasons=[too_still(evidence), *stand.reasons]))
+
+
+def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnosis:
+    """The verdict that an account comes to, once reversals are judged, and what an unknown rest outweighs is taken back."""
+    model, evidence, outcome = whole.model, account.evidence, account.outcome
+    contacts, unlisted, sliding = account.contacts, account.unlisted, evidence.rows
     kept = without(whole.only(np.ones_like(whole.rows)), contacts).rows
     if unlisted is not None:
         kept[:, unlisted.joint - 1] = False
-    turned, sliding = judge_reversals(evidence, outcome, kept, progress), evidence.rows
+    turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
     outcome = useful(evidence, outcome)
@@ -301,9 +310,8 @@ def diagnose(
     while True:
         augmented = model.with_effects([*outcome.added(), *(contact.added for contact in contacts)])
         named = bool(outcome.found or contacts)
-        verdict = "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect"
         found = Diagnosis(
-            verdict,
+            "effects_found" if named else "unlisted_effect" if unlisted is not None else "no_effect",
             outcome,
             augmented,
             unlisted,
@@ -321,8 +329,5 @@ def diagnose(
         doubted.append(in_doubt(doubtful.effect.label(), doubtful.share))
         outcome = without_effect(evidence, outcome, doubtful)
         contacts = account.without_effect(outcome).contacts
-    if verdict == "no_effect" and stand.unknown:
-        found = replace(found, verdict="cannot_tell")
-    return replace(
-        found, standing=replace(stand, reasons=[*doubted, *stand.reasons, *own_zeros]), zeros=zeros
-    )
+    verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
+    return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

@@ -24,7 +24,7 @@ from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, stretches
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
@@ -164,7 +164,7 @@ class Evidence:
     @cached_property
     def row_samples(self) -> NDArray[np.intp]:
         """(R,) sample of every stacked row."""
-        return self.kept[np.nonzero(self.rows[self.kept])[0]]
+        return np.nonzero(self.rows)[0]
 
     @cached_property
     def independent(self) -> NDArray[np.intp]:
@@ -250,11 +250,7 @@ def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
     least = _TRAVEL * np.asarray(ranges[0]) if ranges else np.full(motion.joints, _TRAVEL)
     for run in motion.runs():
         for j in range(motion.joints):
-            edges = (
-                np.flatnonzero(np.diff(samples.moving[run, j].astype(np.int8), prepend=0, append=0))
-                + run.start
-            )
-            for first, end in edges.reshape(-1, 2).tolist():
+            for first, end in (stretches(samples.moving[run, j]) + run.start).tolist():
                 if np.ptp(motion.q[first:end, j]) < least[j]:
                     sliding[first:end, j] = False
     return sliding

@@ -12,10 +12,11 @@ from scipy.ndimage import uniform_filter1d
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import CREEP, dry_level
+from armloop.diagnosis.pushes import PAUSE, around
 from armloop.util.arrays import Array
 
-#: Over this many seconds the residual is averaged; bursts this close together are one, shorter ones are none.
-_WINDOW, _PAUSE, _SHORTEST = 0.15, 0.3, 0.15
+#: Over this many seconds the residual is averaged; shorter bursts are none, as those closer than PAUSE are one.
+_WINDOW, _SHORTEST = 0.15, 0.15
 #: The residual must reach this many baselines …
 _RISE = 4.0
 #: … and this many times the most it reaches in the rest of the run; a burst lasts while it is above a part of its peak.
@@ -43,9 +44,7 @@ def outlying(evidence: Evidence, residual: Array) -> list[slice]:
         bursts, cut_off = _bursts(motion, level, float(threshold))
         outside = np.ones(motion.samples, dtype=bool)
         for burst in [*bursts, *cut_off]:
-            start, end = motion.time[burst.start] - _PAUSE, motion.time[burst.stop - 1] + _PAUSE
-            run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
-            outside[run] &= (motion.time[run] < start) | (motion.time[run] > end)
+            outside &= ~around(motion, burst)
         if bursts and outside.any() and _STANDS_OUT * float(level[outside].max()) <= threshold:
             return bursts
     return []
@@ -70,13 +69,13 @@ def _bursts(motion: Motion, level: Array, threshold: float) -> tuple[list[slice]
         above = np.flatnonzero(level[run] > threshold) + run.start
         if len(above) == 0:
             continue
-        gaps = np.flatnonzero(np.diff(motion.time[above]) > _PAUSE)
+        gaps = np.flatnonzero(np.diff(motion.time[above]) > PAUSE)
         for group in np.split(above, gaps + 1):
             peak = float(level[group].max())
             inside = np.flatnonzero(level[group[0] : group[-1] + 1] > _EDGE * peak) + group[0]
             burst = slice(int(inside[0]), int(inside[-1]) + 1)
             start, end = motion.time[burst.start], motion.time[burst.stop - 1]
             first, last = motion.time[run.start], motion.time[run.stop - 1]
-            event = start - first >= _PAUSE and last - end >= _SHORTEST and end - start >= _SHORTEST
+            event = start - first >= PAUSE and last - end >= _SHORTEST and end - start >= _SHORTEST
             (bursts if event else others).append(burst)
     return bursts, others

@@ -63,8 +63,7 @@ def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
     except ShortRunError:
         return np.zeros(model.arm.n)
     evidence = Evidence.of(model, samples, [])
-    rows = np.zeros_like(evidence.rows)
-    rows[evidence.kept] = evidence.rows[evidence.kept]
+    rows = evidence.rows
     left = (evidence.residual([]) / evidence.scale)[rows]
     slopes = np.stack(
         [

@@ -26,7 +26,7 @@ def model() -> ReconstructedModel:
 
 
 def said(model: ReconstructedModel, log: MotionLog) -> str:
-    return misrecorded(model, [log], preprocess([log], model.conditioning))
+    return misrecorded(model, preprocess([log], model.conditioning))
 
 
 def exchanged(log: MotionLog, order: list[int], torques: bool, angle: float = 1.0) -> MotionLog:
@@ -68,7 +68,7 @@ def test_effects_on_the_arm_are_no_other_record(model: ReconstructedModel) -> No
         model.context(samples.motion), {"mass": 30.0, "com": [0.1, 0.0, 0.0], "own_inertia": 0.1}
     )
     heavy = replace(samples, tau=samples.tau + load)
-    assert misrecorded(model, [log], heavy) == ""
+    assert misrecorded(model, heavy) == ""
     assert said(model, replace(log, tau=np.random.default_rng(1).normal(size=log.tau.shape))) == ""
 
 

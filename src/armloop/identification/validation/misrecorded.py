@@ -1,4 +1,4 @@
-"""Logs that contradict a model as a whole: torques in another unit or of the other sign, joints in another order, angles
+"""Gross-error check of logs against a model: torques in another unit or of the other sign, joints in another order, angles
 in another unit.
 
 No effect on an arm multiplies all torques by one factor far from one, or makes the model right for the columns of other
@@ -7,27 +7,24 @@ joints; a diagnosis would name whatever fits such a log least badly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import preprocess, smooth
+from armloop.data.signals import smooth
 from armloop.identification.reconstruction.readings import Reading, readings
-from armloop.identification.scoring import score_errors
+from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import Array
 
-#: Mean relative error from which on a log is asked; the part of each joint's, at most, that what it may mean must leave; and
-#: the samples that other readings are tried on.
-_POOR, _BETTER, _SAMPLES = 0.5, 0.3, 20_000
+#: Mean relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must leave.
+_POOR, _BETTER = 0.5, 0.3
 #: A factor that all torques share to this ratio, and that is so far from one, or negative.
 _ALIKE, _FAR = 1.3, 3.0
-#: What a factor of the torques would be.
+#: What a factor of torques in N·m would be, if it is as near as this ratio.
 _UNITS = {
     1e3: "mN·m",
     1e-3: "kN·m",
@@ -36,33 +33,24 @@ _UNITS = {
     10.1972: "kgf·cm",
     8.85075: "lbf·in",
 }
+_NEAR = 1.2
 
 
-def misrecorded(model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples) -> str:
-    """What is wrong with logs as a whole, and what would be right; empty if nothing is.
+def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
+    """What is wrong with the logs of samples as a whole, and what would be right; empty if nothing is.
 
     Args:
-        samples: of these logs, preprocessed as the model's training logs were.
+        samples: preprocessed as the model's training logs were.
     """
-    predicted = smooth(samples, model.predict(samples.motion))
-    left = _relative(samples.tau - predicted, samples)
+    left = _relative(residual(model, samples), samples)
     if not left.mean() >= _POOR:
         return ""
-    gains = _gains(samples, predicted)
-    gain = float(np.median(gains))
-    same = bool((gains / gain > 1 / _ALIKE).all() and (gains / gain < _ALIKE).all()) if gain else False
-    far = gain < 0 or abs(np.log(max(abs(gain), TINY))) > np.log(_FAR)
-    if (
-        len(gains) > 1
-        and same
-        and far
-        and _far_better(left, _relative(samples.tau - gain * predicted, samples))
-    ):
-        return _factor(gain)
-    some = [log.select(slice(0, _SAMPLES // len(logs))) for log in logs]
-    for words, read in _others(model.arm):
-        other = preprocess([read(log) for log in some], model.conditioning)
-        if _far_better(left, _relative(other.tau - smooth(other, model.predict(other.motion)), other)):
+    predicted = smooth(samples, model.predict(samples.motion))
+    gain = _common_gain(samples, predicted)
+    if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples)):
+        return _factor(gain, "A" if model.in_amperes else "N·m (N)")
+    for words, other in _read_otherwise(samples, model.arm):
+        if _far_better(left, _relative(residual(model, other), other)):
             return words
     return ""
 
@@ -77,38 +65,49 @@ def _far_better(left: Array, other: Array) -> bool:
     return bool((other <= _BETTER * left).all())
 
 
-def _gains(samples: Samples, predicted: Array) -> Array:
-    """(m,) measured torque per predicted torque of each joint that slides, by least squares."""
-    found = []
-    for tau, own, moving in zip(samples.tau.T, predicted.T, samples.moving.T, strict=True):
-        if moving.any() and own[moving].any():
-            found.append(float(tau[moving] @ own[moving] / (own[moving] @ own[moving])))
-    return np.array(found)
+def _common_gain(samples: Samples, predicted: Array) -> float:
+    """The factor, far from one or negative, of the torques (N, n) of all joints that slide; 0 if they share none."""
+    pairs = zip(samples.tau.T, predicted.T, samples.moving.T, strict=True)
+    slid = [(tau[moving], own[moving]) for tau, own, moving in pairs if own[moving].any()]
+    gains = np.array([tau @ own / (own @ own) for tau, own in slid])
+    gain = float(np.median(gains)) if len(gains) > 1 else 0.0
+    alike = gain != 0.0 and bool((gains / gain > 1 / _ALIKE).all() and (gains / gain < _ALIKE).all())
+    return gain if alike and (gain < 0 or not 1 / _FAR <= gain <= _FAR) else 0.0
 
 
-def _factor(gain: float) -> str:
-    if abs(np.log(abs(gain))) <= np.log(_ALIKE):
+def _factor(gain: float, unit: str) -> str:
+    if 1 / _ALIKE <= -gain <= _ALIKE:
         return "the sign of all joints' tau is turned: torque must be what the drive does on the joint in the direction of q"
-    unit = min(_UNITS, key=lambda factor: abs(np.log(abs(gain) / factor)))
-    near = abs(np.log(abs(gain) / unit)) < 0.2
-    guess = f", as if tau were in {_UNITS[unit]}" if near else ""
-    return f"all torques are about {float(f'{gain:.2g}'):g} times what the model gives{guess}; give tau in N·m (N)"
+    known = [name for factor, name in _UNITS.items() if unit != "A" and 1 / _NEAR <= gain / factor <= _NEAR]
+    guess = f", as if tau were in {known[0]}" if known else ""
+    return f"all torques are about {float(f'{gain:.2g}'):g} times what the model gives{guess}; give tau in {unit}"
 
 
-def _others(arm: Arm) -> Iterator[tuple[str, Callable[[MotionLog], MotionLog]]]:
-    """Every other reading of a log in words, and how to read it so; the torques, too, or the motion alone."""
+def _read_otherwise(samples: Samples, arm: Arm) -> Iterator[tuple[str, Samples]]:
+    """Every other reading of samples, in words and as they would be; of torques and motion, or of the motion alone."""
     for reading in readings(arm):
-        whole = partial(reading.of, arm=arm)
         if reading.unit:
-            yield f"angles seem to be in {reading.unit}; give q in rad and v in rad/s", whole
+            yield (
+                f"angles seem to be in {reading.unit}; give q in rad and v in rad/s",
+                _read(samples, reading, arm),
+            )
             continue
         order = f"taken as {', '.join(str(k + 1) for k in reading.order)}, base to tip, the model explains the log"
+        whole = _read(samples, reading, arm)
         yield f"joints are in another order: {order}; number them from the base to the tip", whole
         yield (
             f"q and v are those of other joints than tau: {order}; put all columns in one order",
-            partial(_motion, reading, arm),
+            replace(whole, tau=samples.tau),
         )
 
 
-def _motion(reading: Reading, arm: Arm, log: MotionLog) -> MotionLog:
-    return replace(reading.of(log, arm), tau=log.tau)
+def _read(samples: Samples, reading: Reading, arm: Arm) -> Samples:
+    """Filters treat every column alike, so that what passed them can be read otherwise as well as the record."""
+    motion, scale, order = samples.motion, reading.scale(arm), reading.order
+    q, v, vdot = (scale * x[:, order] for x in (motion.q, motion.v, motion.vdot))
+    return replace(
+        samples,
+        motion=replace(motion, q=q, v=v, vdot=vdot),
+        tau=samples.tau[:, order],
+        moving=samples.moving[:, order],
+    )
