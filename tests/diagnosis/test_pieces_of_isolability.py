@@ -7,16 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import three_axis
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows
-from armloop.diagnosis import confounded, isolability, next_run, planning
+from armloop.diagnosis import confounded, isolability, next_run
 from armloop.diagnosis.confounded import Law, Rivalry, _share_joints
 from armloop.diagnosis.isolability import Part, Stage, left
-from armloop.experiment.excitation import MotionRanges
 from armloop.model import AddedEffect
-from armloop.util.errors import InputError
 
 
 class TestIsolability:
@@ -358,98 +355,3 @@ class TestNextRun:
         assert (made.purpose, made.sharper, made.joint, made.told[0].then) == ("unlisted", [], 2, None)
         made = self.designed(monkeypatch, [])
         assert (made.purpose, made.sharper, made.joint) == ("precision", ["sharper"], None)
-
-
-class TestDesign:
-    def test_a_wish_is_for_whole_periods_within_limits(self) -> None:
-        for asked, made in ((12.0, 20.0), (20.0, 20.0), (20.1, 40.0), (60.0, 60.0)):
-            wish = planning.Wish(duration=asked)
-            wish.check()
-            assert wish.whole_duration == made
-        planning.Wish(duration=3600.0, reserve=0.0).check()
-        for wrong in ({"duration": 11.9}, {"duration": 3601.0}, {"reserve": 1.0}, {"reserve": -0.1}):
-            with pytest.raises(InputError, match=r"^(next run of|reserve)"):
-                planning.Wish(**wrong).check()
-
-    def test_functions_of_which_a_law_may_be_made(self) -> None:
-        ends = np.array([1.0, 2.0])
-        ranges = MotionRanges(-ends + 1, ends + 1, np.array([2.0, 4.0]), np.array([5.0, 10.0]))
-        columns, names = planning._anything(ranges, 1)
-        motion = Motion(
-            np.zeros(2),
-            np.array([[1.5, 2.0], [9.0, -9.0]]),
-            np.array([[1.0, -2.0], [0.0, 0.0]]),
-            np.array([[2.5, 5.0]] * 2),
-            np.array([0]),
-        )
-        X = columns(motion)[:, 0]
-        assert X.shape == (2, len(names)) == (2, 23)
-        x, v = 0.5, -0.5  # of the second joint, in its range; the law's direction fades in at 0.02 * 4 rad/s
-        places, speeds = [1, x, 2 * x**2 - 1, 4 * x**3 - 3 * x], [1, v, v**2, np.tanh(-2 / 0.08)]
-        own = [a * b for a in places for b in speeds]
-        np.testing.assert_allclose(X[0], [*own, 0.5, 0.5, -0.5, 0.5, 0.25, -0.25, 0.5], atol=1e-12)
-        # no farther than 1.2 of the range
-        assert X[1, 4] == pytest.approx(-1.2) and X[1, 17] == pytest.approx(1.2)
-
-    def test_where_a_model_knows_its_arm(self) -> None:
-        arm = three_axis()
-        low, high, fastest = (
-            np.array([getattr(j, k) for j in arm.joints]) for k in ("lower", "upper", "velocity")
-        )
-        model: Any = SimpleNamespace(arm=arm, history={})
-        assert np.array_equal(planning.training_ranges(model).lower, MotionRanges.of(arm).lower)
-        model.history["range"] = [[0.1, 0.0, 99.0], [0.2, 0.0, 99.0], [0.3, 0.0, 4.0], [0.05, 0.0, 0.0]]
-        found = planning.training_ranges(model)
-        assert found.lower[0] == pytest.approx(-0.05) and found.upper[0] == pytest.approx(0.15)
-        assert found.velocity[0] == pytest.approx(0.2) and found.acceleration[[0, 2]] == pytest.approx(
-            [0.3, 4.0]
-        )
-        assert found.lower[2] == low[2] and found.upper[2] == high[2] and found.velocity[2] == fastest[2]
-        assert 0 < found.upper[1] - found.lower[1] < 1e-4 and 0 < found.velocity[1] < 1e-4
-
-    @pytest.mark.parametrize(
-        ("left", "known", "rounds", "made"),
-        [
-            ([(0.5, 0.1), (0.5, 0.2)], False, 2, 2),
-            ([(0.5, 0.1), (0.5, 0.05)], False, 2, 1),
-            ([(0.5, 0.1), (0.31, 0.1)], False, 2, 1),  # what is far enough already counts no more
-            ([(0.5, 0.1), (0.29, 0.2)], False, 2, 2),
-            ([(0.5, 0.31)], False, 1, 1),
-            ([(0.5, 0.1)], True, 1, 1),  # the rival comes no nearer elsewhere
-        ],
-    )
-    def test_a_motion_is_designed_anew_with_what_rivals_turn_out_to_be_able_to(
-        self, left: list[Any], known: bool, rounds: int, made: int, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        stages = iter(range(len(left)))
-        monkeypatch.setattr(Stage, "of_reference", staticmethod(lambda evidence, reference: next(stages)))
-        law: Any = SimpleNamespace()
-
-        def way(k: int, shape: float) -> Any:
-            rival = SimpleNamespace(effect=SimpleNamespace(place=("a", k, None)), shape=shape)
-            nearer = SimpleNamespace(
-                law=law, rival=SimpleNamespace(effect=rival.effect, shape=shape + (not known))
-            )
-            return SimpleNamespace(
-                law=law, rival=rival, left=lambda stage: left[stage][k], hardest=lambda stage: nearer
-            )
-
-        asked: list[int] = []
-
-        class Known(planning.Planner):
-            def __init__(self) -> None:
-                object.__setattr__(self, "progress", lambda text: None)
-                object.__setattr__(self, "evidence", None)
-
-            def _regression(self, ways: Any) -> Any:
-                asked.append(len(ways))
-                return None, []
-
-            def _optimised(self, regression: Any, criterion: Any) -> Any:
-                return len(asked)
-
-            def whole(self, design: Any) -> Any:
-                return design
-
-        design: Any = Known().alternatives([way(0, 0.0), way(1, 0.0)])
-        assert design == made and asked == [2, 3][:rounds]

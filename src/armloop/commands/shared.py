@@ -10,7 +10,8 @@ from typing import Any
 
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
 from armloop.commands.options import Options
-from armloop.data.log import GAINS, MotionLog, check_header, read_log
+from armloop.data.header import check_header
+from armloop.data.log import GAINS, MotionLog, read_log
 from armloop.data.repeats import require_not_fitted
 from armloop.data.signals import preprocess
 from armloop.model import ReconstructedModel, load_model

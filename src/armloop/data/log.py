@@ -6,8 +6,7 @@ The file is CSV, or Parquet with the same columns: `time,q1..qn,v1..vn,tau1..tau
 SI units; joints numbered from 1, base to tip. Columns of any other name are left alone.
 """
 
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from html import escape
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armloop.data.header import check_header, joints_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
@@ -35,8 +35,6 @@ GAP_PERIODS = 10.0
 FEWEST_SAMPLES = 20
 #: N*m/A (N/A): from below that of a watch to above that of a crane.
 GAINS = (1e-6, 1e6)
-
-_JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,7 +141,7 @@ class MotionLog:
                 "time,q1..,v1..,tau1.., or arrays to MotionLog.from_arrays"
             )
         header = [str(column) for column in names]
-        n, _ = _columns(Path(name), header)
+        n, _ = joints_of(Path(name), header)
         if joints is not None and n != joints:
             raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
         kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
@@ -317,67 +315,6 @@ def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
     first : the row of the file that the first sample stands in, counted from 0
     """
     _check(log, str(path), lambda row: place(path, first + row))
-
-
-def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
-    """Return the number of joints of a file and whether accelerations are there, from its header alone.
-
-    joints : how many joints the arm has; None takes what the file has
-
-    Raises `LogError` when the file is missing or its columns are not those of a log.
-    """
-    n, has_vdot = _columns(path, read_header(path))
-    if joints is not None and n != joints:
-        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
-    return n, has_vdot
-
-
-def _columns(path: Path, header: Sequence[str]) -> tuple[int, bool]:
-    if header and header[0].startswith(("#", "%", "//")):
-        raise LogError(
-            f"{path}: line 1 is a comment, {header[0][:40]!r}; the first line must name the columns: take it out, or let "
-            "`armloop convert` read the file"
-        )
-    if len(header) == 1 and re.search(r"[;\t ]", header[0]):
-        raise LogError(
-            f"{path}: the header is one column, {header[0][:40]!r}; put commas between the names, or let `armloop convert` "
-            "read the file"
-        )
-    found: dict[str, set[int]] = {"q": set(), "v": set(), "tau": set(), "vdot": set()}
-    for name in header:
-        match = _JOINT_COLUMN.fullmatch(name)
-        if match is None and name != "time":
-            continue
-        if header.count(name) > 1:
-            raise LogError(f"{path}: column {name} stands {header.count(name)} times; each must stand once")
-        if match is not None:
-            kind, number = match[1], int(match[2])
-            if name != f"{kind}{number}" or number == 0:
-                raise LogError(
-                    f"{path}: column {name}: joints are numbered {kind}1, {kind}2, ... from the base"
-                )
-            found[kind].add(number)
-    n = max((number for numbers in found.values() for number in numbers), default=1)
-    # A header without any q is none: v may be missing only where it can be differentiated.
-    kinds = [
-        "q",
-        *(["v"] if found["v"] or not found["q"] else []),
-        "tau",
-        *(["vdot"] if found["vdot"] else []),
-    ]
-    missing = [] if "time" in header else ["time"]
-    missing += [f"{kind}{j}" for kind in kinds for j in range(1, n + 1) if j not in found[kind]]
-    if missing:
-        raise LogError(
-            f"{path}: the header lacks {_listed(missing)}; "
-            "it must be time,q1..qn,v1..vn,tau1..taun (optionally vdot1..vdotn; v may be left out) with one n; "
-            "`armloop convert` reads other names and units"
-        )
-    return n, bool(found["vdot"])
-
-
-def _listed(names: Sequence[str], most: int = 6) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float64]:

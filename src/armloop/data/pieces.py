@@ -15,7 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from armloop.data.log import MotionLog, check_header, read_log
+from armloop.data.header import check_header
+from armloop.data.log import MotionLog, read_log
 from armloop.data.tables import count_rows
 from armloop.util.errors import LogError
 

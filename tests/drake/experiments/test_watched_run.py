@@ -85,16 +85,20 @@ def test_a_change_is_named_and_supplied(scenario, model, case) -> None:
     assert np.abs(np.diff(found.supplied, axis=0))[steady].max() < 0.05 * np.abs(found.supplied).max()
 
 
-def test_the_noise_of_a_run_is_drawn_from_the_scenarios_seed(
-    scenario, model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monitors: list[Named] = []
+@pytest.fixture
+def monitors(monkeypatch: pytest.MonkeyPatch) -> "list[Named]":
+    """The monitors of watched runs, in order: they name what they are told to."""
+    made: list[Named] = []
 
     def monitor(model, learn: float) -> Named:
-        monitors.append(Named(model, learn))
-        return monitors[-1]
+        made.append(Named(model, learn))
+        return made[-1]
 
     monkeypatch.setattr(watched_run, "ResidualMonitor", monitor)
+    return made
+
+
+def test_the_noise_of_a_run_is_drawn_from_the_scenarios_seed(scenario, model, monitors) -> None:
     instruments = dataclasses.replace(scenario.plant.config.instruments, torque_noise=0.02)
     config = dataclasses.replace(scenario.plant.config, instruments=instruments)
     brief = dataclasses.replace(
@@ -229,16 +233,7 @@ class Named(LeafSystem):
         return SimpleNamespace(alarmed=int(time >= 0.2 - 1e-9), known=self.known(time))
 
 
-def test_a_run_is_scored_before_during_and_after_its_change(
-    scenario, model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monitors: list[Named] = []
-
-    def monitor(model, learn: float) -> Named:
-        monitors.append(Named(model, learn))
-        return monitors[-1]
-
-    monkeypatch.setattr(watched_run, "ResidualMonitor", monitor)
+def test_a_run_is_scored_before_during_and_after_its_change(scenario, model, monitors) -> None:
     config = dataclasses.replace(scenario.plant.config, instruments=Instruments(torque_noise=0.0))
     reference = dataclasses.replace(scenario.reference, duration=1.7)
     # without an integrator, of whose torque what it learned would be taken off

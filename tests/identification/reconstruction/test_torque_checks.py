@@ -11,7 +11,7 @@ import pytest
 from synthetic import fourier_motion, friction, measured, rigid_torque, standing, three_axis
 
 from armloop.data.log import MotionLog, read_log, unchecked_log
-from armloop.identification.reconstruction import plain_fits, reconstruct, torque_checks
+from armloop.identification.reconstruction import reconstruct, torque_checks
 from armloop.identification.reconstruction.bandwidth import Table
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.robot.arm import load_arm
@@ -355,53 +355,6 @@ class TestExchanges:
         assert fits.better_exchanged(plain) == [(1, 2)]
 
 
-def test_errors_friction_and_inertia_of_a_fit() -> None:
-    """Two joints, one base parameter that is an inertia of both, and the friction of each."""
-    rng = np.random.default_rng(0)
-    N = 400
-    v, vdot = rng.normal(size=(2, N, 2))
-    columns = np.zeros((N, 2, 7))
-    for j in range(2):
-        columns[:, j, 0] = vdot[:, j]
-        columns[:, j, 1 + 3 * j : 4 + 3 * j] = np.stack([np.sign(v[:, j]), v[:, j], np.ones(N)], axis=1)
-    noise = 0.1 * rng.normal(size=(N, 2))
-    tau = 2.0 * vdot + noise
-    tau[:, 0] += 0.5 * np.sign(v[:, 0]) - 0.2 * v[:, 0]
-    moving = np.ones((N, 2), dtype=bool)
-    moving[:50, 1] = False
-    table = Table(columns, tau, np.arange(N) // 10, moving, standing(N, 2), 1)
-    mass = np.zeros((3, 2, 2, 1))
-    mass[:, 0, 0, 0], mass[:, 1, 1, 0] = [1.0, 2.0, 3.0], 5.0
-    problem = torque_checks.Problem(table, mass, 1)
-    found = problem.fit(np.ones(2), np.arange(2))
-    sizes = [np.sqrt(np.mean(tau[rows, j] ** 2)) for j, rows in enumerate(moving.T)]
-    np.testing.assert_allclose(found.relative, 0.1 / np.array(sizes), rtol=0.08)
-    np.testing.assert_allclose(found.inertia, [4.0, 10.0], rtol=0.01)
-    # of Coulomb friction's power against that of the drag that drives
-    brakes, drives = 0.5 * np.abs(v[:, 0]).sum(), 0.2 * (v[:, 0] ** 2).sum()
-    assert found.power[0] == pytest.approx((brakes - drives) / (brakes + drives), abs=0.03)
-    assert found.power[1] == 0.0  # friction of less than a fiftieth of the torque says nothing
-    assert problem.fit(np.full(2, 10.0), np.arange(2)).power.tolist() == pytest.approx(found.power.tolist())
-    for level, brake in ((0.015, 0.0), (0.03, 1.0)):
-        tau[:, 1] += level * sizes[1] * np.sign(v[:, 1])
-        assert problem.fit(np.ones(2), np.arange(2)).power[1] == pytest.approx(brake, abs=0.2)
-        tau[:, 1] -= level * sizes[1] * np.sign(v[:, 1])
-    turned = problem.fit(-np.ones(2), np.arange(2))
-    np.testing.assert_allclose(turned.power, -found.power)
-    np.testing.assert_allclose(turned.inertia, -found.inertia)
-    exchanged = problem.fit(np.ones(2), np.array([1, 0]))
-    assert (exchanged.relative > 0.9).all()
-    # a half of the blocks alone
-    own = table.blocks % 2 == 0
-    tau[~own] = 0.0
-    half = problem.fit(np.ones(2), np.arange(2), 0)
-    for j in range(2):
-        rows = own & moving[:, j]
-        expected = np.linalg.norm(noise[rows, j]) / np.linalg.norm(tau[rows, j])
-        assert half.relative[j] == pytest.approx(expected, rel=0.05)
-    assert problem.fit(np.ones(2), np.arange(2), 1).relative.tolist() == pytest.approx([0.0, 0.0], abs=1e-6)
-
-
 def small_problem() -> torque_checks.Problem:
     """Two joints with two shared parameters and the friction of each; neither is explained but for noise."""
     rng = np.random.default_rng(7)
@@ -455,18 +408,3 @@ def test_the_factor_of_a_torque_is_that_with_which_all_are_explained_best(joint:
     below, at, above = (left(factor) for factor in (0.0, 1.0, 2.0))
     vertex = 1 - (above - below) / (2 * (above - 2 * at + below))
     assert problem._factor(joint, half) == pytest.approx(vertex, rel=1e-4)
-
-
-@pytest.mark.parametrize(("counts", "enough"), [((200, 300), True), ((300, 199), False), ((199, 199), False)])
-def test_each_joint_has_two_hundred_instants(
-    counts: tuple[int, int], enough: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    moving = np.arange(300)[:, None] < np.array(counts)
-    table = Table(
-        np.zeros((300, 2, 8)), np.zeros((300, 2)), np.zeros(300, np.intp), moving, standing(300, 2), 1
-    )
-    monkeypatch.setattr(plain_fits, "table_at", lambda *_, **how: table)
-    problem = torque_checks.Problem.of([run(seconds=2.0)], three_axis(), 10.0)
-    assert (problem is not None) == enough
-    if problem is not None:
-        assert len(problem.table.tau) == 100 and len(problem.mass) == 67  # every third of 200 postures

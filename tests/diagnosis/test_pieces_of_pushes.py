@@ -1,0 +1,140 @@
+"""The size, interval and trial of a push, on numbers small enough to see through."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import three_axis
+
+from armloop.data.motion import Motion
+from armloop.diagnosis import pushes
+from armloop.laws.effects import effect
+
+
+def motion(lengths: tuple[int, ...], joints: int = 1) -> Motion:
+    """Runs of so many samples, 0.01 s each, at rest, 5 s apart."""
+    N, starts = sum(lengths), np.cumsum([0, *lengths[:-1]])
+    time = np.arange(N) * 0.01 + 5.0 * (np.searchsorted(starts, np.arange(N), side="right") - 1)
+    return Motion(time, *np.zeros((3, N, joints)), starts)
+
+
+class TestSizeOfAPush:
+    def test_a_direction_that_is_hardly_felt_tells_nothing(self) -> None:
+        for felt, size in ((0.031, 2.0), (0.029, 0.0)):
+            columns = np.array([[[1.0, 0.0]], [[0.0, felt]]])
+            y = np.array([[3.0], [2.0 * felt]])
+            np.testing.assert_allclose(pushes._size(columns, y), [3.0, size])
+
+    def test_its_error_counts_pieces_and_what_is_not_felt_may_be_as_large_as_what_is(self) -> None:
+        columns = np.zeros((4, 1, 2))
+        columns[:, 0, 0] = 1.0
+        left, pieces = np.array([[1.0], [2.0], [3.0], [-1.0]]), np.array([0, 0, 1, 1])
+        error = pushes._size_error(columns, np.array([3.0, 4.0]), left, pieces)
+        # scores of the pieces 3 and 2, over four samples
+        np.testing.assert_allclose(error, [np.sqrt(13) / 4, 5.0])
+        # felt by a hundredth: still felt enough for the error that its square has
+        columns[:, 0, 1] = [0.05, -0.05, 0.05, -0.05]
+        error = pushes._size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces)
+        np.testing.assert_allclose(error, 0.0, atol=1e-6)
+        columns[:, 0, 1] /= 2
+        np.testing.assert_allclose(
+            pushes._size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces), [0.0, 5.0], atol=1e-6
+        )
+
+
+class TestIntervalOfAPush:
+    KIND = SimpleNamespace(columns=lambda evidence, part: np.ones((len(part.time), 1, 1)))
+
+    def found(self, burst: tuple[int, int], reach: float = 0.05, **of: Any) -> tuple[int, int]:
+        given = motion(of.get("lengths", (200,)))
+        evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given, reach=reach, period=0.01))
+        residual = np.zeros((given.samples, 1))
+        residual[slice(*of.get("true", (50, 100)))] = 3.0
+        kind: Any = self.KIND
+        found = pushes._interval(evidence, residual, np.ones_like(residual), slice(*burst), kind)
+        return found.start, found.stop
+
+    def test_it_is_where_the_push_explains_most_in_and_around_the_burst(self) -> None:
+        assert self.found((40, 110)) == self.found((60, 80)) == self.found((55, 130)) == (50, 100)
+        # no further than 0.3 s away
+        assert self.found((90, 110), true=(40, 150)) == (60, 140)
+        assert self.found((90, 100), true=(40, 150)) == (60, 130)
+        # nor beyond its run
+        assert self.found((90, 98), true=(40, 150), lengths=(100, 100))[1] == 100
+        assert self.found((102, 110), true=(40, 150), lengths=(100, 100))[0] == 100
+
+    def test_its_size_is_that_of_its_middle(self) -> None:
+        # the reach, but no more than a fifth, is left aside at each end: of 20 samples four
+        assert self.found((90, 96), true=(90, 93)) == (90, 96)  # an instant is none
+        assert self.found((90, 94), reach=0.0, true=(90, 94)) == (90, 94)
+        assert self.found((90, 110), true=(90, 94)) == (90, 110)
+        assert self.found((90, 110), true=(90, 95), reach=1.0) == (90, 95)
+        assert self.found((90, 110), true=(92, 110), reach=0.0) == (92, 110)
+        # four samples are more than an instant
+        assert self.found((88, 96), true=(90, 94), reach=0.0) == (90, 94)
+        assert self.found((88, 96), true=(90, 93), reach=0.0) == (88, 96)
+
+
+class TestTrialOfAPush:
+    def trial(self, residual: np.ndarray, monkeypatch: pytest.MonkeyPatch, **of: float) -> Any:
+        arm, given = three_axis(), motion((len(residual),), 3)
+        samples = SimpleNamespace(motion=given, period=0.01, reach=of.get("reach", 0.02))
+        evidence: Any = SimpleNamespace(
+            samples=samples, scale=np.array([0.5, 1.0, 2.0]), model=SimpleNamespace(arm=arm)
+        )
+        monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
+        kind = pushes._Kind(effect("external_torque", 1))
+        return pushes._trial(
+            evidence, residual, np.ones((len(residual), 3)) / evidence.scale, slice(20, 60), kind, [0]
+        )
+
+    def test_a_torque_is_found_with_its_interval_and_what_it_removes(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        residual = np.zeros((100, 3))
+        residual[20:60, 0], residual[20:60, 2] = 2.0, 0.4
+        found = self.trial(residual, monkeypatch)
+        parameters = found.added.parameters
+        assert (parameters["torque"].value, parameters["torque"].std_error) == pytest.approx((2.0, 0.0))
+        assert (parameters["start"].value, parameters["end"].value) == pytest.approx((0.2, 0.59))
+        assert parameters["start"].std_error == pytest.approx(0.03)
+        np.testing.assert_allclose(found.before, [2.0, 0.0, 0.4])
+        np.testing.assert_allclose(found.after, [0.0, 0.0, 0.4], atol=1e-12)
+        # weighted by their baselines, 4 of joint 1 against 0.2 of joint 3
+        assert found.share == pytest.approx(1 - 0.2**2 / (4.0**2 + 0.2**2))
+        # what a joint that showed no event leaves there is not to be explained by one
+        assert found.own == pytest.approx(1.0)
+        assert self.trial(residual, monkeypatch, reach=0.0).added.parameters["end"].std_error == 0.01
+        assert self.trial(0 * residual, monkeypatch) is None
+
+    @pytest.mark.parametrize(("shown", "is_one"), [([0], True), ([0, 2], False)])
+    def test_it_must_explain_the_joints_that_show_it(
+        self, shown: list[int], is_one: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        given = motion((100,), 3)
+        samples = SimpleNamespace(motion=given, period=0.01, reach=0.02)
+        evidence: Any = SimpleNamespace(
+            samples=samples, scale=np.ones(3), model=SimpleNamespace(arm=three_axis())
+        )
+        monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
+        residual = np.zeros((100, 3))
+        residual[20:60, 0] = 2.0
+        residual[20:60, 2] = np.where(np.arange(40) % 2, -3.0, 3.0)  # which no push is
+        found = pushes.push(evidence, residual, slice(20, 60), np.ones((100, 3), dtype=bool), shown)
+        assert (found is not None) == is_one
+
+    def test_what_it_removes_is_counted_where_it_was_not_fitted(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        residual = np.zeros((100, 3))
+        # a tenth of a second up, a tenth down, and so on: each half of the pieces foretells the other wrongly
+        residual[20:60, 0] = np.where(np.arange(40) // 10 % 2, -1.0, 1.0)
+        found = self.trial(residual, monkeypatch)
+        assert found.share == pytest.approx(1 - 4.0)
+        assert found.after[0] == pytest.approx(2.0)
+        assert found.added.parameters["torque"].value == pytest.approx(0.0, abs=1e-12)
+        # scores of four pieces, ±10 (of 0.5 N·m) each, over 40 samples
+        assert found.added.parameters["torque"].std_error == pytest.approx(20 / 40)
