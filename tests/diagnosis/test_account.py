@@ -126,3 +126,30 @@ def test_the_search_is_made_anew_once_if_the_torque_is_late(
     assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
     assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
     assert asked == [searches]
+
+
+def test_without_an_effect_those_events_stay_that_are_one_without_it_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two events, of five samples, of which the first is one without the effect, too; a third one shows without it alone."""
+
+    def event(sample: int) -> Any:
+        return SimpleNamespace(rows=np.arange(5) == sample)
+
+    first, second, fresh = event(1), event(3), event(4)
+    asked: list[Any] = []
+
+    def find(whole: Any, residual: Any, added: Any) -> list[Any]:
+        asked.append((whole, residual, added))
+        return [event(1), fresh]
+
+    monkeypatch.setattr(accounts, "find_contacts", find)
+    monkeypatch.setattr(Account, "remaining", lambda account: f"without {account.outcome.name}")
+    whole: Any = "run"
+    nothing: Any = None
+    fewer: Any = SimpleNamespace(name="spring", added=lambda: ["drag"])
+    found = Account(whole, [first, second], nothing, nothing, nothing).without_effect(fewer)
+    assert [contact.rows.tolist() for contact in found.contacts] == [first.rows.tolist()]
+    assert found.outcome is fewer and asked == [("run", "without spring", ["drag"])]
+    bare = Account(whole, [], nothing, nothing, nothing).without_effect(fewer)
+    assert bare.outcome is fewer and bare.contacts == [] and len(asked) == 1

@@ -15,13 +15,15 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import preprocess
 from armloop.diagnosis import carried as carrying
 from armloop.diagnosis import diagnose
-from armloop.diagnosis.carried import find_carried
+from armloop.diagnosis.account import best_account
+from armloop.diagnosis.carried import account_with_load, find_carried
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.next_run import next_run
 from armloop.laws.effects import Context, effect, hypotheses
 from armloop.laws.effects.payload import Payload
 from armloop.model import ReconstructedModel
 from armloop.reports.findings import findings
+from armloop.util.progress import silent
 
 LOAD = {"mass": 0.4, "com": [0.03, -0.02, 0.05], "own_inertia": 0.0}
 TIMES = [(2.5, 7.0), (11.0, 16.0), (21.0, 24.5)]
@@ -199,3 +201,14 @@ def test_a_start_of_too_few_samples_explains_nothing(
 
     monkeypatch.setattr(carrying, "_starts", few)
     assert find_carried(judged) is None
+
+
+def test_the_account_with_a_load_is_one_of_the_model_as_it_is(model: ReconstructedModel) -> None:
+    """What remains of it is what the model leaves with the load once, not twice."""
+    whole = evidence(model, run(1, TIMES))
+    account = best_account(whole, [], True, silent)
+    found = account_with_load(whole, account, silent, 1)
+    assert found is not None and found.whole.model is model
+    assert [each.effect.name for each in found.outcome.found] == ["carried_load"]
+    left = np.sqrt(np.mean((found.remaining() / whole.scale)[found.evidence.rows] ** 2))
+    assert left < 1.5 < np.sqrt(np.mean((whole.residual([]) / whole.scale)[found.evidence.rows] ** 2)) / 2

@@ -140,7 +140,7 @@ class Answers:
 def judged(jobs: int | None = None) -> Any:
     """The diagnosis of a log of three joints."""
     model: Any = SimpleNamespace(
-        recorded={"unit": "N*m", "drive_gains": None},
+        in_amperes=False,
         arm=SimpleNamespace(n=3, name="arm", joints=()),
         conditioning=None,
         with_effects=lambda added: ("with", *added),
@@ -230,12 +230,12 @@ def test_what_moves_only_beside_its_events_is_told_to_the_search(monkeypatch: py
 def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     Answers(monkeypatch)
     arm = SimpleNamespace(n=3, name="arm")
-    for unit, gains, joints, says in (
-        ("A", None, 3, "reconstruct it with --drive-gains"),
-        ("A", [1.0], 2, "run: 2 joints, but the model's arm arm has 3"),
-        ("N*m", None, 4, "run: 4 joints"),
+    for currents, joints, says in (
+        (True, 3, "reconstruct it with --drive-gains"),
+        (False, 2, "run: 2 joints, but the model's arm arm has 3"),
+        (False, 4, "run: 4 joints"),
     ):
-        model: Any = SimpleNamespace(recorded={"unit": unit, "drive_gains": gains}, arm=arm)
+        model: Any = SimpleNamespace(in_amperes=currents, arm=arm)
         logs: Any = [SimpleNamespace(name="run", joints=joints)]
         with pytest.raises(InputError, match=says):
             diagnose(model, logs)

@@ -235,7 +235,7 @@ def diagnose(
     Raises:
         InputError: the logs do not fit the model.
     """
-    if model.recorded["unit"] == "A" and model.recorded["drive_gains"] is None:
+    if model.in_amperes:
         raise InputError(
             "the model predicts motor currents (A), in which no effect has its physical size; "
             "reconstruct it with --drive-gains K1,..,KN (N·m/A)"

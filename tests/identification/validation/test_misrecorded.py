@@ -57,6 +57,35 @@ def test_units_signs_and_orders_are_told(model: ReconstructedModel, seed: int) -
     assert said(model, turns) == "angles seem to be in revolutions; give q in rad and v in rad/s"
 
 
+@pytest.mark.parametrize(
+    ("factor", "said_to_be"),
+    [(2.9, ""), (3.1, "about 3.1 times"), (0.34, ""), (0.32, "about 0.32 times"), (1 / 9.8, "in kgf·m"), (1e-3, "in kN·m"),
+     (-0.9, "the sign of all"), (-4.0, "about -4 times")],
+)  # fmt: skip
+def test_a_factor_is_told_from_three_times_on_or_with_the_other_sign(
+    model: ReconstructedModel, factor: float, said_to_be: str
+) -> None:
+    log = run(5, 12.0)
+    words = said(model, replace(log, tau=factor * log.tau))
+    assert (said_to_be in words) == (words != "") if said_to_be else words == ""
+
+
+def test_of_currents_no_unit_of_torque_is_guessed(model: ReconstructedModel) -> None:
+    log = run(5, 12.0)
+    milli = replace(log, tau=1e3 * log.tau)
+    assert said(model, milli).endswith("as if tau were in mN·m; give tau in N·m (N)")
+    currents = replace(model, recorded={"unit": "A", "drive_gains": None})
+    assert said(currents, milli) == "all torques are about 1000 times what the model gives; give tau in A"
+
+
+def test_joints_that_do_not_share_a_factor_have_none_in_common(model: ReconstructedModel) -> None:
+    log = run(6, 12.0)
+    assert said(model, replace(log, tau=log.tau * [5.0, 5.0, 9.0])) == ""
+    assert said(model, replace(log, tau=log.tau * [5.0, 5.0, 6.0])).startswith(
+        "all torques are about 5 times"
+    )
+
+
 def test_effects_on_the_arm_are_no_other_record(model: ReconstructedModel) -> None:
     log = run(3, 15.0)
     samples = preprocess([log], model.conditioning)
