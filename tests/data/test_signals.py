@@ -12,6 +12,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import (
     Conditioning,
     ShortRunError,
+    _thinned,
     as_torque,
     derivative,
     independent_rows,
@@ -296,6 +297,16 @@ def test_logs_of_several_rates_are_one_rate_that_of_the_slowest():
     assert moving[0] == pytest.approx(moving[1], abs=0.02) and moving[0] < 1
 
 
+def test_on_a_coarser_grid_a_joint_slides_where_it_did_before_and_after():
+    time = np.arange(6) * 0.004
+    flags = np.array([[True], [True], [False], [True], [True], [True]])
+    values = [np.arange(6.0)[:, None] for _ in range(4)]
+    part = _thinned((time, *values, flags, ~flags), 0.006)
+    np.testing.assert_allclose(part[0], [0.0, 0.006, 0.012, 0.018])
+    # at 6 ms it slides at 4 and not at 8, where its torque is lost
+    assert part[5][:, 0].tolist() == [True, False, False, True] == (~part[6][:, 0]).tolist()
+
+
 def test_what_is_no_measurement_stays_so_at_another_rate():
     fast, slow = at_rates(0.002, 0.01)
     held = fast.tau.copy()
@@ -387,6 +398,32 @@ def test_a_lag_that_is_not_felt_below_the_corner_is_left() -> None:
         how = Conditioning(cutoff_hz=corner)
         (own, left) = (preprocess([x], how).motion.v for x in (log, in_time))
         assert (np.abs(own - left).max() > 1e-3) == felt, corner
+
+
+def test_joints_at_a_steady_speed_have_no_say_and_the_surest_say_most() -> None:
+    log = sines(np.arange(0, 20, 0.004), (0.7, 2.0, 1.3))
+    rng = np.random.default_rng(3)
+
+    def late(seconds: tuple[float, float, float]) -> np.ndarray:
+        pairs = zip(log.v.T, seconds, strict=True)
+        return np.stack([np.interp(log.time - lag, log.time, v) for v, lag in pairs], axis=1)
+
+    # the first differs and is noisy
+    noisy = late((0.005, 0.006, 0.006))
+    noisy[:, 0] += 0.5 * rng.normal(size=len(noisy))
+    assert replace(log, v=noisy).velocity_lag == pytest.approx(0.006, abs=2e-4)
+    # of five joints three turn steadily, whose rounding fits some lag by chance
+    steady = np.array([0.31, 0.11, 0.23])
+    q = np.round(np.outer(log.time, steady) / 1e-4) * 1e-4
+    v = np.round(np.tile(steady, (len(q), 1)) / 1e-3) * 1e-3
+    both = MotionLog(
+        log.time,
+        np.hstack([log.q[:, :2], q]),
+        np.hstack([late((0.006,) * 3)[:, :2], v]),
+        np.hstack([log.tau[:, :2], v]),
+        name="both",
+    )
+    assert both.velocity_lag == pytest.approx(0.006, abs=2e-4)
 
 
 def test_joints_that_do_not_agree_have_no_lag_in_common() -> None:

@@ -14,7 +14,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.diagnosis.trials import Known
-from armloop.laws.effects import effect, hypotheses
+from armloop.laws.effects import Estimate, effect, hypotheses
 from armloop.model import ReconstructedModel
 
 
@@ -48,6 +48,10 @@ def test_a_constant_and_a_short_log_hold_no_drift(model: ReconstructedModel) -> 
     log = run(3, 30.0)
     found = diagnose(model, [replace(log, tau=np.add(log.tau, [0.0, 0.2, 0.0]))], jobs=1)
     assert found.named in ([("torque_offset", 2)], [("friction_asymmetry", 2)])
+    # a straight line has a time constant beyond all that are tried, a transient of the filter one below
+    drift = effect("torque_drift", 2)
+    fits = [drift.resolved({"time_constant": Estimate(T, 0.0, "s")}, [4.0, 600.0]) for T in (3.9, 4.0, 900.0)]
+    assert fits == [False, True, True]
     short = diagnose(model, [run(3, 30.0)], jobs=1).samples.motion
     context = replace(model.context(short), motion=short.take(slice(0, 200)))
     assert effect("torque_drift", 2).shapes(context) == []

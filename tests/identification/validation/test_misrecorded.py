@@ -14,6 +14,8 @@ from armloop.cli import main
 from armloop.data.log import MotionLog, unchecked_log, write_log
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose
+from armloop.identification.reconstruction.readings import Reading
+from armloop.identification.validation import misrecorded as misrecorded_module
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects.payload import Payload
 from armloop.model import ReconstructedModel
@@ -68,6 +70,32 @@ def test_a_factor_is_told_from_three_times_on_or_with_the_other_sign(
     log = run(5, 12.0)
     words = said(model, replace(log, tau=factor * log.tau))
     assert (said_to_be in words) == (words != "") if said_to_be else words == ""
+
+
+def test_a_log_that_the_model_explains_by_half_is_not_asked_of(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(misrecorded_module, "_read_otherwise", asked)
+    log = run(5, 12.0)
+    assert said(model, replace(log, tau=1.8 * log.tau)) == ""
+    with pytest.raises(AssertionError):
+        said(model, replace(log, tau=2.2 * log.tau))
+
+
+def test_a_reading_takes_signals_torques_and_what_slides_of_the_columns_it_is_of(
+    model: ReconstructedModel,
+) -> None:
+    samples = preprocess([run(5, 12.0)], model.conditioning)
+    samples = replace(samples, moving=samples.moving & [True, False, True])
+    order = np.array([1, 2, 0])
+    made = misrecorded_module._read(samples, Reading(order, "degrees"), model.arm)
+    for key in ("q", "v", "vdot"):
+        expected = np.pi / 180 * getattr(samples.motion, key)[:, order]
+        np.testing.assert_allclose(getattr(made.motion, key), expected)
+    assert (made.tau == samples.tau[:, order]).all() and (made.moving == samples.moving[:, order]).all()
 
 
 def test_of_currents_no_unit_of_torque_is_guessed(model: ReconstructedModel) -> None:

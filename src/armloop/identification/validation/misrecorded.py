@@ -22,8 +22,8 @@ from armloop.util.arrays import Array
 
 #: Mean relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must leave.
 _POOR, _BETTER = 0.5, 0.3
-#: A factor that all torques share to this ratio, and that is so far from one, or negative.
-_ALIKE, _FAR = 1.3, 3.0
+#: A factor of all torques is so far from one, or negative; one of minus one, to this ratio, is a sign.
+_FAR, _SIGN = 3.0, 1.3
 #: What a factor of torques in N·m would be, if it is as near as this ratio.
 _UNITS = {
     1e3: "mN·m",
@@ -66,17 +66,16 @@ def _far_better(left: Array, other: Array) -> bool:
 
 
 def _common_gain(samples: Samples, predicted: Array) -> float:
-    """The factor, far from one or negative, of the torques (N, n) of all joints that slide; 0 if they share none."""
+    """The factor of the torques (N, n) of the joints that slide, the median of several; 0 if it is not far from one."""
     pairs = zip(samples.tau.T, predicted.T, samples.moving.T, strict=True)
     slid = [(tau[moving], own[moving]) for tau, own, moving in pairs if own[moving].any()]
     gains = np.array([tau @ own / (own @ own) for tau, own in slid])
     gain = float(np.median(gains)) if len(gains) > 1 else 0.0
-    alike = gain != 0.0 and bool((gains / gain > 1 / _ALIKE).all() and (gains / gain < _ALIKE).all())
-    return gain if alike and (gain < 0 or not 1 / _FAR <= gain <= _FAR) else 0.0
+    return 0.0 if 1 / _FAR <= gain <= _FAR else gain
 
 
 def _factor(gain: float, unit: str) -> str:
-    if 1 / _ALIKE <= -gain <= _ALIKE:
+    if 1 / _SIGN <= -gain <= _SIGN:
         return "the sign of all joints' tau is turned: torque must be what the drive does on the joint in the direction of q"
     known = [name for factor, name in _UNITS.items() if unit != "A" and 1 / _NEAR <= gain / factor <= _NEAR]
     guess = f", as if tau were in {known[0]}" if known else ""
