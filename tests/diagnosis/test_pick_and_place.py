@@ -119,18 +119,14 @@ def test_a_law_leaves_far_less_beyond_the_baseline(
     energy: float, parameters: int, lead: float, simpler: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows, law = 100, 300.0
-    stacked = SimpleNamespace(joint=np.zeros(rows, dtype=int), block=np.arange(rows) // 10)
+    joint, block = np.zeros(rows, dtype=np.intp), np.arange(rows) // 10
 
     def outcome(complexity: int) -> Any:
-        after = SimpleNamespace(
-            stacked=stacked,
-            held_out=np.full(rows, np.sqrt(energy / rows)),
-            score=SimpleNamespace(complexity=complexity),
-        )
-        return SimpleNamespace(after=after)
+        score = Score.of(complexity, np.full(rows, np.sqrt(energy / rows)), joint, block, 1)
+        return SimpleNamespace(after=SimpleNamespace(score=score))
 
-    monkeypatch.setattr(unlisted, "lead_of", lambda worse, better, counts: lead)
-    found: Any = SimpleNamespace(terms=[1, 2], energy=law, left=np.full(rows, np.sqrt(law / rows)))
+    monkeypatch.setattr(unlisted, "lead", lambda worse, better: lead)
+    found = unlisted._Law([(1.0, "v1"), (2.0, "q1")], np.full(rows, np.sqrt(law / rows)), block)
     assert unlisted._is_simpler(found, outcome(4 + parameters), outcome(4), 0) is simpler
 
 
@@ -145,7 +141,7 @@ class TestListedEffectsBeforeALaw:
         def outcome(name: str, held_out: float) -> Any:
             wavy = held_out * (1 + 0.2 * np.sin(np.arange(40)))
             score = SimpleNamespace(energy=np.array([(wavy**2).sum(), 0.0]), rows=np.array([40, 0]))
-            stacked = SimpleNamespace(block=blocks, joint=np.zeros(40, dtype=int))
+            stacked = SimpleNamespace(block=blocks, joint=np.zeros(40, dtype=int), joints=1)
             return SimpleNamespace(
                 name=name, after=SimpleNamespace(stacked=stacked, held_out=wavy, score=score)
             )
@@ -204,15 +200,14 @@ def test_a_law_is_not_stated_where_a_less_simple_effect_does_as_well(
 ) -> None:
     """A spring over a small range is nearly an offset, the simplest of equals, and as nearly a wave of the angle."""
     joint, block = np.array([0, 1] * 20), np.arange(40) // 4
-    bare: Any = SimpleNamespace(
-        after=SimpleNamespace(effects=[], shapes=[], stacked=SimpleNamespace(joint=joint, block=block))
-    )
+    bare: Any = SimpleNamespace(after=SimpleNamespace(effects=[], shapes=[]))
     wavy = 1 + 0.2 * np.sin(np.arange(20))
-    fits = {"none": None, "spring": SimpleNamespace(held_out=np.repeat(left * wavy, 2))}
+    spring = Score.of(1, np.repeat(left * wavy, 2), joint, block, 2)
+    fits = {"none": None, "spring": SimpleNamespace(score=spring)}
     known = SimpleNamespace(of=lambda *given: SimpleNamespace(trial=lambda effect: fits[effect]))
     monkeypatch.setattr(unlisted, "Known", known)
     nothing: Any = None
-    law = unlisted._Law([(1.0, "sin(3*q2)")], wavy)
+    law = unlisted._Law([(1.0, "sin(3*q2)")], wavy, block[joint == 1])
     rivals: Any = [("none", 1.0), ("spring", 0.97)]
     assert unlisted._does_as_well(nothing, bare, rivals, law, 1) is as_well
     assert not unlisted._does_as_well(nothing, bare, rivals[:1], law, 1)

@@ -222,11 +222,14 @@ class TestUnlisted:
 
     def test_dry_friction_drag_and_an_offset_are_listed(self) -> None:
         names = ["1", "v2", "sign(v2)", "v2^2*sign(v2)"]
-        left = np.zeros(1)
-        assert unlisted._Law([(1.0, name) for name in names], left).is_listed(1)
-        assert unlisted._Law([(1.0, "v2")], left).is_listed(1)
-        assert not unlisted._Law([(1.0, "v2")], left).is_listed(0)
-        assert not unlisted._Law([(1.0, "v2"), (1.0, "q2")], left).is_listed(1)
+
+        def law(*names: str) -> unlisted._Law:
+            return unlisted._Law([(1.0, name) for name in names], np.zeros(1), np.zeros(1, dtype=np.intp))
+
+        assert law(*names).is_listed(1)
+        assert law("v2").is_listed(1)
+        assert not law("v2").is_listed(0)
+        assert not law("v2", "q2").is_listed(1)
 
     def test_a_law_is_stated_in_units_of_its_joint(self) -> None:
         arm = load_arm("scara")  # joint 3 slides

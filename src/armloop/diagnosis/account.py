@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, lead_of
+from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import FAR_LESS, Unlisted, find_law
@@ -78,13 +78,12 @@ class Account:
         law, outcome = find_law(evidence, again, progress)
         if law is not None:
             return self
-        other, blocks = replace(self, outcome=outcome, unlisted=None), after.stacked.block
-        mine, others = (each._held_out() ** 2 for each in (self, other))
-        sums = [block_sums(x, blocks) for x in (mine, others, np.ones(len(blocks)))]
+        other = replace(self, outcome=outcome, unlisted=None)
+        mine, others = self._score(), other._score()
         if self.unlisted is not None:
-            return other if lead_of(sums[1], sums[0], sums[2]) <= CHANCE else self
-        least = FAR_LESS * float((mine - 1).sum())
-        return other if float((mine - others).sum()) >= least and lead_of(*sums) > SIGNIFICANCE else self
+            return other if lead(others, mine) <= CHANCE else self
+        least = FAR_LESS * float((mine.energy - mine.rows).sum())
+        return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
 
     def _least_explained(self) -> int:
         """The joint (0-based) of which most is left, in baselines."""
@@ -130,6 +129,11 @@ class Account:
         if self.unlisted is not None:
             held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
         return held_out
+
+    def _score(self) -> Score:
+        """What judges effects and law."""
+        rows = self.outcome.after.stacked
+        return Score.of(0, self._held_out(), rows.joint, rows.block, rows.joints)
 
     def explains(self, contacts: list[Contact], residual: Array) -> float:
         """The part of a residual (N, n), N·m (N), in the bursts of contacts that is not left by effects and law."""

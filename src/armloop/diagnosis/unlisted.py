@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from armloop.data.blocks import block_sums
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
-from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, lead_of
+from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, gain, lead
+from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
@@ -118,7 +119,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
         simpler = _law(evidence, bare.after, j)
         if _is_simpler(simpler, outcome, bare, j):
             law, outcome = simpler, bare
-        elif _energy(outcome.after, j) > FORCED * _energy(bare.after, j):
+        elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
             return find_law(evidence, bare, progress)
     return _stated(evidence, outcome, law, j), pruned(evidence, outcome)
 
@@ -128,10 +129,10 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
     for j in range(evidence.samples.motion.joints):
         there = [f for f in outcome.found if f.effect.joint == j + 1 and f.effect.other_joint is None]
         bare = without_effects_at(evidence, outcome, j)
-        rows = int((outcome.after.stacked.joint == j).sum())
+        rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:
             continue
-        if _energy(outcome.after, j) <= rows:
+        if outcome.after.score.energy[j] <= rows:
             continue  # no more than the baseline's
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = _law(evidence, bare.after, j)
@@ -146,16 +147,9 @@ def _does_as_well(
     evidence: Evidence, bare: Outcome, rivals: Sequence[tuple[Effect, float]], law: _Law, j: int
 ) -> bool:
     """Whether an effect that was taken for as good as the one named, if less simple, leaves no more than a law does."""
-    after = bare.after
-    known, mine = Known.of(evidence, after.effects, after.shapes), after.stacked.joint == j
-    blocks = after.stacked.block[mine]
-    for effect, _ in rivals:
-        trial = known.trial(effect)
-        if trial is not None:
-            pair = (trial.held_out[mine] ** 2, law.left**2, np.ones(len(law.left)))
-            if lead_of(*(block_sums(x, blocks) for x in pair)) <= CHANCE:
-                return True
-    return False
+    known, mine = Known.of(evidence, bare.after.effects, bare.after.shapes), law.score
+    trials = (known.trial(effect) for effect, _ in rivals)
+    return any(trial is not None and lead(trial.score.of_joint(j), mine) <= CHANCE for trial in trials)
 
 
 def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
@@ -166,19 +160,17 @@ def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     parameters = outcome.after.score.complexity - bare.after.score.complexity
     if not 0 < len(law.terms) <= parameters:
         return False
-    mine = outcome.after.stacked.joint == j
-    left, blocks = outcome.after.held_out[mine] ** 2, outcome.after.stacked.block[mine]
-    sums = (block_sums(x, blocks) for x in (left, law.left**2, np.ones(len(left))))
+    named = outcome.after.score.of_joint(j)
     # what the model leaves on its baseline is left by either
-    own, energy = float(mine.sum()), _energy(outcome.after, j)
-    far_less = energy - law.energy >= max(FAR_LESS * (energy - own), own)
-    return lead_of(*sums) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
+    own = float(named.rows.sum())
+    far_less = gain(named, law.score) >= max(FAR_LESS * (named.error - own), own)
+    return lead(named, law.score) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:
     """A joint's residual beside the effects of an outcome, and its law."""
-    scale, rows = float(evidence.scale[j]), int((outcome.after.stacked.joint == j).sum())
-    rmse, with_form = (float(np.sqrt(e / rows)) * scale for e in (_energy(outcome.after, j), law.energy))
+    scale, named = float(evidence.scale[j]), outcome.after.score.of_joint(j)
+    rmse, with_form = (float(np.sqrt(s.error / s.rows.sum())) * scale for s in (named, law.score))
     estimates = _parameters(evidence, law, j) if law.terms else {}
     return Unlisted(j + 1, rmse, scale, law.form(scale), with_form, estimates, law.left)
 
@@ -198,7 +190,7 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
     ratios = np.zeros(n)
     for j in range(n):
         mine = after.stacked.joint == j
-        if mine.sum() < _FEWEST or _energy(after, j) < REMAINDER * _energy(before, j):
+        if mine.sum() < _FEWEST or after.score.energy[j] < REMAINDER * before.score.energy[j]:
             continue
         # Noise has energy, too, but no memory: only what lasts can be a law.
         error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
@@ -210,15 +202,11 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
 
 def _follows_a_law(evidence: Evidence, after: Fit, j: int) -> bool:
     """Whether a law explains of a joint's held-out residual what an effect has to: significantly, and enough."""
-    mine, least = after.stacked.joint == j, float(enough(evidence, after.score)[j])
-    if _energy(after, j) <= least:
+    own, least = after.score.of_joint(j), float(enough(evidence, after.score)[j])
+    if own.error <= least:
         return False  # even all of it would not be
-    before, left = after.held_out[mine] ** 2, _law(evidence, after, j).left ** 2
-    if float((before - left).sum()) <= least:
-        return False
-    blocks = after.stacked.block[mine]
-    sums = (block_sums(x, blocks) for x in (before, left, np.ones(len(left))))
-    return lead_of(*sums) > SIGNIFICANCE
+    law = _law(evidence, after, j).score
+    return gain(own, law) > least and lead(own, law) > SIGNIFICANCE
 
 
 def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
@@ -236,13 +224,9 @@ def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
     return float(np.clip(np.mean(now * then) / max(float(np.mean(now**2)), TINY), 0.0, 1.0))
 
 
-def _energy(fit: Fit, j: int) -> float:
-    return float((fit.held_out[fit.stacked.joint == j] ** 2).sum())
-
-
 @dataclass(frozen=True, eq=False)
 class _Law:
-    """Terms with coefficients (weighted), none if none is stable, and what is left (R,), weighted.
+    """Terms with coefficients (weighted), none if none is stable, what is left (R,), weighted, and the block of each row.
 
     Left of each half of the run is what terms and coefficients leave there that were chosen and fitted on the other.
     Standard errors of the coefficients count blocks as the independent units.
@@ -250,11 +234,13 @@ class _Law:
 
     terms: list[tuple[float, str]]
     left: Array
+    block: NDArray[np.intp]
     errors: Array = field(default_factory=lambda: np.zeros(0))
 
-    @property
-    def energy(self) -> float:
-        return float((self.left**2).sum())
+    @cached_property
+    def score(self) -> Score:
+        """What judges it."""
+        return Score.of(len(self.terms), self.left, np.zeros_like(self.block), self.block, 1)
 
     def is_listed(self, j: int) -> bool:
         """Whether all of it is what listed effects of the joint (0-based) are: an offset, dry friction and drag."""
@@ -308,8 +294,8 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
         sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
     )
     if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
-        return _Law([], y)
+        return _Law([], y, after.stacked.block[mine])
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, np.sqrt(np.diag(spread)))
+    return _Law(terms, error, after.stacked.block[mine], np.sqrt(np.diag(spread)))
