@@ -154,6 +154,26 @@ class TestLadder:
         assert took.before == pytest.approx(np.sqrt(8 / 20))
         assert took.after == pytest.approx(0.5 * (np.sqrt(2 * kept / 20) + np.sqrt(8 / 20)))
 
+    @pytest.mark.parametrize(("both", "kept"), [(0.0019, [2, 3]), (0.0021, [0, 2, 3])])
+    def test_a_joint_drops_the_elements_that_it_does_not_miss_together_the_least_missed_first(
+        self, both: float, kept: list[int]
+    ) -> None:
+        """Of the elements 0, 1 and 2 of its first rung; the other joint misses all of its own."""
+        own = {
+            **{"012": 9.0, "3": 9.0, "123": 4 * np.exp(0.0010), "023": 4 * np.exp(-0.0005), "013": 5.0},
+            **{"03": 9.0, "23": 4 * np.exp(both)},
+        }
+        errors = {f"{choice} 4": [[error, 4.0]] * 2 for choice, error in {"0123": 4.0, **own}.items()}
+        table: Any = Table({"- -": 4.0, **errors, "0123 -": [[4.0, 9.0]] * 2})
+        for choice in ("23", "023"):
+            table.errors[f"{choice} -"] = [[4.0, 9.0]] * 2
+        one = selection._State(table, [[0, 1, 2], [3], [4]], {})
+        one.taken = [[0, 1], [2]]
+        one._weights, one._errors = one._judged()
+        took = one.eliminate_backward()
+        assert one.choice(one.taken) == [kept, [4]] and took.joints == [0]
+        assert took.after == one._error(one._errors)
+
     def test_elements_follow_the_speeds(self) -> None:
         motion = fourier_motion(5.0, 100.0, 1)
         motion.v[:] = np.array([4.0, 0.1, 1.0])

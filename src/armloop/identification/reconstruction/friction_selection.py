@@ -6,7 +6,7 @@ viscous friction that differs with the direction, Coulomb friction that grows wi
 before the joint slides, with and without load. A rung brings a row of elements (widths, speeds, powers), of which a
 passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
 scatter over the folds; else for the joints alone for which it falls by more than twice that. At the end, each joint
-hands back the rungs it does not miss.
+hands back the rungs it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
 
@@ -217,14 +217,18 @@ class _State:
         self._counts = pooled.counts
         self._squares = np.maximum(pooled.squares.sum(axis=0), TINY)
         self.taken: list[list[int]] = [[] for _ in pooled.candidates]
+        self._dropped: list[set[int]] = [set() for _ in pooled.candidates]
         self.prior: Prior | None = None
         self.prior_name: str | None = None
         self._priors = priors
         self._weights, self._errors = self._judged()
 
     def choice(self, taken: list[list[int]]) -> Choice:
-        """Places of the elements of some rungs per joint."""
-        return [[place for level in own for place in self._places[level]] for own in taken]
+        """Places of the elements of some rungs per joint, without those that were dropped."""
+        return [
+            [place for level in own for place in self._places[level] if place not in dropped]
+            for own, dropped in zip(taken, self._dropped, strict=True)
+        ]
 
     def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
         """Take a rung for all joints or for some if it earns its place; the first, what every drive has, anyway."""
@@ -248,7 +252,7 @@ class _State:
         return Comparison(name, before, after, None if joints else self._error(errors), joints)
 
     def eliminate_backward(self) -> Comparison:
-        """Backward elimination: every joint drops the extensions it does not miss, the last first."""
+        """Backward elimination: every joint drops the extensions it does not miss, the last first, then elements."""
         before, joints = self._error(self._errors), set()
         for level in reversed(range(len(self._places))):
             for j, own in enumerate(self.taken):
@@ -258,7 +262,26 @@ class _State:
                     if -self._gain(errors, _SURE, [j])[0] < _KEEP:
                         self.taken, self._errors = shorter, errors
                         joints.add(j)
+        for j in range(len(self.taken)):
+            if self._drop_elements(j):
+                joints.add(j)
+        self._weights, self._errors = self._judged()
         return Comparison("backward elimination", before, self._error(self._errors), None, sorted(joints))
+
+    def _drop_elements(self, joint: int) -> set[int]:
+        """Drop the elements (widths, speeds, powers) that a joint does not miss together, the least missed first."""
+
+        def loss(dropped: set[int]) -> float:
+            self._dropped[joint] = dropped
+            return -self._gain(self._held_out(self.taken), _SURE, [joint])[0]
+
+        kept: set[int] = set()
+        alone = {place: loss({place}) for place in self.choice(self.taken)[joint]}
+        for place in sorted(alone, key=alone.__getitem__):
+            if alone[place] < _KEEP and loss(kept | {place}) < _KEEP:
+                kept.add(place)
+        self._dropped[joint] = kept
+        return kept
 
     def _earns_alone(self, joint: int, level: int) -> bool:
         more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
