@@ -9,6 +9,7 @@ addition theorem: an arm has few joints and a model many waves.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -160,9 +161,7 @@ class Graph:
         x, y = _value(a), _value(b)
         if x is not None and y is not None:
             return self.constant(x / y)
-        if x == 0.0:
-            return a
-        if y == 1.0:
+        if x == 0.0 or y == 1.0:
             return a
         return self._made(("/", a, b), None)
 
@@ -236,28 +235,13 @@ def _combined(a: Node, b: Node, sign: int) -> tuple[int, ...] | None:
     return tuple(x + sign * y for x, y in zip(a.angle, b.angle, strict=True))
 
 
-def statements(outputs: Sequence[Node], temporary: str = "t") -> tuple[list[str], list[str]]:
+def statements(outputs: Sequence[Node]) -> tuple[list[str], list[str]]:
     """C statements that compute what several outputs need, each once, and the outputs' expressions.
 
     An operation that is used once is written where it is used; a sum of products stays a line to read.
     """
-    uses: dict[int, int] = {}
-    order: list[Node] = []
-    seen: set[int] = set()
-    stack: list[tuple[Node, bool]] = [(node, False) for node in reversed(outputs)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-            continue
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        stack.append((node, True))
-        stack += [(x, False) for x in reversed(_operands(node))]
-    for node in order:
-        for x in _operands(node):
-            uses[id(x)] = uses.get(id(x), 0) + 1
+    order = _ordered(outputs)
+    uses = Counter(id(x) for node in order for x in _operands(node))
     text: dict[int, str] = {}
     lines: list[str] = []
     for node in order:
@@ -273,8 +257,8 @@ def statements(outputs: Sequence[Node], temporary: str = "t") -> tuple[list[str]
             written = f"({operands[0]} {kind} {operands[1]})"
         else:
             written = f"{kind}({operands[0]})"
-        if uses.get(id(node), 0) > 1 or len(written) > _LONGEST:
-            name = f"{temporary}{len(lines)}"
+        if uses[id(node)] > 1 or len(written) > _LONGEST:
+            name = f"t{len(lines)}"
             lines.append(f"const double {name} = {_bare(written)};")
             written = name
         text[id(node)] = written
@@ -294,18 +278,21 @@ def literal(value: float) -> str:
 
 def inputs_used(outputs: Sequence[Node]) -> set[str]:
     """Names of the inputs that the outputs depend on."""
-    found: set[str] = set()
-    seen: set[int] = set()
-    stack = list(outputs)
+    return {node.key[1] for node in _ordered(outputs) if node.key[0] == "input"}
+
+
+def _ordered(outputs: Sequence[Node]) -> list[Node]:
+    """All nodes that the outputs depend on, each once, behind its operands (depth first)."""
+    found: dict[int, Node] = {}
+    stack = [(node, False) for node in reversed(outputs)]
     while stack:
-        node = stack.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        if node.key[0] == "input":
-            found.add(node.key[1])
-        stack += _operands(node)
-    return found
+        node, done = stack.pop()
+        if done:
+            found[id(node)] = node
+        elif id(node) not in found:
+            stack.append((node, True))
+            stack += [(x, False) for x in reversed(_operands(node))]
+    return list(found.values())
 
 
 def _operands(node: Node) -> list[Node]:
