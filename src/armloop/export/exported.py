@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +43,8 @@ class Exported:
     rms: Array
     difference: Array | None
     unsaid: Array | None
-    missing: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    missing: list[str]
+    notes: list[str]
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
@@ -70,13 +70,13 @@ def rms_of(tau: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(tau**2, axis=0)))
 
 
-def states_of(motion: Motion, moving: NDArray[np.bool_], most: int = _MOST) -> Motion:
-    """At most so many states of a log in which every joint slides, evenly over it.
+def states_of(motion: Motion, moving: NDArray[np.bool_]) -> Motion:
+    """At most 400 states of a log in which every joint slides, evenly over it.
 
     At rest dry friction is not determined, so that nothing could be compared. Where all joints never slide at once,
     those at rest count as the log has them.
     """
     rows = np.flatnonzero(moving.all(axis=1))
     rows = rows if len(rows) >= 20 else np.arange(motion.samples)
-    rows = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
+    rows = rows[np.linspace(0, len(rows) - 1, min(_MOST, len(rows))).astype(int)]
     return motion.take(rows)

@@ -127,6 +127,11 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     for j in np.flatnonzero(constants).tolist():
         missing.append(f"joint {j + 1}: a constant torque, {constants[j]:.4g} {arm.joints[j].torque_unit}")
     damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
+    if (damping < 0).any():
+        j = int(np.argmin(damping))
+        raise ModelError(
+            f"joint {j + 1}: viscous friction is {damping[j]:.3g}, and Drake takes no damping below 0"
+        )
     for j in range(arm.n):
         if stiffness[j] < 0:
             missing.append(f"joint {j + 1}: a spring that pushes, {stiffness[j]:.4g}")
@@ -200,7 +205,7 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     Where a joint's law is a sum of the two, they are its coefficients; else those nearest to it over the speeds that
     the model was fitted on, by least squares, and what they leave goes to ``missing``.
     """
-    damping, dry = _damping(model), _summed(model, "sign", "coulomb_friction", "level")
+    damping, dry = _viscous(model), _summed(model, "sign", "coulomb_friction", "level")
     others = _other_laws(model)
     if any(others) or (damping < 0).any() or (dry < 0).any():
         v, torques = friction_torques(model)
@@ -220,19 +225,9 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     return damping, dry
 
 
-def _damping(model: ReconstructedModel) -> Array:
-    return _summed(model, "viscous", "viscous_friction", "coefficient")
-
-
 def _viscous(model: ReconstructedModel) -> Array:
-    """The sums of the joints' viscous terms, which must not push."""
-    damping = _damping(model)
-    if (damping < 0).any():
-        j = int(np.argmin(damping))
-        raise ModelError(
-            f"joint {j + 1}: viscous friction is {damping[j]:.3g}, and Drake takes no damping below 0"
-        )
-    return damping
+    """(n,) sums of the joints' viscous coefficients."""
+    return _summed(model, "viscous", "viscous_friction", "coefficient")
 
 
 def _other_laws(model: ReconstructedModel) -> list[list[str]]:
@@ -284,7 +279,9 @@ def _bodies(
         notes.append(
             "the URDF gives no masses: what the torques do not reveal of the links is as small as can be"
         )
-    prior = _with_added(model, prior)
+    for added in model.effects:
+        if added.effect.name == "payload":
+            prior[-10:] += link_parameters(arm, {key: e.value for key, e in added.parameters.items()})
     found = consistent_inertia(arm, links, rotors, prior)
     if not found.exact:
         motion = random_motion(model, _STATES, seed=1)
@@ -298,15 +295,6 @@ def _bodies(
             f"torque by {listed} (RMS over RMS)"
         )
     return found
-
-
-def _with_added(model: ReconstructedModel, prior: Array) -> Array:
-    """The nominal links with the payloads that were found."""
-    prior = prior.copy()
-    for added in model.effects:
-        if added.effect.name == "payload":
-            prior[-10:] += link_parameters(model.arm, {key: e.value for key, e in added.parameters.items()})
-    return prior
 
 
 def body_of(parameters: Sequence[float] | Array) -> tuple[float, Array, Array]:
