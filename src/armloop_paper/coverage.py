@@ -8,8 +8,7 @@ in units of their spread, because noise in the motion biases least squares and n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student
@@ -60,28 +59,14 @@ class Covered:
     block_count: float
 
 
-@dataclass(frozen=True)
-class CoverageStudy:
-    """Nominal level, number of simulated logs per disturbance, how they were regressed, and what came out."""
-
-    nominal: float
-    simulations: int
-    jointly: bool
-    results: list[Covered]
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return asdict(self)
-
-
 def coverage_study(
-    simulations: int = 100,
+    simulations: int,
     seed: int = 0,
     disturbances: Sequence[Disturbance] = DISTURBANCES,
     jointly: bool = False,
     design: Collection | None = None,
     progress: Progress = silent,
-) -> CoverageStudy:
+) -> list[Covered]:
     """Regress the true terms of a three-axis arm from simulated logs, again and again.
 
     Args:
@@ -98,7 +83,7 @@ def coverage_study(
         progress(f"coverage: {disturbance.name}, {simulations} logs")
         runs = [_one(truth, design, disturbance, jointly, 1000 * seed + k) for k in range(simulations)]
         results.append(_summary(disturbance.name, runs))
-    return CoverageStudy(NOMINAL, simulations, jointly, results)
+    return results
 
 
 @dataclass(frozen=True, eq=False)

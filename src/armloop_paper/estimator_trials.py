@@ -98,7 +98,7 @@ def _significant(columns: Index, beta: Array) -> tuple[Index, Array]:
     return columns[large], beta[large]
 
 
-def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...], first: int) -> list[Trial]:
+def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...]) -> list[Trial]:
     """Every estimator on one draw."""
     experiment = EXPERIMENTS[case.arm]
     logs = inverse_dynamics_samples(experiment.arm, _ranges(case), experiment.counts, seed, case.snr)
@@ -118,11 +118,7 @@ def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...
         trials.append(Trial(name, seed, len(found), len(found - true), len(true - found), error))
 
     for name in (ORACLE, *estimators):
-        if (
-            name in _SLOW
-            and len(experiment.revolute) == 3
-            and not (case.slow and seed < first + _DRAWS_OF_SLOW)
-        ):
+        if name in _SLOW and experiment.arm.n == 3 and not (case.slow and seed < _DRAWS_OF_SLOW):
             continue
         if name == ESTIMATORS[0]:
             model = _default(experiment, logs, case.snr)

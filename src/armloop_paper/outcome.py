@@ -43,5 +43,10 @@ class Outcome:
         }
 
 
+def beyond(ours: dict[str, Any], headline: str, section: Section) -> Outcome:
+    """A study beyond the paper, whose side has the same keys and no numbers."""
+    return Outcome(_keys(ours), ours, "beyond", headline, section)
+
+
 def _keys(value: Any) -> Any:
     return {key: _keys(part) for key, part in value.items()} if isinstance(value, dict) else None
