@@ -52,27 +52,25 @@ class Experiment:
         """Which joints turn."""
         return tuple(bool(turns) for turns in self.arm.revolute)
 
-    def library(self, part: str, orders: tuple[int, int] | None = None) -> DoubleFeatureSet:
-        """The paper's library of one-shot SINDy or of a step, with its redundant products."""
+    def library(
+        self, part: str, orders: tuple[int, int] | None = None, independent: bool = False
+    ) -> DoubleFeatureSet:
+        """The paper's library of one-shot SINDy or of a step, with or without what sin² + cos² = 1 makes redundant."""
         return DoubleFeatureSet(
-            self.revolute, *(orders or self.orders[part]), SECOND[part], independent=False
+            self.revolute, *(orders or self.orders[part]), SECOND[part], independent=independent
         )
 
-    def independent(self, part: str, orders: tuple[int, int] | None = None) -> DoubleFeatureSet:
-        """The products without those that sin² + cos² = 1 makes redundant."""
-        return DoubleFeatureSet(self.revolute, *(orders or self.orders[part]), SECOND[part])
-
     def waves(self, part: str, orders: tuple[int, int] | None = None) -> AngleSums:
-        """The same functions without redundancy."""
+        """The same functions as angle sums, without redundancy."""
         return AngleSums(self.revolute, *(orders or self.orders[part]), SECOND[part])
 
     def torque(self, motion: Motion) -> Array:
         """(N, n) exact torques."""
         return regressor(self.arm, motion.q, motion.v, motion.vdot) @ nominal_parameters(self.arm)
 
-    def beyond_range(self, seconds: float = 4.0, samples: int = 801) -> Motion:
+    def beyond_range(self) -> Motion:
         """The trajectory outside the range of the data (captions of Figs. 6 and 11), two periods of it."""
-        t = np.linspace(0.0, seconds, samples)
+        t = np.linspace(0.0, 4.0, 801)
         centre, amplitude = (np.array(part) for part in self.beyond)
         q = centre + np.outer(np.sin(np.pi * t), amplitude)
         v = np.pi * np.outer(np.cos(np.pi * t), amplitude)

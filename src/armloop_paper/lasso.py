@@ -58,7 +58,7 @@ def _descend(G: Array, b: Array, yy: float, penalty: float, xi: Array) -> tuple[
     for _ in range(_ROUNDS):
         active = np.flatnonzero(xi)
         g = b - xi[active] @ G[active]
-        gap = _gap(b, g, yy, penalty, xi)
+        gap = duality_gap(b, g, yy, penalty, xi)
         if gap <= TOLERANCE:
             break
         excess = np.abs(g) - penalty
@@ -95,15 +95,11 @@ def stopped_early(G: Array, b: Array, yy: float, penalty: float) -> Array:
     return np.asarray(coefficients[:, 0])
 
 
-def duality_gap(G: Array, b: Array, yy: float, penalty: float, xi: Array) -> float:
-    """Gap between the objective and its dual bound, relative to the objective.
+def duality_gap(b: Array, g: Array, yy: float, penalty: float, xi: Array) -> float:
+    """Gap between the objective and its dual bound, relative to the objective, at coefficients xi with g = b − G ξ.
 
     Objectives below 1e-8 of ½‖y‖² are exact fits: the gap is then relative to that.
     """
-    return _gap(b, b - G @ xi, yy, penalty, xi)
-
-
-def _gap(b: Array, g: Array, yy: float, penalty: float, xi: Array) -> float:
     rss = max(yy - float(xi @ (b + g)), 0.0)
     objective = 0.5 * rss + penalty * float(np.abs(xi).sum())
     shrink = min(1.0, penalty / max(float(np.abs(g).max()), TINY))

@@ -20,8 +20,7 @@ from armloop_paper.experiments import STEPS, Experiment
 
 #: The penalised error, and by what λ is multiplied to give the weight of ‖Ξ‖₁ beside ½‖τ − YΞ‖².
 OBJECTIVES = ("‖r‖²/2m", "‖r‖²/m", "½‖r‖²", "‖r‖²", "‖r‖")
-NOISES = ("joint", "matrix", "unit", "record")
-SAMPLINGS = ("states", "trajectories")
+_TRAJECTORIES = 10
 _NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power", "record": "noise at rest too"}
 
 
@@ -106,13 +105,13 @@ def _deviation(x: Array, snr: float, noise: str, whole: Array) -> Array:
     return np.asarray(np.sqrt(power * 10.0 ** (-snr / 10.0)))
 
 
-def _along_trajectories(experiment: Experiment, seed: int, trajectories: int = 10) -> MotionLog:
-    """One run after the other, each stamped with its own time: v is to be the rate of q, as in any log."""
+def _along_trajectories(experiment: Experiment, seed: int) -> MotionLog:
+    """Ten runs one after the other, each stamped with its own time: v is to be the rate of q, as in any log."""
     count = experiment.counts[STEPS.index("step3")]
     parts = []
-    for k in range(trajectories):
+    for k in range(_TRAJECTORIES):
         reference = fourier_reference(experiment.ranges, 20.0, 1000 * seed + k)
-        share = count // trajectories + (k < count % trajectories)
+        share = count // _TRAJECTORIES + (k < count % _TRAJECTORIES)
         instants = np.linspace(2.0, 20.0, share)
         parts.append((100.0 * k + instants, *reference.evaluate(instants)))
     time, q, v, vdot = (np.concatenate(column) for column in zip(*parts, strict=True))

@@ -53,12 +53,12 @@ class Disturbance:
 
 
 @cache
-def true_model(arm_name: str = "three_axis") -> ReconstructedModel:
-    """The arm's exact model in the double feature set at the paper's orders, with friction.
+def true_model() -> ReconstructedModel:
+    """The three-axis arm's exact model in the double feature set at the paper's orders, with friction.
 
     Monomials with at most one cosine of a joint are independent: the coefficients are unique.
     """
-    arm, rng = load_arm(arm_name), np.random.default_rng(0)
+    arm, rng = load_arm("three_axis"), np.random.default_rng(0)
     parameters, turns = nominal_parameters(arm), tuple(bool(r) for r in arm.revolute)
     components: list[Component] = []
     for step, (N1, N2, second) in enumerate(((2, 0, "none"), (4, 2, "velocity"), (4, 1, "acceleration")), 1):
@@ -114,11 +114,9 @@ class Collection:
         return found
 
 
-def collection(
-    seed: int, poses: int = 24, segments: int = 60, seconds: float = 60.0, arm_name: str = "three_axis"
-) -> Collection:
+def collection(seed: int, poses: int = 24, segments: int = 60, seconds: float = 60.0) -> Collection:
     """Creeping past poses in both directions, segments of constant velocity, and one Fourier trajectory."""
-    model = true_model(arm_name)
+    model = true_model()
     arm, rng = model.arm, np.random.default_rng(seed)
     ranges = MotionRanges.of(arm)
     static = _segments(
