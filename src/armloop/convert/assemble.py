@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording
-from armloop.convert.units import CURRENTS, FACTORS, canonical
+from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
@@ -106,31 +106,24 @@ def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
 
     Sources that say when they were recorded, and were so one after the other, keep their distance in time.
     """
-    clocks, logs, last = [], [one.log for one in parts], 0.0
+    clocks: list[Array] = []
+    logs = [one.log for one in parts]
     if len({log.tau_unit for log in logs}) > 1:
         raise LogError("the sources hold torques and currents; say --drive-gains, or convert them one by one")
-    epochs = [one.epoch for one in parts]
-    for index, one in enumerate(parts):
+    first = parts[0].epoch
+    for one in parts:
         time = _spread(one.log.time, one.starts)
-        if index:
-            step = max(1.0, _GAP * one.log.period)
-            shift = last + step
-            first, epoch = epochs[0], epochs[index]
-            if first is not None and epoch is not None and epoch - first > last:
-                shift = epoch - first
-            time = time + shift
+        if clocks:
+            last = float(clocks[-1][-1])
+            since = 0.0 if first is None or one.epoch is None else one.epoch - first
+            time = time + (since if since > last else last + max(1.0, _GAP * one.log.period))
         clocks.append(time)
-        last = float(time[-1])
     has_vdot = all(log.vdot is not None for log in logs)
-    log = unchecked_log(
-        time=np.concatenate(clocks),
-        q=np.concatenate([one.q for one in logs]),
-        v=np.concatenate([one.v for one in logs]),
-        tau=np.concatenate([one.tau for one in logs]),
-        vdot=np.concatenate([one.vdot for one in logs if one.vdot is not None]) if has_vdot else None,
-        name=logs[0].name,
-        tau_unit=logs[0].tau_unit,
-    )
+    cells = {
+        key: np.concatenate([getattr(one, key) for one in logs])
+        for key in ("q", "v", "tau", *(["vdot"] if has_vdot else []))
+    }
+    log = unchecked_log(time=np.concatenate(clocks), **cells, name=logs[0].name, tau_unit=logs[0].tau_unit)
     names = dict.fromkeys(name for one in parts for name in one.extra)
     extra = {
         name: np.concatenate([one.extra.get(name, np.full(one.log.samples, np.nan)) for one in parts])
@@ -166,10 +159,9 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
                 f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
             )
-        rates = {"rad": "rad/s", "deg": "deg/s"}
         q = replace(q, unit=_said(q.unit, answers.angle_unit))
         if v is not None:
-            v = replace(v, unit=_said(v.unit, rates[answers.angle_unit]))
+            v = replace(v, unit=_said(v.unit, RATES[answers.angle_unit]))
     if not _is_said(tau):
         asked.append(
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
@@ -182,9 +174,9 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     if mapping.time.rate is None and mapping.time.column is None:
         asked.append("the time (no column of it was found; --map with time: {rate: HZ})")
     if asked:
-        what = recording.kind
         raise LogError(
-            f"{where}: the {what} does not say {' nor '.join(asked)}; say it, or answer in the map that --suggest writes"
+            f"{where}: the {recording.kind} does not say {' nor '.join(asked)}; say it, or answer in the map that "
+            "--suggest writes"
         )
     unit = mapping.time.unit
     if mapping.time.column is not None and (unit is None or unit == UNSAID):
@@ -220,13 +212,9 @@ def _beyond_limits(tau: Array, arm: Arm) -> str | None:
 
 def _time_unit(recording: Recording, mapping: Mapping, q: QuantityMap, v: QuantityMap | None) -> str:
     """The unit of time with which v is the rate of q: measured, not guessed; raises ``LogError`` if none fits."""
-    if v is not None:
-        time = recording.columns.get(mapping.time.column or "")
-        if time is not None and len(time) > 2:
-            ratio = rate_ratio(time, recording, q, v)
-            for unit, factor in FACTORS["time"].items():
-                if 0.7 < ratio / factor < 1.4:
-                    return unit
+    time = recording.columns.get(mapping.time.column or "")
+    if v is not None and time is not None and (unit := time_unit(rate_ratio(time, recording, q, v))):
+        return unit
     raise LogError(
         f"{recording.path}: the unit of the column {mapping.time.column} is not said, and no velocity tells it; "
         "say it in a --map: time: {column: …, unit: s, ms, us or ns}"

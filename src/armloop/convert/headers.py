@@ -11,23 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
-from armloop.convert.units import canonical
+from armloop.convert.units import canonical, spelt
 from armloop.convert.vocabulary import CURRENT, WANTED, WORDS, kind_of, words_of
 
 _BRACKETS = str.maketrans("（）［］【】", "()[][]")
 _UNIT = re.compile(r"[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]\s*$")
-_UNIT_WORDS = {
-    "deg": "deg",
-    "degrees": "deg",
-    "rad": "rad",
-    "mm": "mm",
-    "nm": "N*m",
-    "amp": "A",
-    "ms": "ms",
-    "us": "us",
-    "ns": "ns",
-    "ma": "mA",
-}
+_UNIT_WORDS = {"deg", "degrees", "rad", "mm", "nm", "amp", "ms", "us", "ns", "ma"}
 
 
 @dataclass(frozen=True)
@@ -123,7 +112,7 @@ def _split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
         return name[: found.start()].strip(), found[1]
     last = words_of(name)[-1:]
     if last and last[0] in _UNIT_WORDS and len(words_of(name)) > 1:
-        return name, _UNIT_WORDS[last[0]]
+        return name, spelt(last[0])
     return name, ""
 
 

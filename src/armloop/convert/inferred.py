@@ -150,7 +150,8 @@ def _forces(left: Sequence[str], n: int, groups: Sequence[Group], unsure: dict[s
     fitting = [
         group.columns for group in groups if n and len(group.columns) == n and {*group.columns} <= {*likely}
     ]
-    for only in [*fitting[:1]] if len(fitting) == 1 else [tuple(likely)] if n and len(likely) == n else []:
+    only = fitting[0] if len(fitting) == 1 else likely if n and len(likely) == n else None
+    if only is not None:
         unsure["tau"] = f"the only {n} columns that are left; torques or currents?"
         return list(only)
     unsure["tau"] = (

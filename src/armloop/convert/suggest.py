@@ -12,7 +12,7 @@ from armloop.convert.headers import suggest
 from armloop.convert.inferred import alternatives, described, inferred
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
 from armloop.convert.recording import Recording
-from armloop.convert.units import FACTORS, RATES, canonical, fitting
+from armloop.convert.units import FACTORS, RATES, canonical, fitting, time_unit
 from armloop.robot.arm import Arm
 
 _BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
@@ -122,10 +122,8 @@ def _time_evidence(recording: Recording, mapping: Mapping) -> str:
     if mapping.v is not None and mapping.v.unit is None and mapping.q.unit is None:
         # With the rates of the positions' unit, whichever it is.
         plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, RATES["rad"])
-        ratio = rate_ratio(time, recording, *plain)
-        for unit, factor in FACTORS["time"].items():
-            if 0.7 < ratio / factor < 1.4:
-                return f"{text}; v agrees with the rate of q if it is {unit}"
+        if unit := time_unit(rate_ratio(time, recording, *plain)):
+            return f"{text}; v agrees with the rate of q if it is {unit}"
     return f"{text}: s, ms, us or ns?"
 
 

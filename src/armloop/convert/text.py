@@ -79,7 +79,7 @@ def read_text(path: Path) -> TextTable:
         notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
     heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
     repeated = set(heads[1:])
-    body, starts, numbers, rows = [], [], [], 0
+    body, numbers = [], []
     for k in range(first + 1, len(lines)):
         if k in repeated:
             if _names(lines[k], separator) != names:
@@ -90,10 +90,9 @@ def read_text(path: Path) -> TextTable:
         if lines[k].strip() and not lines[k].lstrip().startswith("#"):
             body.append(lines[k])
             numbers.append(k + 1)
-            rows += 1
     if not body:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
-    starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {rows})
+    starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {len(body)})
     decimal = "," if separator != "," and any(re.search(r"\d,\d", line) for line in body[:50]) else "."
     if separator != "," or decimal != ".":
         between = {"\t": "tabs", ";": "semicolons", " ": "blanks", ",": "commas"}[separator]
@@ -128,15 +127,17 @@ def read_text(path: Path) -> TextTable:
         if not name:
             continue
         kind = cells.type
+        texts = [cell.as_py() for cell in cells] if pyarrow.types.is_string(kind) else []
+        bad = next((text for text in texts if text is not None and not _NUMBER.match(text)), None)
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
             if not is_number(kind) or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
                 twice.append(name)
         elif is_number(kind) or pyarrow.types.is_boolean(kind):
             columns[name] = numbers_of(cells)
-        elif pyarrow.types.is_string(kind) and (bad := _first_text(cells)) is not None:
+        elif bad is not None:
             # A cell that is no number among numbers is a fault only where the column is needed.
-            columns[name] = _forgiving(cells)
+            columns[name] = np.array([_number(text) for text in texts])
             if np.isnan(columns[name]).all():
                 del columns[name]
                 dropped.append(f"{name} (no numbers: {bad!r})")
@@ -264,23 +265,12 @@ def _with_empty(names: list[str], cells: list[str]) -> list[str]:
     return [*names, ""]
 
 
-def _first_text(cells: object) -> str | None:
-    for value in cells:  # type: ignore[attr-defined]
-        text = value.as_py()
-        if text is not None and not _NUMBER.match(text):
-            return str(text)
-    return None
-
-
-def _forgiving(cells: object) -> Array:
-    def number(text: str | None) -> float:
-        try:
-            # not Python's own 1_000, nor digits of another script
-            return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
-        except ValueError:
-            return float("nan")
-
-    return np.array([number(value.as_py()) for value in cells])  # type: ignore[attr-defined]
+def _number(text: str | None) -> float:
+    """The number that a text is, NaN where it is none: not Python's own 1_000 either, nor digits of another script."""
+    try:
+        return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
+    except ValueError:
+        return float("nan")
 
 
 def _fault(
