@@ -15,7 +15,7 @@ import signal
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import wraps
 from multiprocessing import get_context
 from threading import Thread
@@ -105,7 +105,7 @@ def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[An
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     _die_with(parent)
-    _one_thread()
+    _threads()
     if prepare is not None:
         prepare(*arguments)
 
@@ -183,9 +183,8 @@ class Processes:
         if jobs <= 1:
             yield from Serial().map(function, chunks)
             return
-        with _inherited(function, chunks) as key:
-            with Pool(jobs) as pool:
-                yield from pool.map(_call, [key] * len(chunks), range(len(chunks)))
+        with Pool(jobs, _hold, (function, chunks)) as pool:
+            yield from pool.map(_call, range(len(chunks)))
 
     def close(self) -> None:
         pass
@@ -270,18 +269,18 @@ def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:
         return function(chunk)
 
 
-#: What forked processes inherit: functions and chunks that need not be picklable, nor copied.
-_INHERITED: dict[int, tuple[Callable[[Any], Any], Sequence[Any]]] = {}
+#: What a forked process inherits: a function and chunks that need not be picklable, nor copied.
+_held: tuple[Callable[[Any], Any], Sequence[Any]]
 
 
-@contextmanager
-def _inherited(function: Callable[[Any], Any], chunks: Sequence[Any]) -> Iterator[int]:
-    key = max(_INHERITED, default=0) + 1
-    _INHERITED[key] = (function, chunks)
-    try:
-        yield key
-    finally:
-        del _INHERITED[key]
+def _hold(function: Callable[[Any], Any], chunks: Sequence[Any]) -> None:
+    global _held
+    _held = function, chunks
+
+
+def _call(index: int) -> Any:
+    function, chunks = _held
+    return function(chunks[index])
 
 
 #: Of a process in a team: its number, what it holds, how many are done, and where all wait for each other.
@@ -307,11 +306,6 @@ def _share(function: Callable[[Any, Any, int], Any], task: Any, count: int, of: 
     return number, answers
 
 
-def _call(key: int, index: int) -> Any:
-    function, chunks = _INHERITED[key]
-    return function(chunks[index])
-
-
 def one_thread(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """The function with one BLAS thread: several wait for each other longer than they compute where matrices are small."""
 
@@ -327,7 +321,3 @@ def _threads() -> Any:
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(1)
-
-
-def _one_thread() -> None:
-    _threads()
