@@ -103,21 +103,15 @@ def _one(
     fitted = _fitted(samples, len(design.motions[0].starts), len(design.motions[1].starts), jointly)
     _, parts = solve_given_terms(truth, samples, fitted, 3)
     true_values = {_key(u): u.value for problem in problems(truth) for u in problem.unknowns}
-    kinds, error, block, independent, half = [], [], [], [], []
-    for part in parts:
-        textbook = np.sqrt(np.diag(part.equations.independent_covariance()))
-        for k, unknown in enumerate(part.unknowns):
-            kinds.append(_kind(unknown))
-            error.append(unknown.value - true_values[_key(unknown)])
-            block.append(part.std_error[k])
-            half.append(part.std_error[k] * student.ppf(0.5 + NOMINAL / 2, part.freedom[k]))
-            independent.append(textbook[k])
+    unknowns = [unknown for part in parts for unknown in part.unknowns]
+    block = np.concatenate([part.std_error for part in parts])
+    freedom = np.concatenate([part.freedom for part in parts])
     return _Run(
-        kinds,
-        np.array(error),
-        np.array(block),
-        np.array(independent),
-        np.array(half),
+        [_kind(unknown) for unknown in unknowns],
+        np.array([unknown.value - true_values[_key(unknown)] for unknown in unknowns]),
+        block,
+        np.concatenate([np.sqrt(np.diag(part.equations.independent_covariance())) for part in parts]),
+        block * student.ppf(0.5 + NOMINAL / 2, freedom),
         max(part.equations.blocks for part in parts),
     )
 

@@ -103,15 +103,19 @@ def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...
     experiment = EXPERIMENTS[case.arm]
     logs = inverse_dynamics_samples(experiment.arm, _ranges(case), experiment.counts, seed, case.snr)
     names = _names(experiment)
-    true = {
-        (step + 1, joint, names[step][column])
-        for step, joints in enumerate(truth)
-        for joint, (columns, _) in enumerate(joints)
-        for column in columns
-    }
     trials = []
     beyond = experiment.beyond_range()
     exact = experiment.torque(beyond)
+
+    def terms(fitted: Fitted) -> set[tuple[int, int, str]]:
+        return {
+            (step + 1, joint, names[step][column])
+            for step, joints in enumerate(fitted)
+            for joint, (columns, beta) in enumerate(joints)
+            for column in columns[beta != 0]
+        }
+
+    true = terms(truth)
 
     def add(name: str, found: set[tuple[int, int, str]], tau: Array) -> None:
         error = np.sqrt(np.mean((tau - exact) ** 2, axis=0)).tolist()
@@ -130,17 +134,7 @@ def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...
             )
         except ArithmeticError as error:
             raise InputError(f"{case.name}, {name}: {error}") from error
-        found = {
-            (step + 1, joint, names[step][column])
-            for step, joints in enumerate(fitted)
-            for joint, (columns, beta) in enumerate(joints)
-            for column in columns[beta != 0]
-        }
-        tau = sum(
-            (_apply(experiment, step, fitted[step], beyond) for step in range(len(STEPS))),
-            np.zeros_like(exact),
-        )
-        add(name, found, tau)
+        add(name, terms(fitted), _sum(experiment, fitted, beyond))
     return trials
 
 
@@ -194,12 +188,16 @@ def _names(experiment: Experiment) -> list[list[str]]:
     return found
 
 
-def _apply(experiment: Experiment, step: int, fitted: list[tuple[Index, Array]], motion: Motion) -> Array:
-    library = _library(experiment, step)
-    coefficients = np.zeros((library.size, len(fitted)))
-    for joint, (columns, beta) in enumerate(fitted):
-        coefficients[columns, joint] = beta
-    return library.apply(motion, coefficients)
+def _sum(experiment: Experiment, fitted: Fitted, motion: Motion) -> Array:
+    """(N, n) torques of the steps fitted so far."""
+    tau = np.zeros_like(motion.q)
+    for step, joints in enumerate(fitted):
+        library = _library(experiment, step)
+        coefficients = np.zeros((library.size, len(joints)))
+        for joint, (columns, beta) in enumerate(joints):
+            coefficients[columns, joint] = beta
+        tau += library.apply(motion, coefficients)
+    return tau
 
 
 def _by_steps(
@@ -209,7 +207,7 @@ def _by_steps(
     fitted: Fitted = []
     for step, condition in enumerate(CONDITIONS):
         motion, tau = as_motion(logs[condition])
-        rest = tau - sum((_apply(experiment, k, fitted[k], motion) for k in range(step)), np.zeros_like(tau))
+        rest = tau - _sum(experiment, fitted, motion)
         if sparse is None:
             assert truth is not None
             fitted.append(
