@@ -103,7 +103,10 @@ def read_text(path: Path) -> TextTable:
     width = len(body[0].rstrip("\r").split(separator))
     extra = width - len(names)
     if extra == 1 and all(not line.rstrip("\r ").endswith(separator) for line in body[:3]):
-        names_read = _with_empty(names, body[0].split(separator))
+        # An empty name where the rows have an empty cell more than the header (libfranka's ``,,``).
+        empty = (k for k, cell in enumerate(body[0].split(separator)) if not cell.strip())
+        k = next(empty, len(names))
+        names_read = [*names[:k], "", *names[k:]]
     else:
         names_read = [*names, *[""] * max(extra, 0)]
     try:
@@ -255,14 +258,6 @@ def _names(line: str, separator: str) -> list[str]:
 def _is_header(line: str, separator: str) -> bool:
     cells = [cell for cell in _cells(line, separator) if cell.strip()]
     return bool(cells) and sum(not _NUMBER.match(cell) for cell in cells) > len(cells) / 2
-
-
-def _with_empty(names: list[str], cells: list[str]) -> list[str]:
-    """The names with an empty one where the rows have an empty cell more than the header (libfranka's ``,,``)."""
-    for k, cell in enumerate(cells):
-        if not cell.strip():
-            return [*names[:k], "", *names[k:]]
-    return [*names, ""]
 
 
 def _number(text: str | None) -> float:
