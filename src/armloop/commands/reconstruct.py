@@ -177,8 +177,15 @@ def _snr(options: Reconstruct) -> tuple[float, float, float] | None:
         raise InputError(f"--snr {options.snr}: give three numbers in dB, such as 60,40,20") from None
     if not all(0 < level < math.inf for level in (q, v, vdot)):
         raise InputError(f"--snr {options.snr}: ratios in dB must be positive")
-    if options.cutoff != 0:
-        raise InputError("--snr is for samples that are no time series; give --cutoff 0 with it")
-    if options.method != "stepwise" or options.library not in (None, "double-feature-set"):
-        raise InputError("--snr works with the stepwise method and the library double-feature-set")
+    require_ratios_used("--snr", "--cutoff 0", options.method, options.library, options.cutoff)
     return q, v, vdot
+
+
+def require_ratios_used(
+    snr: str, unfiltered: str, method: str, library: str | None, cutoff: float | None
+) -> None:
+    """Raise ``InputError``, by the names that the options have, where signal-to-noise ratios would not be looked at."""
+    if cutoff != 0:
+        raise InputError(f"{snr} is for samples that are no time series; give {unfiltered} with it")
+    if method != "stepwise" or library not in (None, "double-feature-set"):
+        raise InputError(f"{snr} works with the stepwise method and the library double-feature-set")
