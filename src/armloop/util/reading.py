@@ -9,7 +9,9 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -166,9 +168,7 @@ def _size(node: Any, known: dict[int, int], level: int) -> int:
                     line = key.start_mark.line + 1
                     raise _Doubt(f"line {line}: a field's name must be text; put it between quotes")
             keys = [key.value for key, _ in node.value]
-            twice = (
-                {key for key in keys if keys.count(key) > 1 and key != "<<"} if len(keys) < 1000 else set()
-            )
+            twice = [key for key, times in Counter(keys).items() if times > 1 and key != "<<"]
             if twice:
                 raise _Doubt(f"field {min(twice)[:60]!r} stands twice in one mapping; leave one out")
             total += sum(_size(each, known, level + 1) for pair in node.value for each in pair)
@@ -203,8 +203,6 @@ def _loader() -> Any:
 
     Loader.add_constructor("tag:yaml.org,2002:int", integer)
     Loader.add_constructor("tag:yaml.org,2002:float", number)
-    import re
-
     # YAML 1.1 wants a point and a sign in the exponent; people write 1e-3.
     Loader.add_implicit_resolver(
         "tag:yaml.org,2002:float", re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+0123456789.")
