@@ -13,13 +13,14 @@ import os
 import re
 import signal
 import socket
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
 from contextlib import suppress
 from functools import wraps
 from multiprocessing import get_context
 from threading import Thread
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from armloop.util.errors import InputError
 from armloop.util.quiet import quiet
@@ -41,27 +42,23 @@ _TEAM, _LOOK = 4, 0.5
 _forked = False
 
 
-class Workers(Protocol):
+class Workers(ABC):
     """Who applies a function to chunks."""
 
+    @abstractmethod
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         """Yield the answers in the order of the chunks; exceptions of the function come through."""
-        ...
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027
         """Let go of what was opened."""
-        ...
 
 
-class Serial:
+class Serial(Workers):
     """In this process."""
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         # With one BLAS thread, as in every other worker: how many there are decides the order of a product's sums.
         return (_apply(function, chunk) for chunk in chunks)
-
-    def close(self) -> None:
-        pass
 
 
 class Pool(ProcessPoolExecutor):
@@ -168,7 +165,7 @@ class Team:
         return [given[k % self.jobs][k // self.jobs] for k in range(count)]
 
 
-class Processes:
+class Processes(Workers):
     """In forked processes, one BLAS thread each; they inherit function and chunks, only answers are copied.
 
     Args:
@@ -186,11 +183,8 @@ class Processes:
         with Pool(jobs, _hold, (function, chunks)) as pool:
             yield from pool.map(_call, range(len(chunks)))
 
-    def close(self) -> None:
-        pass
 
-
-class Cluster:
+class Cluster(Workers):
     """On the workers of a Dask scheduler, which must have this package and see the same files.
 
     Args:
