@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.convert.units import FACTORS, RATES
 from armloop.convert.vocabulary import wanted
@@ -111,7 +110,8 @@ def _rates(columns: dict[str, Array], time: Array) -> dict[str, tuple[str, float
         likeness = np.nan_to_num(product / np.outer(*sizes))
         ratio = np.nan_to_num(product / sizes[0][:, None] ** 2)
     np.fill_diagonal(likeness, 0.0)
-    likeness = np.where(_is_factor(ratio), likeness, 0.0)
+    is_factor = (np.abs(ratio[..., None] / _FACTORS - 1) < _NEAR).any(axis=-1)
+    likeness = np.where(is_factor, likeness, 0.0)
     found: dict[str, tuple[str, float, float]] = {}
     taken: set[int] = set()
     for flat in np.argsort(-likeness, axis=None):
@@ -124,10 +124,6 @@ def _rates(columns: dict[str, Array], time: Array) -> dict[str, tuple[str, float
         found[names[a]] = (names[b], float(likeness[a, b]), float(ratio[a, b]))
         taken.add(b)
     return found
-
-
-def _is_factor(ratio: Array) -> NDArray[np.bool_]:
-    return np.asarray((np.abs(ratio[..., None] / _FACTORS - 1) < _NEAR).any(axis=-1))
 
 
 def _over_span(steps: Array) -> Array:

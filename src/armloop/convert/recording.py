@@ -57,11 +57,9 @@ def flatten(arrays: dict[str, NDArray[np.generic]]) -> dict[str, Array]:
     holds no numbers is left out.
     """
     numeric = {
-        name: np.asarray(values)
-        for name, values in arrays.items()
-        if np.asarray(values).dtype.kind in "fiub"
-        and np.asarray(values).ndim in (1, 2)
-        and np.size(values) > 1
+        name: values
+        for name, values in zip(arrays, map(np.asarray, arrays.values()), strict=True)
+        if values.dtype.kind in "fiub" and values.ndim in (1, 2) and values.size > 1
     }
     lengths = [max(values.shape) for values in numeric.values()]
     if not lengths:

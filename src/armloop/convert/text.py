@@ -201,7 +201,7 @@ def _layout(lines: list[str]) -> tuple[str, int | None]:
             if len(names) < 2 or not _is_header(lines[k], separator):
                 continue
             rows = below[1:] if below and _is_units(below[0], separator, len(names)) else below[:1]
-            if rows and _width(rows[0], separator) == len(names) and _is_numbers(rows[0], separator):
+            if rows and _width(rows[0], separator) == len(names) and not _is_header(rows[0], separator):
                 return separator, k
     for k, line in enumerate(lines[:100]):
         text = line.strip()
@@ -228,11 +228,6 @@ def _bare(cell: str) -> str:
 def _width(line: str, separator: str) -> int:
     cells = _cells(line.strip(), separator)
     return len(cells) - (not cells[-1].strip())
-
-
-def _is_numbers(line: str, separator: str) -> bool:
-    cells = [cell for cell in _cells(line, separator) if cell.strip()]
-    return bool(cells) and sum(bool(_NUMBER.match(cell)) for cell in cells) >= len(cells) / 2
 
 
 def _is_units(line: str, separator: str, width: int) -> bool:
