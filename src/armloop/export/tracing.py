@@ -9,13 +9,22 @@ addition theorem: an arm has few joints and a model many waves.
 from __future__ import annotations
 
 import math
+import operator
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 from armloop.util.functions import Functions
 
 Key = tuple[Any, ...]
+
+
+def _operators(sign: str) -> tuple[Callable[[Node, Any], Node], Callable[[Node, Any], Node]]:
+    """The method for a sign between a node and another number, and the one for another number and a node."""
+    return (
+        lambda self, other: self.graph.operate(sign, self, other),
+        lambda self, other: self.graph.operate(sign, other, self),
+    )
 
 
 class Node:
@@ -28,32 +37,13 @@ class Node:
         #: Whole multiples of the angles that this is the sum of, where it is one.
         self.angle = angle
 
-    def __add__(self, other: Any) -> Node:
-        return self.graph.add(self, other)
-
-    def __radd__(self, other: Any) -> Node:
-        return self.graph.add(other, self)
-
-    def __sub__(self, other: Any) -> Node:
-        return self.graph.subtract(self, other)
-
-    def __rsub__(self, other: Any) -> Node:
-        return self.graph.subtract(other, self)
-
-    def __mul__(self, other: Any) -> Node:
-        return self.graph.multiply(self, other)
-
-    def __rmul__(self, other: Any) -> Node:
-        return self.graph.multiply(other, self)
-
-    def __truediv__(self, other: Any) -> Node:
-        return self.graph.divide(self, other)
-
-    def __rtruediv__(self, other: Any) -> Node:
-        return self.graph.divide(other, self)
+    __add__, __radd__ = _operators("+")
+    __sub__, __rsub__ = _operators("-")
+    __mul__, __rmul__ = _operators("*")
+    __truediv__, __rtruediv__ = _operators("/")
 
     def __neg__(self) -> Node:
-        return self.graph.multiply(-1.0, self)
+        return -1.0 * self
 
     def __pos__(self) -> Node:
         return self
@@ -66,14 +56,14 @@ class Node:
             raise TypeError(f"only whole powers from 0 can be written, not {power}")
         result: Any = 1.0
         for _ in range(int(power)):
-            result = self.graph.multiply(result, self)
+            result = result * self
         return self.graph.node(result)
 
     def __bool__(self) -> bool:
-        raise TypeError("a law that branches on its arguments cannot be written as one formula")
+        return _branches()
 
 
-def _branches(x: Any, lower: Any, upper: Any) -> Any:
+def _branches(*_: Any) -> bool:
     raise TypeError("a law that branches on its arguments cannot be written as one formula")
 
 
@@ -114,39 +104,35 @@ class Graph:
             clip=_branches,
         )
 
-    def add(self, a: Any, b: Any) -> Node:
+    def operate(self, sign: str, a: Any, b: Any) -> Node:
+        """The sum, difference, product or quotient of two numbers."""
         a, b = self.node(a), self.node(b)
         x, y = _value(a), _value(b)
         if x is not None and y is not None:
-            return self.constant(x + y)
+            return self.constant(_ARITHMETIC[sign](x, y))
+        return {"+": self._sum, "-": self._difference, "*": self._product, "/": self._quotient}[sign](
+            a, b, x, y
+        )
+
+    def _sum(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if x == 0.0:
             return b
         if y == 0.0:
             return a
         if b.key[0] == "-" and b.key[2] is a:  # c + (1 - c) of a rotation about a coordinate axis
-            return b.key[1]
+            return cast(Node, b.key[1])
         if b.key[0] == "*" and _value(b.key[1]) == -1.0:
             return self._made(("-", a, b.key[2]), _combined(a, b, 1))
         return self._made(("+", a, b), _combined(a, b, 1))
 
-    def subtract(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x - y)
+    def _difference(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if y == 0.0:
             return a
-        if x == 0.0:
-            return self.multiply(-1.0, b)
-        return self._made(("-", a, b), _combined(a, b, -1))
+        return -b if x == 0.0 else self._made(("-", a, b), _combined(a, b, -1))
 
-    def multiply(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x * y)
+    def _product(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if y is not None:
-            a, b, x, y = b, a, y, x
+            a, b, x = b, a, y
         if x == 0.0:
             return self.constant(0.0)
         if x == 1.0:
@@ -156,14 +142,8 @@ class Graph:
             angle = tuple(int(x) * k for k in b.angle)
         return self._made(("*", a, b), angle)
 
-    def divide(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x / y)
-        if x == 0.0 or y == 1.0:
-            return a
-        return self._made(("/", a, b), None)
+    def _quotient(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
+        return a if x == 0.0 or y == 1.0 else self._made(("/", a, b), None)
 
     def call(self, name: str, x: Any) -> Node:
         """A function of one number."""
@@ -214,6 +194,7 @@ class Graph:
 
 #: Multiples of an angle that are still built from single ones; a motor's ripple of order 101 is not.
 _HIGHEST = 8
+_ARITHMETIC = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sin": math.sin,
     "cos": math.cos,

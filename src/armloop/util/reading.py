@@ -12,6 +12,8 @@ import os
 import re
 import stat
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -66,31 +68,39 @@ def read_text(path: str | Path, most: int, error: type[InputError], what: str = 
         raise error(f"{path}: cannot be read (byte {fault.start} is no UTF-8); give {what}") from fault
 
 
-def read_json(path: str | Path, error: type[InputError], what: str, most: int = RESULTS) -> Any:
+def read_json(path: str | Path, error: type[InputError], what: str) -> Any:
     """The value in a JSON file.
 
     Raises:
         InputError: of the given class; as :func:`read_bytes`, or it is no JSON of the kind described above.
     """
-    text = read_text(path, most, error, what)
-    try:
-        return json.loads(
-            text,
-            object_pairs_hook=_once,
-            parse_constant=_no_constant,
-            parse_int=_whole,
-            parse_float=_number,
-        )
-    except json.JSONDecodeError as fault:
-        raise error(f"{path}: not JSON (line {fault.lineno}: {fault.msg}); give {what}") from fault
-    except _Doubt as fault:
-        raise error(f"{path}: {fault}") from None
-    except RecursionError as fault:
-        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
+    text = read_text(path, RESULTS, error, what)
+    with _refusing(path, error, what):
+        try:
+            return json.loads(
+                text,
+                object_pairs_hook=_once,
+                parse_constant=_no_constant,
+                parse_int=_whole,
+                parse_float=_number,
+            )
+        except json.JSONDecodeError as fault:
+            raise error(f"{path}: not JSON (line {fault.lineno}: {fault.msg}); give {what}") from fault
 
 
 class _Doubt(Exception):
     """What is wrong with a value."""
+
+
+@contextmanager
+def _refusing(path: str | Path, error: type[InputError], what: str) -> Iterator[None]:
+    """Say of which file a doubt is, and refuse one that nests without end."""
+    try:
+        yield
+    except _Doubt as fault:
+        raise error(f"{path}: {fault}") from None
+    except RecursionError as fault:
+        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -119,7 +129,7 @@ def _number(text: str) -> float:
     return value
 
 
-def read_yaml(path: str | Path, error: type[InputError], what: str, most: int = SETTINGS) -> Any:
+def read_yaml(path: str | Path, error: type[InputError], what: str) -> Any:
     """The value in a YAML file, by the safe subset: plain data, no tags that make objects.
 
     Raises:
@@ -128,28 +138,23 @@ def read_yaml(path: str | Path, error: type[InputError], what: str, most: int = 
     """
     import yaml
 
-    text = read_text(path, most, error, what)
-    loader = None
-    try:
-        loader = _loader()(text)
-        node = loader.get_single_node()
-        if node is None:
-            return None
-        _size(node, {}, 0)
-        return loader.construct_document(node)
-    except yaml.YAMLError as fault:
-        mark = getattr(fault, "problem_mark", None)
-        line = f"line {mark.line + 1}: " if mark else ""
-        raise error(f"{path}: unreadable YAML: {line}{getattr(fault, 'problem', None) or fault}") from fault
-    except _Doubt as fault:
-        raise error(f"{path}: {fault}") from None
-    except RecursionError as fault:
-        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
-    except ValueError as fault:
-        raise error(f"{path}: unreadable YAML: {fault}") from fault
-    finally:
-        if loader is not None:
-            loader.dispose()
+    text = read_text(path, SETTINGS, error, what)
+    with _refusing(path, error, what):
+        try:
+            loader = _loader()(text)
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            _size(node, {}, 0)
+            return loader.construct_document(node)
+        except yaml.YAMLError as fault:
+            mark = getattr(fault, "problem_mark", None)
+            line = f"line {mark.line + 1}: " if mark else ""
+            raise error(
+                f"{path}: unreadable YAML: {line}{getattr(fault, 'problem', None) or fault}"
+            ) from fault
+        except ValueError as fault:
+            raise error(f"{path}: unreadable YAML: {fault}") from fault
 
 
 def _size(node: Any, known: dict[int, int], level: int) -> int:
