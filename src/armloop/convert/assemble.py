@@ -83,7 +83,11 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     if "v" not in cells:
         cells["v"] = _differences(time, cells["q"], starts)
         notes.append("v: central differences of q, for the source has no velocities")
-    unit = "A" if mapping.tau.gains is None and canonical(_unit(mapping.tau, 0), "tau") in CURRENTS else "N*m"
+    unit = (
+        "A"
+        if mapping.tau.gains is None and canonical(mapping.tau.units()[0] or "", "tau") in CURRENTS
+        else "N*m"
+    )
     beyond = None if arm is None or unit == "A" else _beyond_limits(cells["tau"], arm)
     if beyond is not None:
         notes.append(beyond)
@@ -151,9 +155,7 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     elif answers.tau_unit is not None:
         tau = replace(tau, unit=answers.tau_unit)
     if answers.angle_unit is not None:
-        told = {
-            str(canonical(unit, "q")) for unit in (q.unit if isinstance(q.unit, list) else [q.unit]) if unit
-        }
+        told = {str(canonical(unit, "q")) for unit in q.units() if unit}
         if told & {"rad", "deg"} - {answers.angle_unit}:
             raise LogError(
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
@@ -162,14 +164,14 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
         q = replace(q, unit=_said(q.unit, answers.angle_unit))
         if v is not None:
             v = replace(v, unit=_said(v.unit, RATES[answers.angle_unit]))
-    if not _is_said(tau):
+    if None in tau.units():
         asked.append(
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
             f"{_sizes(recording, mapping, arm)})"
         )
-    elif canonical(_unit(tau, 0), "tau") == "%" and tau.gains is None:
+    elif canonical(tau.units()[0] or "", "tau") == "%" and tau.gains is None:
         raise LogError(f"{where}: tau is in percent of a rating: give gains (N·m per percent) in a --map")
-    if not _is_said(q) or (v is not None and not _is_said(v)):
+    if None in q.units() or (v is not None and None in v.units()):
         asked.append("the unit of positions and velocities (--angle-unit rad or deg)")
     if mapping.time.rate is None and mapping.time.column is None:
         asked.append("the time (no column of it was found; --map with time: {rate: HZ})")
@@ -240,15 +242,6 @@ def _said(unit: str | list[str] | None, answer: str) -> str | list[str]:
     return answer if unit is None or unit == UNSAID else unit
 
 
-def _is_said(quantity: QuantityMap) -> bool:
-    units = quantity.unit if isinstance(quantity.unit, list) else [quantity.unit]
-    return not any(unit is None or unit == UNSAID for unit in units)
-
-
-def _unit(quantity: QuantityMap, j: int) -> str:
-    return str(quantity.unit[j] if isinstance(quantity.unit, list) else quantity.unit)
-
-
 def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[str]) -> list[int]:
     names, where = mapping.joints, str(recording.path)
     if arm is None:
@@ -272,22 +265,26 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
 def _column(recording: Recording, quantity: QuantityMap, kind: str, j: int) -> Array:
     """One column of the source in SI units."""
     n, name = len(quantity.names()), quantity.names()[j]
-    cells = recording.columns.get(name)
-    if cells is None:
-        raise LogError(
-            f"{recording.path}: no column {name}, which {kind} of joint {j + 1} needs; {_there_are(recording)}"
-        )
-    bad = np.flatnonzero(~np.isfinite(cells))
-    if len(bad):
-        raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
-            f"({len(bad)} of {len(cells)}); correct or drop what was not measured"
-        )
-    unit = canonical(_unit(quantity, j), kind)
+    cells = _cells(recording, name, f", which {kind} of joint {j + 1} needs", "or drop what was not measured")
+    unit = canonical(quantity.units()[j] or "", kind)
     factor = FACTORS[kind][unit] if unit is not None else 1.0
     if quantity.gains is not None:
         factor = factor * per_joint(quantity.gains, n)[j]
     return (cells + per_joint(quantity.offset, n)[j]) * (factor * per_joint(quantity.sign, n)[j])
+
+
+def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
+    """(N,) numbers of a column; raises ``LogError`` where it is not there, or one of them is none."""
+    cells = recording.columns.get(name)
+    if cells is None:
+        raise LogError(f"{recording.path}: no column {name}{needed}; {_there_are(recording)}")
+    bad = np.flatnonzero(~np.isfinite(cells))
+    if len(bad):
+        raise LogError(
+            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
+            f"({len(bad)} of {len(cells)}); correct {correct}"
+        )
+    return cells
 
 
 def _there_are(recording: Recording) -> str:
@@ -300,15 +297,8 @@ def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.int
     N = recording.samples
     if mapping.time.rate is not None:
         return np.arange(N) / mapping.time.rate, np.arange(N), list(recording.starts)
-    name = mapping.time.column
-    raw = recording.columns.get(name or "")
-    if raw is None:
-        raise LogError(f"{recording.path}: no column {name} for the time; {_there_are(recording)}")
-    bad = np.flatnonzero(~np.isfinite(raw))
-    if len(bad):
-        raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number; correct the time"
-        )
+    name = mapping.time.column or ""
+    raw = _cells(recording, name, " for the time", "the time")
     edges = set(recording.starts)
     step = np.diff(raw, prepend=raw[0] - 1)
     step[list(edges)] = 1.0
