@@ -50,7 +50,7 @@ def is_lerobot(path: Path) -> bool:
 
 
 def read_lerobot(path: Path) -> Recording:
-    """Read all episodes, each a run of its own; raises ``LogError`` where torques are missing."""
+    """Read all episodes, each a run of its own; a map has to say where the torques are if no name does."""
     import pyarrow.parquet
 
     files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
@@ -73,16 +73,26 @@ def read_lerobot(path: Path) -> Recording:
         else:
             columns |= flatten({name: values})
     mapping = _mapping(columns, _rate(info, path))
+    unsure = {}
     if mapping is None:
-        raise LogError(
-            f"{path}: no torques or currents among {', '.join(sorted(arrays))}; a log needs them "
-            "(observation.effort, or a state with …effort or …current), or a --map that says where they are"
+        unsure["columns"] = (
+            f"no torques or currents among {', '.join(sorted(arrays))}; a log needs them (observation.effort, or a state "
+            "with …effort or …current)"
         )
     episode = arrays.get("episode_index")
     starts = [0] if episode is None else [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(episode)))]
     notes = [f"{len(starts)} episode{'s' * (len(starts) != 1)}"]
-    named = mapping.joints is not None
-    return Recording(path, "LeRobot data set", columns, mapping, named=named, starts=starts, notes=notes)
+    named = mapping is not None and mapping.joints is not None
+    return Recording(
+        path,
+        "LeRobot data set",
+        columns,
+        mapping,
+        named=named,
+        starts=starts,
+        notes=notes,
+        unsure=unsure,
+    )
 
 
 def _rate(info: dict[str, Any], path: Path) -> float | None:
