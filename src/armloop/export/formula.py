@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,16 @@ _ROUNDING = 4e-16
 _MEMORY = ("hysteresis", "load_hysteresis")
 
 
-@dataclass(frozen=True)
-class Stop:
-    """One elasto-plastic element: its joint (from 0) and the stretch at which it yields, rad (m)."""
+class Stop(NamedTuple):
+    """One elasto-plastic element: its joint (from 0), the stretch at which it yields, rad (m), and its level there.
+
+    The level is in N·m (N), or per unit of the joint's load.
+    """
 
     joint: int
     width: float
+    level: float
+    by_load: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +70,6 @@ def formula(model: ReconstructedModel) -> Formula:
     v = [graph.input(f"v[{j}]") for j in range(n)]
     vdot = [graph.input(f"vdot[{j}]") for j in range(n)]
     plain, left_out = _split(model)
-    stops: list[Stop] = []
 
     def torques(kept: ReconstructedModel, t: Node) -> tuple[list[Node], list[Node]]:
         equations = ModelEquations(kept, graph.functions())
@@ -78,13 +82,12 @@ def formula(model: ReconstructedModel) -> Formula:
 
     late = graph.constant(_LATE)
     torque, _ = torques(plain, late)
-    slid, elements = _without_memory(plain)
+    slid, stops = _without_memory(plain)
     fades = any(a.effect.of_time for a in plain.effects)
-    if not elements and not fades:
+    if not stops and not fades:
         return Formula(torque, torque, [], False, left_out)
     remembered, load = torques(slid, graph.input("t") if fades else late)
-    for k, (joint, width, level, by_load) in enumerate(elements):
-        stops.append(Stop(joint, width))
+    for k, (joint, _, level, by_load) in enumerate(stops):
         z = level * graph.input(f"z[{k}]")
         remembered[joint] = remembered[joint] + (z * abs(load[joint]) if by_load else z)
     return Formula(torque, remembered, stops, fades, left_out)
@@ -114,16 +117,14 @@ def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[str]]:
     return replace(model, effects=tuple(kept)), left_out
 
 
-def _without_memory(
-    model: ReconstructedModel,
-) -> tuple[ReconstructedModel, list[tuple[int, float, float, bool]]]:
-    """The model without its elasto-plastic elements, and these: joint, width, level, whether per unit of load."""
-    elements: list[tuple[int, float, float, bool]] = []
+def _without_memory(model: ReconstructedModel) -> tuple[ReconstructedModel, list[Stop]]:
+    """The model without its elasto-plastic elements, and these."""
+    elements: list[Stop] = []
     terms = []
     for j, joint in enumerate(model.friction.terms):
         terms.append(tuple(term for term in joint if term.kind not in _MEMORY))
         elements += [
-            (j, float(t.parameter), float(t.coefficient), t.kind == "load_hysteresis")
+            Stop(j, float(t.parameter), float(t.coefficient), t.kind == "load_hysteresis")
             for t in joint
             if t.kind in _MEMORY
         ]
@@ -134,7 +135,7 @@ def _without_memory(
             continue
         assert added.effect.joint is not None
         values = {key: number(e.value) for key, e in added.parameters.items()}
-        elements.append((added.effect.joint - 1, values["width"], values["level"], False))
+        elements.append(Stop(added.effect.joint - 1, values["width"], values["level"]))
         if values.get("level_change"):
             # what a model that had learned the step has to take back stays a step
             change = replace(added.parameters["level"], value=0.0)

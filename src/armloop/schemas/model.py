@@ -264,7 +264,6 @@ def _agree(model: ModelData) -> None:
     """Raise ``ModelError`` where lengths do not go with the number of joints."""
     arm, n = model.arm, len(model.arm.joints)
     kept = model.history.encoder_zeros
-    zeros = [] if kept is None else [("history.encoder_zeros.spread", kept.spread)]
     lengths: list[tuple[str, Any]] = [
         *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
         ("friction", model.friction),
@@ -275,7 +274,7 @@ def _agree(model: ModelData) -> None:
         ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
         ("history.slowest", model.history.slowest),
-        *zeros,
+        ("history.encoder_zeros.spread", kept and kept.spread),
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
             for key in ("joints", "friction", "stribeck")
