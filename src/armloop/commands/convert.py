@@ -144,6 +144,7 @@ def _suggest(options: Convert, arm: Arm | None) -> None:
 def _tell(found: Converted, out: Path, arm: Arm | None) -> None:
     import numpy as np
 
+    from armloop.convert.recording import some
     from armloop.reports.tables import table
 
     log, runs = found.log, found.log.runs()
@@ -170,7 +171,7 @@ def _tell(found: Converted, out: Path, arm: Arm | None) -> None:
     for note in found.notes:
         print(f"  {note}")
     if found.extra:
-        print(f"  kept beside it: {', '.join(list(found.extra)[:12])}{' …' if len(found.extra) > 12 else ''}")
+        print(f"  kept beside it: {some(found.extra, 12)}")
     print(f"wrote {out}")
     if log.tau_unit == "A":
         print("tau is in A: later commands need --tau-unit A (or --drive-gains to make it a torque)")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
-from armloop.convert.recording import Array, Recording
+from armloop.convert.recording import Array, Recording, some
 from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.robot.arm import Arm
@@ -96,7 +96,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     used, extra = mapping.used(), {}
     for name in recording.columns if mapping.keep == "all" else mapping.keep:
         if name not in recording.columns:
-            raise LogError(f"{where}: no column {name} to keep; {_there_are(recording)}")
+            raise LogError(f"{where}: no column {name} to keep; there are: {some(recording.columns, 12)}")
         if name not in used:
             extra[f"source.{name}" if _OWN.fullmatch(name) else name] = recording.columns[name][keep]
     if len(keep) < N:
@@ -277,7 +277,9 @@ def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
     """(N,) numbers of a column; raises ``LogError`` where it is not there, or one of them is none."""
     cells = recording.columns.get(name)
     if cells is None:
-        raise LogError(f"{recording.path}: no column {name}{needed}; {_there_are(recording)}")
+        raise LogError(
+            f"{recording.path}: no column {name}{needed}; there are: {some(recording.columns, 12)}"
+        )
     bad = np.flatnonzero(~np.isfinite(cells))
     if len(bad):
         raise LogError(
@@ -285,11 +287,6 @@ def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
             f"({len(bad)} of {len(cells)}); correct {correct}"
         )
     return cells
-
-
-def _there_are(recording: Recording) -> str:
-    names = list(recording.columns)
-    return f"there are: {', '.join(names[:12])}{' …' if len(names) > 12 else ''}"
 
 
 def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.intp], list[int]]:

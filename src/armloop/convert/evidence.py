@@ -56,14 +56,6 @@ class Evidence:
         """Columns that are neither positions nor torques."""
         return {*self.clocks, *self.constant}
 
-    def order(self, column: str) -> int:
-        """How often a column is the derivative of another one: 0 for a position, 1 for a velocity."""
-        primitive = {rate: name for name, (rate, *_) in self.rates.items()}
-        count = 0
-        while column in primitive and count < len(primitive):
-            column, count = primitive[column], count + 1
-        return count
-
 
 def evidence(
     columns: Mapping[str, Array], clock: str | None = None, starts: Sequence[int] = (0,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -48,6 +48,12 @@ class Recording:
     def samples(self) -> int:
         """The number of rows."""
         return len(next(iter(self.columns.values()))) if self.columns else 0
+
+
+def some(names: Iterable[str], most: int = 8) -> str:
+    """The first of the names, for a message."""
+    listed = list(names)
+    return ", ".join(listed[:most]) + (" …" if len(listed) > most else "")
 
 
 def flatten(arrays: dict[str, NDArray[np.generic]]) -> dict[str, Array]:

@@ -11,7 +11,7 @@ from armloop.convert.assemble import rate_ratio
 from armloop.convert.headers import suggest
 from armloop.convert.inferred import alternatives, described, inferred
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
-from armloop.convert.recording import Recording
+from armloop.convert.recording import Recording, some
 from armloop.convert.units import FACTORS, RATES, canonical, fitting, time_unit
 from armloop.robot.arm import Arm
 
@@ -88,9 +88,7 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
     if "v" in unsure and mapping.v is None:
         lines.append(f"# v: unsure: {unsure['v']}")
     extra = [name for name in recording.columns if name not in mapping.used()]
-    lines.append(
-        "keep: all" + (f"  # {', '.join(extra[:8])}{' …' if len(extra) > 8 else ''}" if extra else "")
-    )
+    lines.append(f"keep: all  # {some(extra)}" if extra else "keep: all")
     return "\n".join(lines) + "\n"
 
 
