@@ -101,11 +101,7 @@ class Mapping(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_map(path: str | Path) -> Mapping:
-    """Read and check a map.
-
-    Raises:
-        InputError: the file is missing or no map: one line that names the field.
-    """
+    """Read and check a map; raises ``InputError``, which names the field, where it is none."""
     try:
         mapping = checked(read_yaml(path, InputError, "a map, a YAML file"), Mapping)
     except Misfit as misfit:

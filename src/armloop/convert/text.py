@@ -44,22 +44,14 @@ class TextTable:
 
 
 def header_of(path: Path) -> list[str]:
-    """The names of a text table's columns, or an empty list where no line looks like a header.
-
-    Raises:
-        LogError: the file is not text.
-    """
+    """The names of a table's columns, none where no line looks like a header; raises ``LogError`` for what is no text."""
     lines, _ = _lines(path)
     separator, at = _layout(lines)
     return [] if at is None else _names(lines[at], separator)
 
 
 def read_text(path: Path) -> TextTable:
-    """Read a text table; a line that repeats the header starts a new part.
-
-    Raises:
-        LogError: the file is not text, has no header, or a row has too few or too many cells.
-    """
+    """Read a text table, a line that repeats the header starts a new part; raises ``LogError``, which names the line."""
     import pyarrow
     import pyarrow.csv
 

@@ -11,11 +11,7 @@ from armloop.model import ReconstructedModel
 
 
 def c_source(model: ReconstructedModel) -> tuple[str, Formula]:
-    """The text of the C file, and the formulas in it.
-
-    Raises:
-        ModelError: the model has an effect that no formula can say.
-    """
+    """The text of the C file and its formulas; raises ``ModelError`` for an effect that no formula can say."""
     found = formula(model)
     n = model.arm.n
     states = f"const double q[{n}], const double v[{n}], const double vdot[{n}], double tau[{n}]"

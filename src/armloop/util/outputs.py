@@ -13,6 +13,7 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path
 
 from armloop.util.errors import InputError
@@ -75,11 +76,7 @@ def stamp() -> str | None:
 
 
 def target(path: str | Path, option: str = "") -> Path:
-    """The file that an output goes to, links followed.
-
-    Raises:
-        InputError: it is a folder or a device, it is read, or this command has not written it.
-    """
+    """The file of an output, links followed; raises ``InputError`` for a folder, a device, an input or a file of others."""
     where, name = str(path_of(path, option or "the path of an output")), option or "the output"
     _check_name(where, name)
     try:
@@ -203,11 +200,7 @@ def _check_name(where: str, option: str) -> None:
 
 
 def _lock(folder: Path, option: str, guard: _Guard) -> None:
-    missing = []
-    each = folder
-    while not each.exists():
-        missing.append(each)
-        each = each.parent
+    missing = list(takewhile(lambda each: not each.exists(), (folder, *folder.parents)))
     for each in reversed(missing):
         each.mkdir(exist_ok=True)
         guard.made.append(each)
