@@ -69,12 +69,9 @@ def coverage_study(
 ) -> list[Covered]:
     """Regress the true terms of a three-axis arm from simulated logs, again and again.
 
-    Args:
-        simulations: logs per disturbance; motion is the same in all, the errors are fresh.
-        seed: of the motion and the errors.
-        jointly: regress all terms on all samples at once instead of step by step. The level of Step I is that
-            at creeping speed, viscous friction included; regressed jointly it is that of Eq. (34).
-        design: the motion; by default creeping past 24 poses, 60 constant velocities, 60 s of varying ones.
+    So many ``simulations`` per disturbance: the motion of ``design`` is the same in all, the errors are fresh. ``jointly``
+    regresses all terms on all samples at once instead of step by step: the level of Step I is that at creeping speed,
+    viscous friction included, the joint one that of Eq. (34).
     """
     design = design or collection(seed)
     truth = true_model()

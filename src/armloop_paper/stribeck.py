@@ -79,14 +79,9 @@ def profile_stribeck(velocity: Array, torque: Array, speed_noise: float) -> Stri
 def compare_stribeck(
     velocity: Array, torque: Array, speed_noise: float, penalty: float = 1e-3
 ) -> StribeckComparison:
-    """The profile and the paper's way on the same samples.
+    """The profile and the paper's way (on every sample) on the same data; arguments and errors as :func:`profile_stribeck`.
 
-    Args:
-        velocity, torque, speed_noise: as of :func:`profile_stribeck`; the paper's way gets every sample.
-        penalty: λ of Eq. (32) on columns of unit mean square.
-
-    Raises:
-        ExcitationError: as :func:`profile_stribeck`.
+    ``penalty`` is λ of Eq. (32) on columns of unit mean square.
     """
     profile = profile_stribeck(velocity, torque, speed_noise)
     squares, lasso, condition = [], [], 1.0

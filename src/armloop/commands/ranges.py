@@ -55,11 +55,7 @@ def reserve_stated(options: Ranges) -> bool:
 
 
 def read_ranges(options: Ranges, arm: Arm, plant: str, known: MotionRanges | None = None) -> MotionRanges:
-    """The ranges of ``--ranges``, else ``known``, else those of ``plant``, with what the options say instead.
-
-    Raises:
-        InputError: a range is empty, beyond the URDF's limits, or not one number per joint.
-    """
+    """The ranges of ``--ranges``, else ``known``, else ``plant``'s, with what the options say; raises ``InputError``."""
     from armloop.experiment.excitation import ranges_with
 
     stated = {key: numbers(getattr(options, key), f"--{key}", arm) for key in _NAMES}

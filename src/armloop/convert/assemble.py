@@ -54,11 +54,7 @@ class Part:
 
 
 def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answers) -> Part:
-    """One source as a motion log, in SI units, base to tip.
-
-    Raises:
-        LogError: a column is missing or holds no numbers, a unit is not said, or joints do not match the arm's.
-    """
+    """One source as a motion log in SI units, base to tip; raises ``LogError``, which names the column at fault."""
     where = str(recording.path)
     if recording.samples < FEWEST_SAMPLES:
         raise LogError(

@@ -25,15 +25,9 @@ _FIRST = 100
 
 
 def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> Recording:
-    """Read the joint states of one bag.
+    """Read the joint states of one bag, of ``topic`` where it has several; raises ``LogError`` where there are none.
 
-    Args:
-        topic: which one, where a bag has several.
-        wanted: the joints' names; messages without them (of a gripper's driver) are left out. None takes the
-            names of the first message.
-
-    Raises:
-        LogError: the bag is unreadable, holds no joint states, or several that only ``topic`` can tell apart.
+    Messages without the joints ``wanted`` (of a gripper's driver) are left out; None takes the names of the first message.
     """
     import msgspec
     from rosbags.highlevel import AnyReader, AnyReaderError

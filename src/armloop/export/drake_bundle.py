@@ -55,11 +55,7 @@ print("q after 0.1 s without drives:", plant.GetPositions(plant.GetMyContextFrom
 
 
 def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exported:
-    """Write ``arm.urdf``, ``model.json`` and ``simulate.py``, run the program, and compare the torques.
-
-    Raises:
-        InputError: the place cannot be written to, or the program does not run.
-    """
+    """Write arm, model and program, run it, and compare the torques; raises ``InputError`` where that cannot be done."""
     what = said(model, nearest_friction=False)
     smoothing = _smoothing(model, what)
     texts = {"arm.urdf": urdf_text(what), "simulate.py": _PROGRAM.format(step=_STEP, smoothing=smoothing)}

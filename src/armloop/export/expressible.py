@@ -88,14 +88,10 @@ class Said:
 
 
 def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
-    """What descriptions can say of a model.
+    """What descriptions can say of a model; raises ``ModelError`` where no links with positive masses come near it.
 
-    Args:
-        nearest_friction: put the nearest damping and dry friction in place of laws that are neither; without it
-            the viscous terms alone are damping, and the rest is somebody else's.
-
-    Raises:
-        ModelError: no link inertias with positive masses come near the model's torques.
+    ``nearest_friction`` puts the nearest damping and dry friction in place of laws that are neither; without it the viscous
+    terms alone are damping, and the rest is somebody else's.
     """
     arm = model.arm
     missing: list[str] = []

@@ -58,11 +58,7 @@ class Formula:
 
 
 def formula(model: ReconstructedModel) -> Formula:
-    """Run a model's equations on traced numbers: inputs ``q[j]``, ``v[j]``, ``vdot[j]``, ``z[k]``, ``t``.
-
-    Raises:
-        ModelError: an effect has no law of q, v and vdot.
-    """
+    """Run a model's equations on traced ``q[j]``, ``v[j]``, ``vdot[j]``, ``z[k]``, ``t``; raises ``ModelError``."""
     n = model.arm.n
     model = replace(model, arm=_exact_quarters(model.arm))
     graph = Graph(n)

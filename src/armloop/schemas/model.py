@@ -240,11 +240,7 @@ _MIGRATIONS = {"armloop/model/1": _from_1}
 
 
 def model_data(data: Any) -> dict[str, Any]:
-    """Check what was read from a model file, of this schema or an earlier one; returned as one of this schema.
-
-    Raises:
-        ModelError: another schema, or a field is missing, misshapen, out of range, or does not go with the arm.
-    """
+    """What was read from a model file, checked, as one of this schema; raises ``ModelError``, which names the field."""
     found = data.get("schema") if isinstance(data, dict) else None
     while isinstance(found, str) and found in _MIGRATIONS:
         data = _MIGRATIONS[found](data)

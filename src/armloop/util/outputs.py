@@ -130,11 +130,8 @@ def record(draft: Path, final: Path) -> None:
 def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--out") -> Path:
     """The output folder for this command alone, checked before any work is done, with the files that will go into it.
 
-    The folder is made, and taken away again if nothing is written. Nothing but a lock of the system holds it: it
-    ends with the command, however that ends.
-
-    Raises:
-        InputError: it cannot be made or written to, another run writes into it, or a file in it is not to be replaced.
+    The folder is made, and taken away again if nothing is written. Nothing but a lock of the system holds it: it ends with
+    the command, however that ends. Raises ``InputError`` where it cannot be had, or a file in it is not to be replaced.
     """
     folder = path_of(path, option)
     _check_name(str(path), option)
@@ -151,11 +148,7 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
 
 
 def take_file(path: str | Path | None, option: str) -> None:
-    """Check the place of an output file before any work is done; None is no output.
-
-    Raises:
-        InputError: as :func:`target`, its folder cannot be written to, or another output goes there.
-    """
+    """Check the place of an output file (None is none) before any work is done; raises as :func:`target`."""
     if path is None:
         return
     real = target(path, option)

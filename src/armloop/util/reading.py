@@ -28,11 +28,7 @@ _DIGITS, _LEVELS, _VALUES = 64, 64, 50_000
 
 
 def read_bytes(path: str | Path, most: int, error: type[InputError], what: str = "a file") -> bytes:
-    """The content of a regular file of at most so many bytes.
-
-    Raises:
-        InputError: of the given class; no such file, no regular file, not readable, or too large.
-    """
+    """The content of a regular file of at most so many bytes; raises the ``InputError`` given for any other."""
     path = path_of(path, f"the path of {what}", error)
     try:
         # Without blocking: a pipe that nobody writes to would be waited for.
@@ -69,11 +65,7 @@ def read_text(path: str | Path, most: int, error: type[InputError], what: str = 
 
 
 def read_json(path: str | Path, error: type[InputError], what: str) -> Any:
-    """The value in a JSON file.
-
-    Raises:
-        InputError: of the given class; as :func:`read_bytes`, or it is no JSON of the kind described above.
-    """
+    """The value in a JSON file of the kind described above; raises the ``InputError`` given for any other."""
     text = read_text(path, RESULTS, error, what)
     with _refusing(path, error, what):
         try:
@@ -130,12 +122,7 @@ def _number(text: str) -> float:
 
 
 def read_yaml(path: str | Path, error: type[InputError], what: str) -> Any:
-    """The value in a YAML file, by the safe subset: plain data, no tags that make objects.
-
-    Raises:
-        InputError: of the given class; as :func:`read_bytes`, or it is no YAML of the kind described above, or its
-            aliases stand for more than any settings hold.
-    """
+    """The value in a YAML file by the safe subset: no tags that make objects, few aliases; raises as :func:`read_json`."""
     import yaml
 
     text = read_text(path, SETTINGS, error, what)
