@@ -38,25 +38,17 @@ DISTURBANCES = (
 
 @dataclass(frozen=True)
 class Covered:
-    """One disturbance.
-
-    Attributes:
-        disturbance: its name.
-        coefficients: number of coefficients of each kind.
-        blocks: part of the intervals from blocks that cover, per kind.
-        independent: the same with samples taken as independent.
-        bias: root mean square over a kind's coefficients of mean error over standard deviation of the estimates.
-        width: median ratio of stated standard error to the estimates' standard deviation, per kind.
-        block_count: mean number of blocks.
-    """
+    """One disturbance, by kind of coefficient."""
 
     disturbance: str
-    coefficients: dict[str, int]
-    blocks: dict[str, float]
-    independent: dict[str, float]
-    bias: dict[str, float | None]
-    width: dict[str, float | None]
-    block_count: float
+    coefficients: dict[str, int]  # how many
+    blocks: dict[str, float]  # part of the intervals from blocks that cover
+    independent: dict[str, float]  # the same with samples taken as independent
+    bias: dict[str, float | None]  # RMS of mean error over standard deviation of the estimates
+    width: dict[
+        str, float | None
+    ]  # median ratio of stated standard error to the estimates' standard deviation
+    block_count: float  # mean number of blocks
 
 
 def coverage_study(

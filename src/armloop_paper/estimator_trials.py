@@ -42,38 +42,25 @@ _ROUND_OFF = 1e-6
 
 @dataclass(frozen=True)
 class Case:
-    """One experiment under noise.
+    """One experiment under noise."""
 
-    Attributes:
-        arm: a key of :data:`EXPERIMENTS`.
-        name: of the case.
-        snr: in dB, of q, v and v̇.
-        widened: joint 2 turns within ±90°.
-        slow: whether the slow solvers take part.
-    """
-
-    arm: str
+    arm: str  # a key of EXPERIMENTS
     name: str
-    snr: tuple[float, float, float]
-    widened: bool = False
-    slow: bool = True
+    snr: tuple[float, float, float]  # dB, of q, v and v̇
+    widened: bool = False  # joint 2 turns within ±90°
+    slow: bool = True  # whether the slow solvers take part
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One estimator on one noise draw.
-
-    Attributes:
-        terms, false, missed: over all steps and joints.
-        error: (n,) RMSE on the trajectory outside the range, N·m or N.
-    """
+    """One estimator on one noise draw; terms over all steps and joints."""
 
     estimator: str
     draw: int
     terms: int
     false: int
     missed: int
-    error: list[float]
+    error: list[float]  # (n,) RMSE on the trajectory outside the range, N·m or N
 
 
 def _ranges(case: Case) -> MotionRanges:

@@ -31,26 +31,18 @@ CASES = (
 
 @dataclass(frozen=True)
 class Row:
-    """One estimator over the draws of one case.
-
-    Attributes:
-        exact: draws with exactly the true terms.
-        nearly: draws with all true terms and at most one false one.
-        terms, false, missed: means.
-        error: largest over the joints of the RMSE outside the range over that of the oracle, median of the draws.
-        worst: its maximum over the draws with the exact terms; None if there are none.
-    """
+    """One estimator over the draws of one case."""
 
     case: str
     estimator: str
     draws: int
-    exact: int
-    nearly: int
-    terms: float
+    exact: int  # draws with exactly the true terms
+    nearly: int  # draws with all true terms and at most one false one
+    terms: float  # mean number, of which are
     false: float
     missed: float
-    error: float
-    worst: float | None
+    error: float  # median of the draws' largest RMSE of a joint outside the range over that of the oracle
+    worst: float | None  # its maximum over the draws with the exact terms; None if there are none
 
 
 def study(
@@ -60,11 +52,7 @@ def study(
     estimators: Sequence[str] = ESTIMATORS,
     jobs: int | None = None,
 ) -> list[Row]:
-    """All estimators on so many noise draws, seeds from 0, of every case.
-
-    Args:
-        jobs: processes; all cores by default.
-    """
+    """All estimators on so many noise draws, seeds from 0, of every case; ``jobs`` processes, by default one per core."""
     rows: list[Row] = []
     for case in cases:
         truth = true_terms(EXPERIMENTS[case.arm])

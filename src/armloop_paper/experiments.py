@@ -23,23 +23,15 @@ STEPS = ("step1", "step2", "step3")
 
 @dataclass(frozen=True)
 class Experiment:
-    """One arm of the paper as it is simulated there.
-
-    Attributes:
-        arm_name: built-in arm.
-        ranges: of q, v and vdot in the data collections (Tables 1 and 3), lower and upper ends, rad, s, m.
-        counts: samples of the static, constant-velocity and varying data.
-        orders: optimal (N1, N2) of one-shot SINDy and of the steps.
-        penalty, threshold: λ of Eq. (32), and the size from which a coefficient counts as active.
-        beyond: centre and amplitude of the trajectory outside the range of the data, q(t) = c + a sin(πt).
-    """
+    """One arm of the paper as it is simulated there."""
 
     arm_name: str
-    ranges: MotionRanges
-    counts: tuple[int, int, int]
-    orders: dict[str, tuple[int, int]]
-    penalty: float
-    threshold: float
+    ranges: MotionRanges  # of q, v and vdot in the data collections (Tables 1 and 3), rad, s, m
+    counts: tuple[int, int, int]  # samples of the static, constant-velocity and varying data
+    orders: dict[str, tuple[int, int]]  # optimal (N1, N2) of one-shot SINDy and of the steps
+    penalty: float  # λ of Eq. (32)
+    threshold: float  # from which size a coefficient counts as active
+    # centre and amplitude of the trajectory outside the range of the data, q(t) = c + a sin(πt)
     beyond: tuple[tuple[float, ...], tuple[float, ...]]
 
     @cached_property

@@ -30,14 +30,11 @@ class NotConverged(ArithmeticError):
 
 
 def lasso(G: Array, b: Array, yy: float, penalty: float, start: Array | None = None) -> Array:
-    """Minimise ½‖y − Xξ‖² + penalty·‖ξ‖₁ from G = XᵀX (p, p), b = Xᵀy (p,), yy = ‖y‖².
+    """Minimise ½‖y − Xξ‖² + penalty·‖ξ‖₁ from G = XᵀX (p, p), b = Xᵀy (p,), yy = ‖y‖²; raises ``NotConverged``.
 
-    An active-set method on a falling sequence of penalties: the columns that violate optimality most are added, the
-    active ones are moved to the exact minimum for their signs, and those that cross zero on the way are dropped.
-    A start saves the way from zero.
-
-    Raises:
-        NotConverged: the duality gap stays above `TOLERANCE` of the objective.
+    An active-set method on a falling sequence of penalties: the columns that violate optimality most are added, the active
+    ones are moved to the exact minimum for their signs, and those that cross zero on the way are dropped. A start saves the
+    way from zero.
     """
     xi = np.zeros(len(b)) if start is None else start
     largest = float(np.abs(b - G @ xi).max(initial=0.0))

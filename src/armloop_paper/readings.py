@@ -28,27 +28,18 @@ _NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power", "recor
 class Reading:
     """One way to read the recipe.
 
-    Attributes:
-        objective: one of :data:`OBJECTIVES`, + λ‖Ξ‖₁.
-        scaled: columns are scaled to unit RMS before λ acts on their coefficients.
-        early: the solver stops after 1,000 sweeps (scikit-learn's default) instead of at convergence.
-        noise: the signal power that the ratio refers to: each ``joint``'s own; the mean over the whole ``matrix``
-            of signals of one kind, what MATLAB's ``awgn(x, snr, "measured")`` takes; or ``unit`` power, what
-            ``awgn(x, snr)`` takes.
-        sampling: varying-velocity data are random ``states`` in the ranges, or samples of Fourier-series
-            ``trajectories`` (Eq. 31).
-        factor: λ is taken times this: 1 for the λ that is printed.
-
     The defaults are those of the reproduction: Eq. (32) literally, norm not squared, solved to convergence, noise as
     MATLAB measures it (the paper simulates in MATLAB). Of the readings tried they come closest to Fig. 5.
     """
 
-    objective: str = "‖r‖"
-    scaled: bool = False
-    early: bool = False
+    objective: str = "‖r‖"  # one of OBJECTIVES, + λ‖Ξ‖₁
+    scaled: bool = False  # columns are scaled to unit RMS before λ acts on their coefficients
+    early: bool = False  # the solver stops after 1,000 sweeps (scikit-learn's default), not at convergence
+    # the signal power that the ratio refers to: each joint's own; the mean over the whole matrix of signals of one kind,
+    # what MATLAB's awgn(x, snr, "measured") takes; unit power, what awgn(x, snr) takes; or that of the whole record
     noise: str = "matrix"
-    sampling: str = "states"
-    factor: float = 1.0
+    sampling: str = "states"  # random in the ranges; or along Fourier-series trajectories (Eq. 31)
+    factor: float = 1.0  # λ is taken times this: 1 for the λ that is printed
 
     def weight(self, penalty: float, samples: int) -> float:
         """λ in front of ‖Ξ‖₁ where the error is ½‖r‖²; for the norm not squared times ‖r‖."""

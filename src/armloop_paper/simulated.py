@@ -30,26 +30,16 @@ _CREEP = np.radians(0.1)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What the model does not know.
-
-    Attributes:
-        name: short name.
-        white, coloured: standard deviation of torque noise, part of the torque's RMS; the second is correlated
-            over ``correlation`` seconds.
-        drift: standard deviation of a slow change of the friction level, part of f_c, over 1 s.
-        ripple: amplitude of a torque that depends on the position, part of f_c, with a phase of its own in
-            every log.
-        q_noise, v_noise: white noise on positions, rad, and velocities, rad/s.
-    """
+    """What the model does not know; standard deviations, but for the ripple's amplitude."""
 
     name: str
-    white: float = 0.005
-    coloured: float = 0.0
+    white: float = 0.005  # torque noise, part of the torque's RMS
+    coloured: float = 0.0  # the same, correlated over so many seconds:
     correlation: float = 0.2
-    drift: float = 0.0
-    ripple: float = 0.0
-    q_noise: float = 0.0
-    v_noise: float = 0.0
+    drift: float = 0.0  # slow change of the friction level over 1 s, part of f_c
+    ripple: float = 0.0  # torque that depends on q, part of f_c, with a phase of its own in every log
+    q_noise: float = 0.0  # white noise, rad
+    v_noise: float = 0.0  # rad/s
 
 
 @cache

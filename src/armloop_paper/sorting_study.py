@@ -33,25 +33,16 @@ _REST, _RAMP, _CRUISE, _RATE, _ROUNDING = 0.8, 0.5, 0.7, 250.0, 1e-4
 
 @dataclass(frozen=True)
 class Sorted:
-    """One case at one noise level with one indicator, mean over the seeds.
+    """One case at one noise level with one indicator, mean over the seeds."""
 
-    Attributes:
-        case, level, indicator: one of :data:`CASES`, dB, ``"paper"`` or ``"robust"``.
-        rand: adjusted Rand index against the true conditions; 1 is perfect, 0 is chance.
-        worst_rand: of the seed with the smallest.
-        missed: part of the standstill that is sorted elsewhere.
-        blind: part of the motion that is taken for standstill.
-        right: part of all samples whose condition is named rightly.
-    """
-
-    case: str
-    level: float
-    indicator: str
-    rand: float
-    worst_rand: float
-    missed: float
-    blind: float
-    right: float
+    case: str  # one of CASES
+    level: float  # dB
+    indicator: str  # paper or robust
+    rand: float  # adjusted Rand index against the true conditions; 1 is perfect, 0 is chance
+    worst_rand: float  # of the seed with the smallest
+    missed: float  # part of the standstill that is sorted elsewhere
+    blind: float  # part of the motion that is taken for standstill
+    right: float  # part of all samples whose condition is named rightly
 
 
 def conditions_study(

@@ -42,17 +42,14 @@ class Stribeck:
 class StribeckComparison:
     """What each way recovers from the same data.
 
-    Attributes:
-        profile: one fit of both directions, by a profile over v_s.
-        least_squares, lasso: the paper's way, (forward, backward). v_s is where the excess over the constant has
-            fallen to 1/e; the static level is the curve's at rest.
-        condition: condition number of the paper's columns, scaled to unit norm, forward.
+    The paper's ways by direction (forward, backward): v_s is where the excess over the constant has fallen to 1/e, the
+    static level the curve's at rest.
     """
 
-    profile: Stribeck
+    profile: Stribeck  # one fit of both directions, by a profile over v_s
     least_squares: tuple[Stribeck, Stribeck]
     lasso: tuple[Stribeck, Stribeck]
-    condition: float
+    condition: float  # condition number of the paper's columns, scaled to unit norm, forward
 
 
 def profile_stribeck(velocity: Array, torque: Array, speed_noise: float) -> Stribeck:

@@ -24,17 +24,12 @@ PARTS = ("sindy", *STEPS)
 
 @dataclass(frozen=True)
 class Counted:
-    """Candidates, samples and seconds of one-shot SINDy (``sindy``) and of each step.
-
-    Attributes:
-        seconds: of ``numpy.linalg.lstsq``.
-        by_moments: seconds of the same as armloop solves it.
-    """
+    """Candidates, samples and seconds of one-shot SINDy (``sindy``) and of each step."""
 
     candidates: dict[str, int]
     samples: dict[str, int]
-    seconds: dict[str, float]
-    by_moments: dict[str, float]
+    seconds: dict[str, float]  # of numpy.linalg.lstsq
+    by_moments: dict[str, float]  # of the same as armloop solves it
 
     @property
     def stepwise(self) -> int:

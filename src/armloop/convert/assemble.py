@@ -35,21 +35,13 @@ class Answers:
 
 @dataclass(eq=False)
 class Part:
-    """One source as a motion log.
+    """One source as a motion log."""
 
-    Attributes:
-        log: with the times of the source, counted from its first sample.
-        extra: further columns by name, each (N,).
-        starts: index of the first sample of each part that must become a run of its own.
-        joints: the source's name of each joint, base to tip.
-        epoch: s since 1970 of the first sample, where the source says it.
-    """
-
-    log: MotionLog
-    extra: dict[str, Array]
-    starts: list[int]
-    joints: list[str]
-    epoch: float | None
+    log: MotionLog  # with the times of the source, counted from its first sample
+    extra: dict[str, Array]  # further columns by name, each (N,)
+    starts: list[int]  # first sample of each part that must become a run of its own
+    joints: list[str]  # the source's name of each joint, base to tip
+    epoch: float | None  # s since 1970 of the first sample, where the source says it
     notes: list[str] = field(default_factory=list)
 
 

@@ -36,19 +36,13 @@ _FACTORS = np.array(
 
 @dataclass(frozen=True)
 class Evidence:
-    """What columns show.
+    """What columns show."""
 
-    Attributes:
-        clocks: columns that rise throughout, those that do not simply count first.
-        counters: the clocks among them that rise by one from row to row.
-        constant: columns with one value, or none.
-        rates: by column, the column that is its derivative, their correlation, and how many times the column's rate
-            per unit of the first clock (per row without one) that derivative is.
-    """
-
-    clocks: list[str]
-    counters: list[str]
-    constant: list[str]
+    clocks: list[str]  # rise throughout, those that do not simply count first
+    counters: list[str]  # the clocks among them that rise by one from row to row
+    constant: list[str]  # have one value, or none
+    # by column, the column that is its derivative, their correlation, and how many times the column's rate per unit of
+    # the first clock (per row without one) that derivative is
     rates: dict[str, tuple[str, float, float]]
 
     @property

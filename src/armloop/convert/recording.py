@@ -15,34 +15,21 @@ from armloop.util.arrays import Array
 
 @dataclass(eq=False)
 class Recording:
-    """One source.
+    """One source."""
 
-    Attributes:
-        path: of the file or folder.
-        kind: what it is, in words ("ROS 2 bag", ...).
-        columns: the numeric columns by name, each (N,); not a number where a cell was empty.
-        mapping: what the format fixes; a unit of None is one that it does not say. None where a map is needed.
-        named: the joints' names say which is which, so that they have to be matched with the arm's.
-        starts: index of the first sample of each part that the source itself keeps apart (an episode, a
-            header that is repeated); 0 is one of them.
-        epoch: what the time column counts from, s since 1970, where the format says so.
-        rows: what to call a row ("row", "message").
-        notes: what was read and what was left, one line each.
-        unsure: what the columns' names leave open, by field of the map.
-        units: by column, the unit that a row below the header says.
-    """
-
-    path: Path
-    kind: str
-    columns: dict[str, Array]
-    mapping: Mapping | None = None
-    named: bool = False
-    starts: Sequence[int] = (0,)
-    epoch: float | None = None
-    rows: str = "row"
-    notes: list[str] = field(default_factory=list)
-    unsure: dict[str, str] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
+    path: Path  # of the file or folder
+    kind: str  # what it is, in words ("ROS 2 bag", ...)
+    columns: dict[str, Array]  # the numeric ones by name, each (N,); not a number where a cell was empty
+    mapping: Mapping | None = None  # what the format fixes, unit None where it does not say; else needed
+    named: bool = False  # the joints' names say which is which: they have to be matched with the arm's
+    starts: Sequence[int] = (0,)  # first sample of each part kept apart (an episode, a repeated header)
+    epoch: float | None = None  # what the time column counts from, s since 1970, where the format says so
+    rows: str = "row"  # what to call a row ("row", "message")
+    notes: list[str] = field(default_factory=list)  # what was read and what was left, one line each
+    unsure: dict[str, str] = field(
+        default_factory=dict
+    )  # what the columns' names leave open, by field of the map
+    units: dict[str, str] = field(default_factory=dict)  # by column, what a row below the header says
 
     @property
     def samples(self) -> int:

@@ -33,30 +33,18 @@ _NO_BODY = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Said:
-    """An arm as descriptions have it, n joints.
+    """An arm as descriptions have it, n joints."""
 
-    Attributes:
-        arm: kinematics, names and limits.
-        links: (10 n,) inertial parameters of bodies that can exist.
-        rotors: (n,) inertias of the drives seen at the joint, kg m² (kg).
-        damping: (n,) viscous coefficients, N m s (N s/m).
-        dry: (n,) levels of dry friction, N m (N).
-        stiffness, rest: (n,) springs at the joints, N m/rad (N/m), and where they are relaxed, rad (m).
-        gravity: (3,) m/s² in the base frame.
-        missing: what of the model is in none of these, one line each.
-        notes: what was decided on the way.
-    """
-
-    arm: Arm
-    links: Array
-    rotors: Array
-    damping: Array
-    dry: Array
-    stiffness: Array
-    rest: Array
-    gravity: Array
-    missing: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    arm: Arm  # kinematics, names and limits
+    links: Array  # (10 n,) inertial parameters of bodies that can exist
+    rotors: Array  # (n,) inertias of the drives seen at the joint, kg m² (kg)
+    damping: Array  # (n,) viscous coefficients, N m s (N s/m)
+    dry: Array  # (n,) levels of dry friction, N m (N)
+    stiffness: Array  # (n,) springs at the joints, N m/rad (N/m)
+    rest: Array  # (n,) where they are relaxed, rad (m)
+    gravity: Array  # (3,) m/s² in the base frame
+    missing: list[str] = field(default_factory=list)  # what of the model is in none of these, one line each
+    notes: list[str] = field(default_factory=list)  # what was decided on the way
 
     def torque(self, q: Array, v: Array, vdot: Array, features: frozenset[str]) -> Array:
         """(N, n) torques of the drives by what a target with these features takes in."""

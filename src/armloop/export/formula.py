@@ -35,21 +35,17 @@ class Stop(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """Torques as formulas.
+    """Torques as formulas."""
 
-    Attributes:
-        torque: (n,) as a controller supplies it: friction with memory as if fully slid, fading friction gone.
-        remembered: (n,) with the elements' states ``z[k]`` in [-1, 1] and the time ``t`` of the joints' start.
-        stops: the elements, in the order of their states.
-        fades: whether time matters.
-        left_out: what of the model is not in the formulas, one line each.
-    """
-
-    torque: list[Node]
-    remembered: list[Node]
-    stops: list[Stop]
-    fades: bool
-    left_out: list[str]
+    torque: list[
+        Node
+    ]  # (n,) as a controller supplies it: friction with memory fully slid, fading friction gone
+    remembered: list[
+        Node
+    ]  # (n,) with the elements' states z[k] in [-1, 1] and the time t of the joints' start
+    stops: list[Stop]  # the elements, in the order of their states
+    fades: bool  # whether time matters
+    left_out: list[str]  # what of the model is not in the formulas, one line each
 
     @property
     def has_memory(self) -> bool:
