@@ -53,15 +53,10 @@ class StribeckComparison:
 
 
 def profile_stribeck(velocity: Array, torque: Array, speed_noise: float) -> Stribeck:
-    """Eq. (34) by a profile over v_s.
+    """Eq. (34) by a profile over v_s; raises ``ExcitationError`` for too few speeds in either direction.
 
-    Args:
-        velocity, torque: (N,) of one joint while it moves at constant velocity, load removed.
-        speed_noise: standard deviation of the velocity's noise, rad/s; slower samples than four times this are left
-            out, and v_s is sought from the slowest sample left to half the fastest.
-
-    Raises:
-        ExcitationError: too few speeds in either direction.
+    ``velocity`` and ``torque`` (N,) are of one joint at constant velocities, load removed. Samples slower than four
+    standard deviations ``speed_noise``, rad/s, are left out; v_s is sought from the slowest left to half the fastest.
     """
     v, tau = _reliable(velocity, torque, speed_noise)
     low, high = np.log(np.abs(v).min()), np.log(0.5 * np.abs(v).max())

@@ -24,27 +24,18 @@ NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """What was written and how it reads back.
+    """What was written and how it reads back; torques of n joints."""
 
-    Attributes:
-        target: one of ``armloop.export.TARGETS``.
-        files: what was written.
-        consumer: who read it back; empty where nobody could, which ``notes`` say.
-        rms: (n,) RMS of the model's torque over the states compared.
-        difference: (n,) largest difference between the torque read back and what the target can say of the model.
-        unsaid: (n,) largest difference between the torque read back and the whole model's.
-        missing: what the target cannot say, one line each.
-        notes: what else the user should know.
-    """
-
-    target: str
-    files: list[Path]
-    consumer: str
-    rms: Array
-    difference: Array | None
-    unsaid: Array | None
-    missing: list[str]
-    notes: list[str]
+    target: str  # one of armloop.export.TARGETS
+    files: list[Path]  # what was written
+    consumer: str  # who read it back; empty where nobody could, which the notes say
+    rms: Array  # (n,) RMS of the model's torque over the states compared
+    difference: (
+        Array | None
+    )  # (n,) largest one of the torque read back from what the target can say of the model
+    unsaid: Array | None  # (n,) largest one of the torque read back from the whole model's
+    missing: list[str]  # what the target cannot say, one line each
+    notes: list[str]  # what else the user should know
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""

@@ -60,11 +60,9 @@ class Registry(Generic[T]):
         return self._load(self.installed[name]) if found is None and name in self.installed else found
 
     def own(self) -> dict[str, T]:
-        """Every one of the user's by its name, installed ones loaded.
+        """Every one of the user's by its name, installed ones loaded; raises ``InputError`` for one that is no good.
 
-        Raises:
-            InputError: an installed one cannot be loaded or is none. It is not passed over: what lacks one without a
-                word would be something else.
+        It is not passed over: what lacks one without a word would be something else.
         """
         return {name: self._load(entry) for name, entry in self.installed.items()} | self.session
 

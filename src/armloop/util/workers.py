@@ -166,11 +166,7 @@ class Team:
 
 
 class Processes(Workers):
-    """In forked processes, one BLAS thread each; they inherit function and chunks, only answers are copied.
-
-    Args:
-        jobs: how many; all cores by default.
-    """
+    """In forked processes, all cores by default, one BLAS thread each; function and chunks are inherited, answers copied."""
 
     def __init__(self, jobs: int | None = None) -> None:
         self.jobs = jobs or len(os.sched_getaffinity(0))
@@ -185,13 +181,9 @@ class Processes(Workers):
 
 
 class Cluster(Workers):
-    """On the workers of a Dask scheduler, which must have this package and see the same files.
+    """On the workers of a Dask scheduler (``tcp://10.0.0.7:8786``), which must have this package and see the same files.
 
-    Args:
-        address: of the scheduler, such as ``tcp://10.0.0.7:8786``.
-
-    Raises:
-        InputError: Dask is not installed, or nothing answers at the address.
+    Raises ``InputError`` where Dask is not installed, or nothing answers at the address.
     """
 
     def __init__(self, address: str) -> None:
