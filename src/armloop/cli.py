@@ -173,14 +173,7 @@ def _named_files(options: Options) -> list[str]:
         for each in value if isinstance(value, list) else [value]:
             if name not in _WRITTEN and isinstance(each, str):
                 found += [part for part in (each, each.partition("=")[2], each.rpartition(":")[0]) if part]
-    return [path for path in found if _is_file(path)]
-
-
-def _is_file(path: str) -> bool:
-    try:
-        return os.path.isfile(path)
-    except ValueError:  # a zero byte
-        return False
+    return [path for path in found if os.path.isfile(path)]
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from armloop.reports.html import Section
 from armloop_paper.context import Context
 from armloop_paper.estimators import estimators_table, study
-from armloop_paper.outcome import Outcome
+from armloop_paper.outcome import Outcome, beyond
 
 
 def run(context: Context) -> Outcome:
@@ -16,5 +18,4 @@ def run(context: Context) -> Outcome:
         f"terms (the oracle); {context.draws} draws of states and noise. The paper uses plain Lasso."
     )
     section = Section("Beyond the paper: estimators under noise", [text], tables=[estimators_table(rows)])
-    results = [row.to_dict() for row in rows]
-    return Outcome({"rows": None}, {"rows": results}, "beyond", f"{len(rows)} rows", section)
+    return beyond({"rows": [asdict(row) for row in rows]}, f"{len(rows)} rows", section)

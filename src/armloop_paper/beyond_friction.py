@@ -8,7 +8,7 @@ from armloop.laws.friction import stribeck_fall
 from armloop.reports.html import Section
 from armloop.reports.tables import make_table
 from armloop_paper.context import Context
-from armloop_paper.outcome import Outcome
+from armloop_paper.outcome import Outcome, beyond
 from armloop_paper.spread import in_words, spread
 from armloop_paper.stribeck import Stribeck, compare_stribeck
 
@@ -40,16 +40,11 @@ def run(context: Context) -> Outcome:
         f"columns have condition {condition:.0e}. Shown is the forward direction."
     )
     headers = ["", "true", "profile over v_s", "exponentials, least squares", "exponentials, Lasso"]
-    return Outcome(
-        {way: dict.fromkeys(values) for way, values in ours.items()},
+    table = make_table(headers, rows, f"Median (range) of {context.draws} draws")
+    return beyond(
         ours,
-        "beyond",
         f"v_s {in_words(found['profile'][:, 2])} by the profile (true {_TRUE.velocity})",
-        Section(
-            "Beyond the paper: Stribeck friction",
-            [text],
-            tables=[make_table(headers, rows, f"Median (range) of {context.draws} draws")],
-        ),
+        Section("Beyond the paper: Stribeck friction", [text], tables=[table]),
     )
 
 

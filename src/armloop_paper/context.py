@@ -17,25 +17,15 @@ Result = TypeVar("Result")
 
 @dataclass
 class Context:
-    """One run of the reproduction.
+    """One run of the reproduction."""
 
-    Attributes:
-        draws: noise draws per case.
-        reading_draws: noise draws per reading of the recipe that is not the default.
-        seeds: collections of the tracking experiment.
-        starts: random starts of k-means.
-        repeats: of a short timing, of which the best counts.
-        processes: how many work at once, forked, with one BLAS thread each; 1 works here.
-        progress: told where the run stands.
-    """
-
-    draws: int = 10
-    reading_draws: int = 2
-    seeds: int = 5
-    starts: int = 20
-    repeats: int = 20
-    processes: int = 2
-    progress: Progress = silent
+    draws: int = 10  # noise draws per case
+    reading_draws: int = 2  # noise draws per reading of the recipe that is not the default
+    seeds: int = 5  # collections of the tracking experiment
+    starts: int = 20  # random starts of k-means
+    repeats: int = 20  # of a short timing, of which the best counts
+    processes: int = 2  # how many work at once, forked, with one BLAS thread each; 1 works here
+    progress: Progress = silent  # told where the run stands
     _shared: dict[object, Any] = field(default_factory=dict)
 
     def once(self, key: object, make: Callable[[], Result]) -> Result:

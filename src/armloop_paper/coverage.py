@@ -8,8 +8,7 @@ in units of their spread, because noise in the motion biases least squares and n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student
@@ -39,57 +38,32 @@ DISTURBANCES = (
 
 @dataclass(frozen=True)
 class Covered:
-    """One disturbance.
-
-    Attributes:
-        disturbance: its name.
-        coefficients: number of coefficients of each kind.
-        blocks: part of the intervals from blocks that cover, per kind.
-        independent: the same with samples taken as independent.
-        bias: root mean square over a kind's coefficients of mean error over standard deviation of the estimates.
-        width: median ratio of stated standard error to the estimates' standard deviation, per kind.
-        block_count: mean number of blocks.
-    """
+    """One disturbance, by kind of coefficient."""
 
     disturbance: str
-    coefficients: dict[str, int]
-    blocks: dict[str, float]
-    independent: dict[str, float]
-    bias: dict[str, float | None]
-    width: dict[str, float | None]
-    block_count: float
-
-
-@dataclass(frozen=True)
-class CoverageStudy:
-    """Nominal level, number of simulated logs per disturbance, how they were regressed, and what came out."""
-
-    nominal: float
-    simulations: int
-    jointly: bool
-    results: list[Covered]
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return asdict(self)
+    coefficients: dict[str, int]  # how many
+    blocks: dict[str, float]  # part of the intervals from blocks that cover
+    independent: dict[str, float]  # the same with samples taken as independent
+    bias: dict[str, float | None]  # RMS of mean error over standard deviation of the estimates
+    width: dict[
+        str, float | None
+    ]  # median ratio of stated standard error to the estimates' standard deviation
+    block_count: float  # mean number of blocks
 
 
 def coverage_study(
-    simulations: int = 100,
+    simulations: int,
     seed: int = 0,
     disturbances: Sequence[Disturbance] = DISTURBANCES,
     jointly: bool = False,
     design: Collection | None = None,
     progress: Progress = silent,
-) -> CoverageStudy:
+) -> list[Covered]:
     """Regress the true terms of a three-axis arm from simulated logs, again and again.
 
-    Args:
-        simulations: logs per disturbance; motion is the same in all, the errors are fresh.
-        seed: of the motion and the errors.
-        jointly: regress all terms on all samples at once instead of step by step. The level of Step I is that
-            at creeping speed, viscous friction included; regressed jointly it is that of Eq. (34).
-        design: the motion; by default creeping past 24 poses, 60 constant velocities, 60 s of varying ones.
+    So many ``simulations`` per disturbance: the motion of ``design`` is the same in all, the errors are fresh. ``jointly``
+    regresses all terms on all samples at once instead of step by step: the level of Step I is that at creeping speed,
+    viscous friction included, the joint one that of Eq. (34).
     """
     design = design or collection(seed)
     truth = true_model()
@@ -98,7 +72,7 @@ def coverage_study(
         progress(f"coverage: {disturbance.name}, {simulations} logs")
         runs = [_one(truth, design, disturbance, jointly, 1000 * seed + k) for k in range(simulations)]
         results.append(_summary(disturbance.name, runs))
-    return CoverageStudy(NOMINAL, simulations, jointly, results)
+    return results
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,21 +92,15 @@ def _one(
     fitted = _fitted(samples, len(design.motions[0].starts), len(design.motions[1].starts), jointly)
     _, parts = solve_given_terms(truth, samples, fitted, 3)
     true_values = {_key(u): u.value for problem in problems(truth) for u in problem.unknowns}
-    kinds, error, block, independent, half = [], [], [], [], []
-    for part in parts:
-        textbook = np.sqrt(np.diag(part.equations.independent_covariance()))
-        for k, unknown in enumerate(part.unknowns):
-            kinds.append(_kind(unknown))
-            error.append(unknown.value - true_values[_key(unknown)])
-            block.append(part.std_error[k])
-            half.append(part.std_error[k] * student.ppf(0.5 + NOMINAL / 2, part.freedom[k]))
-            independent.append(textbook[k])
+    unknowns = [unknown for part in parts for unknown in part.unknowns]
+    block = np.concatenate([part.std_error for part in parts])
+    freedom = np.concatenate([part.freedom for part in parts])
     return _Run(
-        kinds,
-        np.array(error),
-        np.array(block),
-        np.array(independent),
-        np.array(half),
+        [_kind(unknown) for unknown in unknowns],
+        np.array([unknown.value - true_values[_key(unknown)] for unknown in unknowns]),
+        block,
+        np.concatenate([np.sqrt(np.diag(part.equations.independent_covariance())) for part in parts]),
+        block * student.ppf(0.5 + NOMINAL / 2, freedom),
         max(part.equations.blocks for part in parts),
     )
 

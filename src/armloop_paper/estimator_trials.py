@@ -42,38 +42,25 @@ _ROUND_OFF = 1e-6
 
 @dataclass(frozen=True)
 class Case:
-    """One experiment under noise.
+    """One experiment under noise."""
 
-    Attributes:
-        arm: a key of :data:`EXPERIMENTS`.
-        name: of the case.
-        snr: in dB, of q, v and v̇.
-        widened: joint 2 turns within ±90°.
-        slow: whether the slow solvers take part.
-    """
-
-    arm: str
+    arm: str  # a key of EXPERIMENTS
     name: str
-    snr: tuple[float, float, float]
-    widened: bool = False
-    slow: bool = True
+    snr: tuple[float, float, float]  # dB, of q, v and v̇
+    widened: bool = False  # joint 2 turns within ±90°
+    slow: bool = True  # whether the slow solvers take part
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One estimator on one noise draw.
-
-    Attributes:
-        terms, false, missed: over all steps and joints.
-        error: (n,) RMSE on the trajectory outside the range, N·m or N.
-    """
+    """One estimator on one noise draw; terms over all steps and joints."""
 
     estimator: str
     draw: int
     terms: int
     false: int
     missed: int
-    error: list[float]
+    error: list[float]  # (n,) RMSE on the trajectory outside the range, N·m or N
 
 
 def _ranges(case: Case) -> MotionRanges:
@@ -98,31 +85,31 @@ def _significant(columns: Index, beta: Array) -> tuple[Index, Array]:
     return columns[large], beta[large]
 
 
-def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...], first: int) -> list[Trial]:
+def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...]) -> list[Trial]:
     """Every estimator on one draw."""
     experiment = EXPERIMENTS[case.arm]
     logs = inverse_dynamics_samples(experiment.arm, _ranges(case), experiment.counts, seed, case.snr)
     names = _names(experiment)
-    true = {
-        (step + 1, joint, names[step][column])
-        for step, joints in enumerate(truth)
-        for joint, (columns, _) in enumerate(joints)
-        for column in columns
-    }
     trials = []
     beyond = experiment.beyond_range()
     exact = experiment.torque(beyond)
+
+    def terms(fitted: Fitted) -> set[tuple[int, int, str]]:
+        return {
+            (step + 1, joint, names[step][column])
+            for step, joints in enumerate(fitted)
+            for joint, (columns, beta) in enumerate(joints)
+            for column in columns[beta != 0]
+        }
+
+    true = terms(truth)
 
     def add(name: str, found: set[tuple[int, int, str]], tau: Array) -> None:
         error = np.sqrt(np.mean((tau - exact) ** 2, axis=0)).tolist()
         trials.append(Trial(name, seed, len(found), len(found - true), len(true - found), error))
 
     for name in (ORACLE, *estimators):
-        if (
-            name in _SLOW
-            and len(experiment.revolute) == 3
-            and not (case.slow and seed < first + _DRAWS_OF_SLOW)
-        ):
+        if name in _SLOW and experiment.arm.n == 3 and not (case.slow and seed < _DRAWS_OF_SLOW):
             continue
         if name == ESTIMATORS[0]:
             model = _default(experiment, logs, case.snr)
@@ -134,17 +121,7 @@ def draw_trials(seed: int, case: Case, truth: Fitted, estimators: tuple[str, ...
             )
         except ArithmeticError as error:
             raise InputError(f"{case.name}, {name}: {error}") from error
-        found = {
-            (step + 1, joint, names[step][column])
-            for step, joints in enumerate(fitted)
-            for joint, (columns, beta) in enumerate(joints)
-            for column in columns[beta != 0]
-        }
-        tau = sum(
-            (_apply(experiment, step, fitted[step], beyond) for step in range(len(STEPS))),
-            np.zeros_like(exact),
-        )
-        add(name, found, tau)
+        add(name, terms(fitted), _sum(experiment, fitted, beyond))
     return trials
 
 
@@ -198,12 +175,16 @@ def _names(experiment: Experiment) -> list[list[str]]:
     return found
 
 
-def _apply(experiment: Experiment, step: int, fitted: list[tuple[Index, Array]], motion: Motion) -> Array:
-    library = _library(experiment, step)
-    coefficients = np.zeros((library.size, len(fitted)))
-    for joint, (columns, beta) in enumerate(fitted):
-        coefficients[columns, joint] = beta
-    return library.apply(motion, coefficients)
+def _sum(experiment: Experiment, fitted: Fitted, motion: Motion) -> Array:
+    """(N, n) torques of the steps fitted so far."""
+    tau = np.zeros_like(motion.q)
+    for step, joints in enumerate(fitted):
+        library = _library(experiment, step)
+        coefficients = np.zeros((library.size, len(joints)))
+        for joint, (columns, beta) in enumerate(joints):
+            coefficients[columns, joint] = beta
+        tau += library.apply(motion, coefficients)
+    return tau
 
 
 def _by_steps(
@@ -213,7 +194,7 @@ def _by_steps(
     fitted: Fitted = []
     for step, condition in enumerate(CONDITIONS):
         motion, tau = as_motion(logs[condition])
-        rest = tau - sum((_apply(experiment, k, fitted[k], motion) for k in range(step)), np.zeros_like(tau))
+        rest = tau - _sum(experiment, fitted, motion)
         if sparse is None:
             assert truth is not None
             fitted.append(

@@ -9,9 +9,8 @@ Sect. 3.3. The oracle knows the true terms and regresses them by least squares.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -32,55 +31,35 @@ CASES = (
 
 @dataclass(frozen=True)
 class Row:
-    """One estimator over the draws of one case.
-
-    Attributes:
-        exact: draws with exactly the true terms.
-        nearly: draws with all true terms and at most one false one.
-        terms, false, missed: means.
-        error: largest over the joints of the RMSE outside the range over that of the oracle, median of the draws.
-        worst: its maximum over the draws with the exact terms; None if there are none.
-    """
+    """One estimator over the draws of one case."""
 
     case: str
     estimator: str
     draws: int
-    exact: int
-    nearly: int
-    terms: float
+    exact: int  # draws with exactly the true terms
+    nearly: int  # draws with all true terms and at most one false one
+    terms: float  # mean number, of which are
     false: float
     missed: float
-    error: float
-    worst: float | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return asdict(self)
+    error: float  # median of the draws' largest RMSE of a joint outside the range over that of the oracle
+    worst: float | None  # its maximum over the draws with the exact terms; None if there are none
 
 
 def study(
     draws: int = 10,
     progress: Progress = silent,
-    first: int = 0,
     cases: Sequence[Case] = CASES,
     estimators: Sequence[str] = ESTIMATORS,
     jobs: int | None = None,
 ) -> list[Row]:
-    """All estimators on so many noise draws, seeds ``first``, ``first`` + 1, … of every case.
-
-    Args:
-        jobs: processes; all cores by default.
-    """
+    """All estimators on so many noise draws, seeds from 0, of every case; ``jobs`` processes, by default one per core."""
     rows: list[Row] = []
     for case in cases:
         truth = true_terms(EXPERIMENTS[case.arm])
-        seeds = range(first, first + draws)
-        jobs_done = Processes(jobs).map(
-            partial(draw_trials, case=case, truth=truth, estimators=tuple(estimators), first=first), seeds
-        )
+        draw = partial(draw_trials, case=case, truth=truth, estimators=tuple(estimators))
         trials: list[Trial] = []
-        for seed, some in zip(seeds, jobs_done, strict=True):
-            progress(f"{case.name}: draw {seed - first + 1} of {draws}")
+        for seed, some in enumerate(Processes(jobs).map(draw, range(draws))):
+            progress(f"{case.name}: draw {seed + 1} of {draws}")
             trials += some
         rows += _rows(case, trials)
     return rows

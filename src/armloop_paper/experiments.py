@@ -23,23 +23,15 @@ STEPS = ("step1", "step2", "step3")
 
 @dataclass(frozen=True)
 class Experiment:
-    """One arm of the paper as it is simulated there.
-
-    Attributes:
-        arm_name: built-in arm.
-        ranges: of q, v and vdot in the data collections (Tables 1 and 3), lower and upper ends, rad, s, m.
-        counts: samples of the static, constant-velocity and varying data.
-        orders: optimal (N1, N2) of one-shot SINDy and of the steps.
-        penalty, threshold: λ of Eq. (32), and the size from which a coefficient counts as active.
-        beyond: centre and amplitude of the trajectory outside the range of the data, q(t) = c + a sin(πt).
-    """
+    """One arm of the paper as it is simulated there."""
 
     arm_name: str
-    ranges: MotionRanges
-    counts: tuple[int, int, int]
-    orders: dict[str, tuple[int, int]]
-    penalty: float
-    threshold: float
+    ranges: MotionRanges  # of q, v and vdot in the data collections (Tables 1 and 3), rad, s, m
+    counts: tuple[int, int, int]  # samples of the static, constant-velocity and varying data
+    orders: dict[str, tuple[int, int]]  # optimal (N1, N2) of one-shot SINDy and of the steps
+    penalty: float  # λ of Eq. (32)
+    threshold: float  # from which size a coefficient counts as active
+    # centre and amplitude of the trajectory outside the range of the data, q(t) = c + a sin(πt)
     beyond: tuple[tuple[float, ...], tuple[float, ...]]
 
     @cached_property
@@ -52,27 +44,25 @@ class Experiment:
         """Which joints turn."""
         return tuple(bool(turns) for turns in self.arm.revolute)
 
-    def library(self, part: str, orders: tuple[int, int] | None = None) -> DoubleFeatureSet:
-        """The paper's library of one-shot SINDy or of a step, with its redundant products."""
+    def library(
+        self, part: str, orders: tuple[int, int] | None = None, independent: bool = False
+    ) -> DoubleFeatureSet:
+        """The paper's library of one-shot SINDy or of a step, with or without what sin² + cos² = 1 makes redundant."""
         return DoubleFeatureSet(
-            self.revolute, *(orders or self.orders[part]), SECOND[part], independent=False
+            self.revolute, *(orders or self.orders[part]), SECOND[part], independent=independent
         )
 
-    def independent(self, part: str, orders: tuple[int, int] | None = None) -> DoubleFeatureSet:
-        """The products without those that sin² + cos² = 1 makes redundant."""
-        return DoubleFeatureSet(self.revolute, *(orders or self.orders[part]), SECOND[part])
-
     def waves(self, part: str, orders: tuple[int, int] | None = None) -> AngleSums:
-        """The same functions without redundancy."""
+        """The same functions as angle sums, without redundancy."""
         return AngleSums(self.revolute, *(orders or self.orders[part]), SECOND[part])
 
     def torque(self, motion: Motion) -> Array:
         """(N, n) exact torques."""
         return regressor(self.arm, motion.q, motion.v, motion.vdot) @ nominal_parameters(self.arm)
 
-    def beyond_range(self, seconds: float = 4.0, samples: int = 801) -> Motion:
+    def beyond_range(self) -> Motion:
         """The trajectory outside the range of the data (captions of Figs. 6 and 11), two periods of it."""
-        t = np.linspace(0.0, seconds, samples)
+        t = np.linspace(0.0, 4.0, 801)
         centre, amplitude = (np.array(part) for part in self.beyond)
         q = centre + np.outer(np.sin(np.pi * t), amplitude)
         v = np.pi * np.outer(np.cos(np.pi * t), amplitude)

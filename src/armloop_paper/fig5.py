@@ -54,8 +54,7 @@ def run(context: Context) -> Outcome:
             [
                 Picture(
                     active_figure(
-                        {METHODS[m]: np.array([one.active[m] for one in draws]) for m in METHODS},
-                        "active terms",
+                        {METHODS[m]: [np.array([one.active[m] for one in draws])] for m in METHODS}
                     ),
                     "Median over the draws; lines span all of them.",
                 )

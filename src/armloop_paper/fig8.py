@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.experiment.sampling import CONDITIONS, inverse_dynamics_samples
-from armloop.features.double_feature_set import DoubleFeatureSet
 from armloop.features.wave_moments import WaveProducts
 from armloop.reports.html import Picture, Section
 from armloop.reports.tables import make_table
 from armloop_paper import paper
 from armloop_paper.context import Context
-from armloop_paper.experiments import SECOND, STEPS, THREE_AXIS, as_motion
+from armloop_paper.experiments import STEPS, THREE_AXIS, as_motion
 from armloop_paper.least_squares import least_squares
 from armloop_paper.outcome import Outcome
 from armloop_paper.plots import order_errors_figure
@@ -45,22 +44,21 @@ def run(context: Context) -> Outcome:
     errors, noisy = _merged(found[:-2]), _merged(found[-2:])
     chosen = {name: choose(name, errors[name]) for name in _TRIED}
     under_noise = {name: list(choose(name, noisy[name])) for name in _TRIED}
-    rows = [
-        [
-            _NAMES[name],
-            f"({N1}, {N2})",
-            library_size(name, (N1, N2)),
-            errors[name][N1, N2],
-            noisy[name].get((N1, N2)),
-            _mark(name, (N1, N2), chosen),
-        ]
-        for name, tried in _TRIED.items()
-        for N1, N2 in sorted(tried, key=lambda orders: library_size(name, orders))
-    ]
-    searches = {}
+    rows, searches = [], {}
     for name, tried in _TRIED.items():
         in_order = sorted(tried, key=lambda orders: library_size(name, orders))
         labels = [f"({N1}, {N2})" for N1, N2 in in_order]
+        rows += [
+            [
+                _NAMES[name],
+                label,
+                library_size(name, orders),
+                errors[name][orders],
+                noisy[name].get(orders),
+                _mark(name, orders, chosen),
+            ]
+            for label, orders in zip(labels, in_order, strict=True)
+        ]
         searches[_NAMES[name]] = (labels, [errors[name][o] for o in in_order], in_order.index(chosen[name]))
     ours = {name: list(orders) for name, orders in chosen.items()}
     same = ours == paper.THREE_AXIS_ORDERS
@@ -121,7 +119,7 @@ def choose(name: str, errors: dict[Orders, float]) -> Orders:
 
 def library_size(name: str, orders: Orders) -> int:
     """Candidates of the paper's library at these orders."""
-    return DoubleFeatureSet(THREE_AXIS.revolute, *orders, SECOND[name], independent=False).size
+    return THREE_AXIS.library(name, orders).size
 
 
 def _search(job: _Job) -> dict[str, dict[Orders, float]]:

@@ -20,16 +20,7 @@ _CHUNK = 1024
 
 
 def library_moments(library: DoubleFeatureSet, motion: Motion, tau: Array) -> tuple[Array, Array]:
-    """Sums over the samples of a library's products.
-
-    Args:
-        motion: N samples of n joints.
-        tau: (N, n) torques.
-
-    Returns:
-        G: (p, p) YᵀY of the candidates Y (N, p).
-        B: (p, n) Yᵀτ.
-    """
+    """(p, p) YᵀY and (p, n) Yᵀτ of a library's candidates Y (N, p) and torques τ (N, n)."""
     first, second = _feature_sets(library)
     values = library.factors.evaluate(motion)
     table = np.zeros((len(first.parents), len(second.parents)))
@@ -47,17 +38,11 @@ def library_moments(library: DoubleFeatureSet, motion: Motion, tau: Array) -> tu
 
 @dataclass(frozen=True, eq=False)
 class _FeatureSet:
-    """M monomials with their pairwise products.
+    """M monomials with their pairwise products."""
 
-    Attributes:
-        index: (M, K) factors of each monomial.
-        parents: (S, 2) two members whose product each of the S different products is.
-        pairs: (M, M) the product that each pair gives.
-    """
-
-    index: Index
-    parents: Index
-    pairs: Index
+    index: Index  # (M, K) factors of each monomial
+    parents: Index  # (S, 2) two members whose product each of the S different products is
+    pairs: Index  # (M, M) the product that each pair gives
 
     def squares(self, members: Array) -> Array:
         """(S, N) products of the members' values (M, N)."""

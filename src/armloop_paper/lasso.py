@@ -30,14 +30,11 @@ class NotConverged(ArithmeticError):
 
 
 def lasso(G: Array, b: Array, yy: float, penalty: float, start: Array | None = None) -> Array:
-    """Minimise ½‖y − Xξ‖² + penalty·‖ξ‖₁ from G = XᵀX (p, p), b = Xᵀy (p,), yy = ‖y‖².
+    """Minimise ½‖y − Xξ‖² + penalty·‖ξ‖₁ from G = XᵀX (p, p), b = Xᵀy (p,), yy = ‖y‖²; raises ``NotConverged``.
 
-    An active-set method on a falling sequence of penalties: the columns that violate optimality most are added, the
-    active ones are moved to the exact minimum for their signs, and those that cross zero on the way are dropped.
-    A start saves the way from zero.
-
-    Raises:
-        NotConverged: the duality gap stays above `TOLERANCE` of the objective.
+    An active-set method on a falling sequence of penalties: the columns that violate optimality most are added, the active
+    ones are moved to the exact minimum for their signs, and those that cross zero on the way are dropped. A start saves the
+    way from zero.
     """
     xi = np.zeros(len(b)) if start is None else start
     largest = float(np.abs(b - G @ xi).max(initial=0.0))
@@ -58,7 +55,7 @@ def _descend(G: Array, b: Array, yy: float, penalty: float, xi: Array) -> tuple[
     for _ in range(_ROUNDS):
         active = np.flatnonzero(xi)
         g = b - xi[active] @ G[active]
-        gap = _gap(b, g, yy, penalty, xi)
+        gap = duality_gap(b, g, yy, penalty, xi)
         if gap <= TOLERANCE:
             break
         excess = np.abs(g) - penalty
@@ -95,15 +92,11 @@ def stopped_early(G: Array, b: Array, yy: float, penalty: float) -> Array:
     return np.asarray(coefficients[:, 0])
 
 
-def duality_gap(G: Array, b: Array, yy: float, penalty: float, xi: Array) -> float:
-    """Gap between the objective and its dual bound, relative to the objective.
+def duality_gap(b: Array, g: Array, yy: float, penalty: float, xi: Array) -> float:
+    """Gap between the objective and its dual bound, relative to the objective, at coefficients xi with g = b − G ξ.
 
     Objectives below 1e-8 of ½‖y‖² are exact fits: the gap is then relative to that.
     """
-    return _gap(b, b - G @ xi, yy, penalty, xi)
-
-
-def _gap(b: Array, g: Array, yy: float, penalty: float, xi: Array) -> float:
     rss = max(yy - float(xi @ (b + g)), 0.0)
     objective = 0.5 * rss + penalty * float(np.abs(xi).sum())
     shrink = min(1.0, penalty / max(float(np.abs(g).max()), TINY))

@@ -15,6 +15,9 @@ from armloop_paper.readings import READINGS, Reading, collected
 
 Snr = tuple[float, float, float] | None
 
+#: Terms that are looked through for those that give a printed percentage.
+_MOST = 6000
+
 METHODS = {"sindy": "SINDy", "stepwise": "stepwise", "armloop": "armloop"}
 
 
@@ -92,20 +95,20 @@ def readings(
     return rows + [(r, found[k * count : (k + 1) * count]) for k, r in enumerate(others)]
 
 
-def reduction(draws: list[Draw], method: str = "stepwise") -> Array:
-    """(d, n) percent by which a method keeps fewer active terms than SINDy."""
+def reduction(draws: list[Draw]) -> Array:
+    """(d, n) percent by which the stepwise method keeps fewer active terms than SINDy."""
     sindy = np.array([one.active["sindy"] for one in draws], dtype=float)
-    other = np.array([one.active[method] for one in draws], dtype=float)
+    other = np.array([one.active["stepwise"] for one in draws], dtype=float)
     return np.where(sindy > 0, 100 * (1 - other / np.maximum(sindy, 1)), 0.0)
 
 
-def least_counts(percent: float, digits: int, most: int = 6000) -> tuple[int, int]:
+def least_counts(percent: float, digits: int) -> tuple[int, int]:
     """The smallest (stepwise, SINDy) numbers of terms whose reduction rounds to the printed percentage.
 
     A printed figure of four digits tells how many terms there must have been at least. Figures are allowed to be
     rounded or cut off.
     """
-    for sindy in range(1, most):
+    for sindy in range(1, _MOST):
         few = round(sindy * (1 - percent / 100))
         for stepwise_terms in (few - 1, few, few + 1):
             if stepwise_terms >= 0:
@@ -113,4 +116,4 @@ def least_counts(percent: float, digits: int, most: int = 6000) -> tuple[int, in
                 unit = 10.0**-digits
                 if abs(exact - percent) <= 0.5 * unit + 1e-9 or 0 <= exact - percent < unit - 1e-9:
                     return stepwise_terms, sindy
-    return 0, most
+    return 0, _MOST

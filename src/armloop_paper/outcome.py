@@ -10,24 +10,14 @@ from armloop.reports.html import Section
 
 @dataclass(frozen=True)
 class Outcome:
-    """One item.
+    """One item, figures JSON-ready; raises ``ValueError`` when the paper's side and ours have different keys."""
 
-    Attributes:
-        paper, ours: JSON-ready figures under the same keys; None where the paper prints no number.
-        details: JSON-ready figures that the paper has no counterpart of: spread, readings, errors.
-        verdict: ``agrees``, ``partly`` or ``differs``; ``beyond`` where the paper has nothing to compare with.
-        headline: ours against the paper's in one short line.
-        section: of the report; its text says what agrees, what does not and why.
-
-    Raises ``ValueError`` when the two sides have different keys.
-    """
-
-    paper: dict[str, Any]
+    paper: dict[str, Any]  # None where the paper prints no number
     ours: dict[str, Any]
-    verdict: str
-    headline: str
-    section: Section
-    details: dict[str, Any] = field(default_factory=dict)
+    verdict: str  # agrees, partly or differs; beyond where the paper has nothing to compare with
+    headline: str  # ours against the paper's in one short line
+    section: Section  # of the report; its text says what agrees, what does not and why
+    details: dict[str, Any] = field(default_factory=dict)  # without a counterpart: spread, readings, errors
 
     def __post_init__(self) -> None:
         if _keys(self.paper) != _keys(self.ours):
@@ -41,6 +31,11 @@ class Outcome:
             "verdict": self.verdict,
             "details": self.details,
         }
+
+
+def beyond(ours: dict[str, Any], headline: str, section: Section) -> Outcome:
+    """A study beyond the paper, whose side has the same keys and no numbers."""
+    return Outcome(_keys(ours), ours, "beyond", headline, section)
 
 
 def _keys(value: Any) -> Any:

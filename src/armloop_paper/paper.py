@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from armloop.reports import paper as published
+
 #: Fig. 1 and the end of Sect. 2.2: clusters at the elbow; iterations of Algorithm 1 over 20 random starts.
 CLUSTERS, RUNS, ITERATIONS_MAX, ITERATIONS_MEAN = 3, 20, 12, 5.75
 
@@ -35,4 +37,4 @@ THREE_AXIS_SNR = {"case_1": None, "case_2": (70.0, 50.0, 30.0), "case_3": (60.0,
 THREE_AXIS_REDUCTION = {"case_2": [75.62, 83.81, 50.00], "case_3": [83.34, 85.57, 85.78]}
 
 #: Sect. 4.3, below Fig. 13: mean absolute tracking error, deg.
-ETA_DEG = {"pid": [1.10, 1.21, 1.23], "pid_step1": [0.73, 0.50, 0.81], "pid_step3": [0.25, 0.25, 0.27]}
+ETA_DEG = {name: list(eta) for name, eta in published.ETA_DEG.items()}

@@ -14,16 +14,13 @@ from armloop.util.arrays import Array
 _COLORS = (ORANGE, GREEN, BLUE)
 
 
-def active_figure(counts: Mapping[str, Array], what: str, titles: Sequence[str] = ("",)) -> Figure:
-    """Bars per joint and method: medians of draws (d, n), lines over their range, on a logarithmic axis.
-
-    With several titles the methods' arrays are (panels, d, n), one panel each.
-    """
+def active_figure(counts: Mapping[str, Sequence[Array]], titles: Sequence[str] = ("",)) -> Figure:
+    """Active terms by method, a panel for each of its arrays of draws (d, n): bars per joint, lines over their range."""
     made = figure(max(6.4, 4.2 * len(titles)), 3.4)
     row = panels(made, 1, len(titles), sharey=True)[0]
     for k, (axes, title) in enumerate(zip(row, titles, strict=True)):
         for m, (name, values) in enumerate(counts.items()):
-            draws = np.asarray(values if len(titles) == 1 else values[k], dtype=float)
+            draws = values[k]
             middle = np.median(draws, axis=0)
             x = np.arange(draws.shape[1]) + (m - 0.5 * (len(counts) - 1)) * 0.27
             span = np.abs(np.array([draws.min(axis=0), draws.max(axis=0)]) - middle)
@@ -41,7 +38,7 @@ def active_figure(counts: Mapping[str, Array], what: str, titles: Sequence[str] 
                 )
         axes.set_yscale("log")
         axes.set_xticks(range(draws.shape[1]), [f"joint {j + 1}" for j in range(draws.shape[1])])
-        polish(axes, "", what if k == 0 else "", title, grid="y")
+        polish(axes, "", "active terms" if k == 0 else "", title, grid="y")
         axes.margins(y=0.15)
     legend(made, len(counts))
     return made

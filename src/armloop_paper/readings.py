@@ -20,8 +20,7 @@ from armloop_paper.experiments import STEPS, Experiment
 
 #: The penalised error, and by what λ is multiplied to give the weight of ‖Ξ‖₁ beside ½‖τ − YΞ‖².
 OBJECTIVES = ("‖r‖²/2m", "‖r‖²/m", "½‖r‖²", "‖r‖²", "‖r‖")
-NOISES = ("joint", "matrix", "unit", "record")
-SAMPLINGS = ("states", "trajectories")
+_TRAJECTORIES = 10
 _NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power", "record": "noise at rest too"}
 
 
@@ -29,27 +28,18 @@ _NOISE_WORDS = {"joint": "noise by joint", "unit": "noise of unit power", "recor
 class Reading:
     """One way to read the recipe.
 
-    Attributes:
-        objective: one of :data:`OBJECTIVES`, + λ‖Ξ‖₁.
-        scaled: columns are scaled to unit RMS before λ acts on their coefficients.
-        early: the solver stops after 1,000 sweeps (scikit-learn's default) instead of at convergence.
-        noise: the signal power that the ratio refers to: each ``joint``'s own; the mean over the whole ``matrix``
-            of signals of one kind, what MATLAB's ``awgn(x, snr, "measured")`` takes; or ``unit`` power, what
-            ``awgn(x, snr)`` takes.
-        sampling: varying-velocity data are random ``states`` in the ranges, or samples of Fourier-series
-            ``trajectories`` (Eq. 31).
-        factor: λ is taken times this: 1 for the λ that is printed.
-
     The defaults are those of the reproduction: Eq. (32) literally, norm not squared, solved to convergence, noise as
     MATLAB measures it (the paper simulates in MATLAB). Of the readings tried they come closest to Fig. 5.
     """
 
-    objective: str = "‖r‖"
-    scaled: bool = False
-    early: bool = False
+    objective: str = "‖r‖"  # one of OBJECTIVES, + λ‖Ξ‖₁
+    scaled: bool = False  # columns are scaled to unit RMS before λ acts on their coefficients
+    early: bool = False  # the solver stops after 1,000 sweeps (scikit-learn's default), not at convergence
+    # the signal power that the ratio refers to: each joint's own; the mean over the whole matrix of signals of one kind,
+    # what MATLAB's awgn(x, snr, "measured") takes; unit power, what awgn(x, snr) takes; or that of the whole record
     noise: str = "matrix"
-    sampling: str = "states"
-    factor: float = 1.0
+    sampling: str = "states"  # random in the ranges; or along Fourier-series trajectories (Eq. 31)
+    factor: float = 1.0  # λ is taken times this: 1 for the λ that is printed
 
     def weight(self, penalty: float, samples: int) -> float:
         """λ in front of ‖Ξ‖₁ where the error is ½‖r‖²; for the norm not squared times ‖r‖."""
@@ -106,13 +96,13 @@ def _deviation(x: Array, snr: float, noise: str, whole: Array) -> Array:
     return np.asarray(np.sqrt(power * 10.0 ** (-snr / 10.0)))
 
 
-def _along_trajectories(experiment: Experiment, seed: int, trajectories: int = 10) -> MotionLog:
-    """One run after the other, each stamped with its own time: v is to be the rate of q, as in any log."""
+def _along_trajectories(experiment: Experiment, seed: int) -> MotionLog:
+    """Ten runs one after the other, each stamped with its own time: v is to be the rate of q, as in any log."""
     count = experiment.counts[STEPS.index("step3")]
     parts = []
-    for k in range(trajectories):
+    for k in range(_TRAJECTORIES):
         reference = fourier_reference(experiment.ranges, 20.0, 1000 * seed + k)
-        share = count // trajectories + (k < count % trajectories)
+        share = count // _TRAJECTORIES + (k < count % _TRAJECTORIES)
         instants = np.linspace(2.0, 20.0, share)
         parts.append((100.0 * k + instants, *reference.evaluate(instants)))
     time, q, v, vdot = (np.concatenate(column) for column in zip(*parts, strict=True))

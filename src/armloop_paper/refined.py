@@ -24,18 +24,11 @@ _CONVERGED = 1e-13
 
 
 def refined(G: Array, b: Array, gradient: Callable[[Array], Array]) -> Array:
-    """Solve min ‖Y − X β‖ for several right-hand sides.
+    """(p, c) coefficients β that minimise ‖Y − X β‖; corrections stop when they no longer shrink.
 
-    Args:
-        G: (p, p) Xᵀ X, contiguous; it is overwritten, because at thousands of columns a copy is what counts.
-        b: (p, c) Xᵀ Y.
-        gradient: Xᵀ (Y − X β) of coefficients (p, c), computed on the data without forming Xᵀ X.
-
-    Returns:
-        (p, c) coefficients; corrections stop when they no longer shrink.
-
-    Raises:
-        LinAlgError: columns are dependent beyond what round-off explains.
+    G (p, p) = XᵀX, contiguous, is overwritten, because at thousands of columns a copy is what counts; b (p, c) = XᵀY;
+    ``gradient`` gives Xᵀ(Y − X β), computed on the data without XᵀX. Raises ``LinAlgError`` for columns that are dependent
+    beyond what round-off explains.
     """
     sizes = np.diag(G).copy()[:, None]
     scale = np.where(sizes > 0, 1 / np.sqrt(np.where(sizes > 0, sizes, 1.0)), 0.0)

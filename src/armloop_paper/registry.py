@@ -17,11 +17,7 @@ ITEMS = (*PAPER, *BEYOND)
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """The items asked for in the paper's order, by default the paper's.
-
-    Raises:
-        InputError: an unknown item.
-    """
+    """The items asked for in the paper's order, by default the paper's; raises ``InputError`` for an unknown one."""
     for name in names:
         if name not in ITEMS:
             raise InputError(f"unknown item {name!r}; there are: {', '.join(ITEMS)}")

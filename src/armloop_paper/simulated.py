@@ -30,35 +30,25 @@ _CREEP = np.radians(0.1)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What the model does not know.
-
-    Attributes:
-        name: short name.
-        white, coloured: standard deviation of torque noise, part of the torque's RMS; the second is correlated
-            over ``correlation`` seconds.
-        drift: standard deviation of a slow change of the friction level, part of f_c, over 1 s.
-        ripple: amplitude of a torque that depends on the position, part of f_c, with a phase of its own in
-            every log.
-        q_noise, v_noise: white noise on positions, rad, and velocities, rad/s.
-    """
+    """What the model does not know; standard deviations, but for the ripple's amplitude."""
 
     name: str
-    white: float = 0.005
-    coloured: float = 0.0
+    white: float = 0.005  # torque noise, part of the torque's RMS
+    coloured: float = 0.0  # the same, correlated over so many seconds:
     correlation: float = 0.2
-    drift: float = 0.0
-    ripple: float = 0.0
-    q_noise: float = 0.0
-    v_noise: float = 0.0
+    drift: float = 0.0  # slow change of the friction level over 1 s, part of f_c
+    ripple: float = 0.0  # torque that depends on q, part of f_c, with a phase of its own in every log
+    q_noise: float = 0.0  # white noise, rad
+    v_noise: float = 0.0  # rad/s
 
 
 @cache
-def true_model(arm_name: str = "three_axis") -> ReconstructedModel:
-    """The arm's exact model in the double feature set at the paper's orders, with friction.
+def true_model() -> ReconstructedModel:
+    """The three-axis arm's exact model in the double feature set at the paper's orders, with friction.
 
     Monomials with at most one cosine of a joint are independent: the coefficients are unique.
     """
-    arm, rng = load_arm(arm_name), np.random.default_rng(0)
+    arm, rng = load_arm("three_axis"), np.random.default_rng(0)
     parameters, turns = nominal_parameters(arm), tuple(bool(r) for r in arm.revolute)
     components: list[Component] = []
     for step, (N1, N2, second) in enumerate(((2, 0, "none"), (4, 2, "velocity"), (4, 1, "acceleration")), 1):
@@ -114,11 +104,9 @@ class Collection:
         return found
 
 
-def collection(
-    seed: int, poses: int = 24, segments: int = 60, seconds: float = 60.0, arm_name: str = "three_axis"
-) -> Collection:
+def collection(seed: int, poses: int = 24, segments: int = 60, seconds: float = 60.0) -> Collection:
     """Creeping past poses in both directions, segments of constant velocity, and one Fourier trajectory."""
-    model = true_model(arm_name)
+    model = true_model()
     arm, rng = model.arm, np.random.default_rng(seed)
     ranges = MotionRanges.of(arm)
     static = _segments(

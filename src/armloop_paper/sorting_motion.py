@@ -21,13 +21,9 @@ _RAMP = 0.3
 def sorting_motion(
     ranges: MotionRanges, pace: float, seed: int, moves: int = 12
 ) -> tuple[Motion, NDArray[np.int_]]:
-    """Move from place to place with trapezoidal velocity, all joints together, resting at every place.
+    """The motion (100 Hz) from place to place with trapezoidal velocity and rests, and each sample's true condition.
 
-    Args:
-        pace: share of the ranges' velocities that is used, 0 to 1.
-
-    Returns:
-        The motion, sampled at 100 Hz, and the true condition of every sample.
+    ``pace`` is the share of the ranges' velocities that is used, 0 to 1; all joints move together.
     """
     rng = np.random.default_rng(seed)
     places = rng.uniform(ranges.lower, ranges.upper, (moves + 1, ranges.n))

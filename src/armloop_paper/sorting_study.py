@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +20,12 @@ Labels = NDArray[np.int_]
 
 #: Signal-to-noise ratios of velocity and acceleration, dB; the paper's Fig. 1 has 60 and 50.
 LEVELS = (60.0, 50.0, 40.0, 30.0, 20.0)
-CASES = {
-    "all joints": "three joints, each at a speed of its own",
-    "velocities cancel": "the second joint mirrors the first, the third rests",
-    "one joint at a time": "four joints, the third prismatic: a tenth of the others' numbers, and of their noise",
-    "measured": "moves from rest to rest, noisy and rounded velocities, accelerations by differences",
-}
+CASES = (
+    "all joints",  # three joints, each at a speed of its own
+    "velocities cancel",  # the second joint mirrors the first, the third rests
+    "one joint at a time",  # four joints, the third prismatic: a tenth of the others' numbers, and of their noise
+    "measured",  # moves from rest to rest, noisy and rounded velocities, accelerations by differences
+)
 _COUNTS = (500, 1000, 1000)
 #: Of the measured-like log: seconds at rest, of a ramp, at constant velocity; rate in Hz, rounding of v in rad/s.
 _REST, _RAMP, _CRUISE, _RATE, _ROUNDING = 0.8, 0.5, 0.7, 250.0, 1e-4
@@ -34,48 +33,24 @@ _REST, _RAMP, _CRUISE, _RATE, _ROUNDING = 0.8, 0.5, 0.7, 250.0, 1e-4
 
 @dataclass(frozen=True)
 class Sorted:
-    """One case at one noise level with one indicator, mean over the seeds.
+    """One case at one noise level with one indicator, mean over the seeds."""
 
-    Attributes:
-        case, level, indicator: key of :data:`CASES`, dB, ``"paper"`` or ``"robust"``.
-        rand: adjusted Rand index against the true conditions; 1 is perfect, 0 is chance.
-        worst_rand: of the seed with the smallest.
-        missed: part of the standstill that is sorted elsewhere.
-        blind: part of the motion that is taken for standstill.
-        right: part of all samples whose condition is named rightly.
-    """
-
-    case: str
-    level: float
-    indicator: str
-    rand: float
-    worst_rand: float
-    missed: float
-    blind: float
-    right: float
-
-
-@dataclass(frozen=True)
-class ConditionsStudy:
-    """All cases, levels and indicators; ``seeds`` draws of each."""
-
-    seeds: int
-    results: list[Sorted]
-
-    def to_dict(self) -> dict[str, Any]:
-        """JSON-ready values."""
-        return asdict(self)
+    case: str  # one of CASES
+    level: float  # dB
+    indicator: str  # paper or robust
+    rand: float  # adjusted Rand index against the true conditions; 1 is perfect, 0 is chance
+    worst_rand: float  # of the seed with the smallest
+    missed: float  # part of the standstill that is sorted elsewhere
+    blind: float  # part of the motion that is taken for standstill
+    right: float  # part of all samples whose condition is named rightly
 
 
 def conditions_study(
-    seeds: int = 5,
-    levels: Sequence[float] = LEVELS,
-    cases: Sequence[str] = tuple(CASES),
-    progress: Progress = silent,
-) -> ConditionsStudy:
-    """Sort random data of known conditions with both indicators."""
+    seeds: int = 5, levels: Sequence[float] = LEVELS, progress: Progress = silent
+) -> list[Sorted]:
+    """Sort random data of known conditions with both indicators; so many draws of each case and level."""
     results = []
-    for case in cases:
+    for case in CASES:
         for level in levels:
             progress(f"conditions: {case}, {level:g} dB")
             data = [case_data(case, level, seed) for seed in range(seeds)]
@@ -84,7 +59,7 @@ def conditions_study(
                 rand, missed, blind, right = rows.mean(axis=0).tolist()
                 worst = float(rows[:, 0].min())
                 results.append(Sorted(case, level, indicator, rand, worst, missed, blind, right))
-    return ConditionsStudy(seeds, results)
+    return results
 
 
 def _judge(motion: Motion, truth: Labels, scored: NDArray[np.bool_], indicator: str) -> list[float]:
@@ -100,7 +75,7 @@ def _judge(motion: Motion, truth: Labels, scored: NDArray[np.bool_], indicator: 
 
 def case_data(case: str, level: float, seed: int) -> tuple[Motion, Labels, NDArray[np.bool_]]:
     """A motion, its true conditions (N,), and the samples to score (N,); ``level`` in dB."""
-    rng = np.random.default_rng([seed, list(CASES).index(case)])
+    rng = np.random.default_rng([seed, CASES.index(case)])
     if case == "measured":
         return _measured(rng, level)
     n = 4 if case == "one joint at a time" else 3

@@ -42,29 +42,21 @@ class Stribeck:
 class StribeckComparison:
     """What each way recovers from the same data.
 
-    Attributes:
-        profile: one fit of both directions, by a profile over v_s.
-        least_squares, lasso: the paper's way, (forward, backward). v_s is where the excess over the constant has
-            fallen to 1/e; the static level is the curve's at rest.
-        condition: condition number of the paper's columns, scaled to unit norm, forward.
+    The paper's ways by direction (forward, backward): v_s is where the excess over the constant has fallen to 1/e, the
+    static level the curve's at rest.
     """
 
-    profile: Stribeck
+    profile: Stribeck  # one fit of both directions, by a profile over v_s
     least_squares: tuple[Stribeck, Stribeck]
     lasso: tuple[Stribeck, Stribeck]
-    condition: float
+    condition: float  # condition number of the paper's columns, scaled to unit norm, forward
 
 
 def profile_stribeck(velocity: Array, torque: Array, speed_noise: float) -> Stribeck:
-    """Eq. (34) by a profile over v_s.
+    """Eq. (34) by a profile over v_s; raises ``ExcitationError`` for too few speeds in either direction.
 
-    Args:
-        velocity, torque: (N,) of one joint while it moves at constant velocity, load removed.
-        speed_noise: standard deviation of the velocity's noise, rad/s; slower samples than four times this are left
-            out, and v_s is sought from the slowest sample left to half the fastest.
-
-    Raises:
-        ExcitationError: too few speeds in either direction.
+    ``velocity`` and ``torque`` (N,) are of one joint at constant velocities, load removed. Samples slower than four
+    standard deviations ``speed_noise``, rad/s, are left out; v_s is sought from the slowest left to half the fastest.
     """
     v, tau = _reliable(velocity, torque, speed_noise)
     low, high = np.log(np.abs(v).min()), np.log(0.5 * np.abs(v).max())
@@ -79,14 +71,9 @@ def profile_stribeck(velocity: Array, torque: Array, speed_noise: float) -> Stri
 def compare_stribeck(
     velocity: Array, torque: Array, speed_noise: float, penalty: float = 1e-3
 ) -> StribeckComparison:
-    """The profile and the paper's way on the same samples.
+    """The profile and the paper's way (on every sample) on the same data; arguments and errors as :func:`profile_stribeck`.
 
-    Args:
-        velocity, torque, speed_noise: as of :func:`profile_stribeck`; the paper's way gets every sample.
-        penalty: λ of Eq. (32) on columns of unit mean square.
-
-    Raises:
-        ExcitationError: as :func:`profile_stribeck`.
+    ``penalty`` is λ of Eq. (32) on columns of unit mean square.
     """
     profile = profile_stribeck(velocity, torque, speed_noise)
     squares, lasso, condition = [], [], 1.0

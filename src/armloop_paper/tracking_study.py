@@ -27,16 +27,12 @@ CONTROLLERS = (*paper.ETA_DEG, EXACT)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What one seed of the collection came to.
+    """What one seed of the collection came to; model, samples and tracking for the figures."""
 
-    Attributes:
-        nrmse: per step the error of the predicted torque on the reference of Fig. 14, relative to its RMS, per joint.
-        eta: per controller the mean absolute tracking error, deg.
-        model, samples, tracking: for the figures.
-    """
-
-    nrmse: dict[str, list[float]]
-    eta: dict[str, list[float]]
+    nrmse: dict[
+        str, list[float]
+    ]  # per step and joint: error of the torque predicted for Fig. 14 over its RMS
+    eta: dict[str, list[float]]  # per controller the mean absolute tracking error, deg
     model: ReconstructedModel
     samples: Samples
     tracking: dict[str, TrackingResult]

@@ -12,7 +12,7 @@ from foreign_logs import NAMES, assert_same, bag, libfranka, motion, refused, rt
 from synthetic import three_axis
 
 from armloop.cli import main
-from armloop.convert import Answers, convert
+from armloop.convert import Answers, Mapping, QuantityMap, TimeMap, convert
 from armloop.convert.joints import match
 from armloop.data.log import MotionLog, read_log
 from armloop.util.errors import InputError, InputWarning
@@ -200,6 +200,25 @@ def test_lerobot_episodes_are_runs_and_degrees_are_asked_for(tmp_path, log):
         answers=Answers("N*m", None, "deg"),
     )
     np.testing.assert_allclose(one.log.q, log.q[300:], atol=1e-9)
+
+
+def test_a_map_says_where_a_lerobot_set_has_its_torques(tmp_path, log):
+    folder = lerobot(tmp_path / "set", log, 1.0)
+    info = folder / "meta" / "info.json"
+    info.write_text(info.read_text().replace("observation.effort", "observation.gauge"))
+    for path in (folder / "data").rglob("*.parquet"):
+        table = pyarrow.parquet.read_table(path)
+        names = [name.replace("effort", "gauge") for name in table.column_names]
+        pyarrow.parquet.write_table(table.rename_columns(names), path)
+    with pytest.raises(InputError, match=r"no torques or currents among .*observation.gauge.*--map"):
+        convert([folder], arm=three_axis())
+    mapping = Mapping(
+        TimeMap("timestamp", "s"),
+        QuantityMap([f"observation.state/{name}.pos" for name in NAMES], "rad"),
+        QuantityMap([f"observation.gauge/{name}" for name in NAMES], "N*m"),
+    )
+    found = convert([folder], arm=three_axis(), mapping=mapping)
+    np.testing.assert_allclose(found.log.tau, log.tau, atol=1e-9)
 
 
 @pytest.mark.parametrize("shape", ["v2 motors", "v3 nested", "v3 state with everything"])

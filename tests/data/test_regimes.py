@@ -193,11 +193,11 @@ def test_exact_zeros_say_nothing_about_noise():
 
 def test_the_study_tells_the_two_indicators_apart():
     study = conditions_study(seeds=2, levels=(40.0,))
-    rand = {(r.case, r.indicator): r.worst_rand for r in study.results}
+    rand = {(r.case, r.indicator): r.worst_rand for r in study}
     for case in ("all joints", "velocities cancel", "one joint at a time", "measured"):
         assert rand[case, "robust"] > 0.94
         assert rand[case, "paper"] < 0.7
-    robust = [r for r in study.results if r.indicator == "robust"]
+    robust = [r for r in study if r.indicator == "robust"]
     assert max(r.missed for r in robust) < 0.01 and max(r.blind for r in robust) < 0.02
 
 

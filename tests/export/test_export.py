@@ -279,3 +279,11 @@ def test_without_a_consumer_the_file_is_written_and_it_is_said(tmp_path, monkeyp
     assert found.difference is None and any("not installed" in note for note in found.notes)
     assert (tmp_path / "arm.xml").exists()
     assert rigid_body(ARMS["scara"]).parameters.shape == (40,)
+
+
+def test_a_current_is_in_amperes_at_a_sliding_joint_too():
+    model = replace(
+        model_of(ARMS["scara"], disguised(ARMS["scara"], False)), recorded={"unit": "A", "drive_gains": None}
+    )
+    units = re.findall(r"^ \*   \d  \S+: (\w+), (\S+)$", c_source(model)[0], re.MULTILINE)
+    assert units == [("rad", "A"), ("rad", "A"), ("m", "A"), ("rad", "A")]

@@ -142,7 +142,14 @@ def excite(
         require_model(model)
         model.arm.require_same(arm, "the model")
     chosen = library or default_library(arm)
-    given = None if noise is None else tuple(numbers_of(noise, (arm.n,), "noise").tolist())
+    stated = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
+    given = {
+        name: None if values is None else tuple(numbers_of(values, (arm.n,), name).tolist())
+        for name, values in ({"noise": noise} | stated).items()
+    }
+    level = given.pop("noise")
+    if level is None and model is not None:
+        level = baseline_noise(model.baseline.get("rmse"))
     settings = Settings(
         library=chosen,
         criterion=criterion,
@@ -151,18 +158,13 @@ def excite(
         harmonics=harmonics,
         order=order,
         reserve=reserve,
-        noise=baseline_noise(model.baseline.get("rmse")) if noise is None and model is not None else given,
+        noise=level,
         cutoff_hz=default_conditioning(chosen).cutoff_hz,
         starts=starts,
         random=random,
         seed=seed,
     )
-    stated = {"lower": lower, "upper": upper, "velocity": velocity, "acceleration": acceleration}
-    kept = {
-        name: None if values is None else tuple(numbers_of(values, (arm.n,), name).tolist())
-        for name, values in stated.items()
-    }
-    ranges = ranges_with(arm, _plants(arm), **kept)
+    ranges = ranges_with(arm, _plants(arm), **given)
     return Reference(run(arm, ranges, settings, model.predict if model else None, progress))
 
 

@@ -13,6 +13,7 @@ from armloop.api.reading import as_arm, as_logs
 from armloop.api.score import Score, evaluate, samples_for
 from armloop.api.shown import displayed, page
 from armloop.commands.reconstruct import Reconstruct as Command
+from armloop.commands.reconstruct import require_ratios_used
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.export import Exported, states_of
@@ -51,7 +52,7 @@ class Model(ReconstructedModel):
         """The same model with what this class adds."""
         if isinstance(model, Model):
             return model
-        return Model(**{f.name: getattr(model, f.name) for f in fields(ReconstructedModel)})
+        return Model(**_parts(model))
 
     def score(self, logs: MotionLog | Sequence[MotionLog]) -> Score:
         """Errors on logs; see :func:`armloop.evaluate`."""
@@ -109,7 +110,7 @@ class Model(ReconstructedModel):
 
     def plain(self) -> ReconstructedModel:
         """The model without the logs it was made of."""
-        return ReconstructedModel(**{f.name: getattr(self, f.name) for f in fields(ReconstructedModel)})
+        return ReconstructedModel(**_parts(self))
 
     def __repr__(self) -> str:
         nrmse = [x for x in self.baseline.get("nrmse", []) if x is not None]
@@ -200,9 +201,11 @@ def reconstruct(
     conditioning = None if cutoff is None else Conditioning(cutoff_hz=float(cutoff))
     recorded: dict[str, Any] = {"unit": units.pop(), "drive_gains": None}
     account = run(given, arm, method, library, conditioning, options, progress, recorded)
-    made = account.model
-    kept = {f.name: getattr(made, f.name) for f in fields(ReconstructedModel)}
-    return Model(**kept, account=account, logs=tuple(given))
+    return Model(**_parts(account.model), account=account, logs=tuple(given))
+
+
+def _parts(model: ReconstructedModel) -> dict[str, Any]:
+    return {f.name: getattr(model, f.name) for f in fields(ReconstructedModel)}
 
 
 def _ratios(
@@ -214,10 +217,7 @@ def _ratios(
     q, v, vdot = numbers_of(snr, (3,), "snr", "dB of q, v and vdot").tolist()
     if min(q, v, vdot) <= 0:
         raise InputError(f"snr must be positive ratios in dB; it is {(q, v, vdot)}")
-    if cutoff != 0:
-        raise InputError("snr is for samples that are no time series; give cutoff=0 with it")
-    if method != "stepwise" or library not in (None, "double-feature-set"):
-        raise InputError("snr works with the stepwise method and the library double-feature-set")
+    require_ratios_used("snr", "cutoff=0", method, library, cutoff)
     return q, v, vdot
 
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import argparse
 from typing import Any
 
-from armloop.commands.options import Check, Options, argument, flag, option, several, within
+from armloop.commands.options import Check, Options, argument, flag, option, several, whole, within
 
 _LOG_HELP = "motion logs, CSV or Parquet: time,q1..qn,v1..vn,tau1..taun (SI units; joints base to tip)"
 ARM_HELP = "a built-in arm (three_axis, scara) or the path of a URDF"
 
-MAX_ORDER = within(1, 6, "give an order from 1 to 6")
-CUTOFF = Check(
-    lambda hz: hz == 0 or 1e-3 <= hz < 1e4, "give a frequency of 0.001 Hz or more, or 0 for no filter"
-)
 REFUSE_OTHERS = "refuse the model unless it was made for this arm"
-METHOD_HELP = "stepwise, or sindy: one regression of everything, the reference method (%(default)s)"
-CUTOFF_HELP = "low-pass in Hz, 0 for none (default: by held-out error, at most 10)"
-MAX_ORDER_HELP = "largest truncation order N1 tried (%(default)s)"
+
+METHOD: str = option(
+    "stepwise, or sindy: one regression of everything, the reference method (%(default)s)", "stepwise"
+)
+MAX_ORDER: int = option(
+    "largest truncation order N1 tried (%(default)s)", 4, check=within(1, 6, "give an order from 1 to 6")
+)
+CUTOFF: float | None = option(
+    "low-pass in Hz, 0 for none (default: by held-out error, at most 10)",
+    check=Check(
+        lambda hz: hz == 0 or 1e-3 <= hz < 1e4, "give a frequency of 0.001 Hz or more, or 0 for no filter"
+    ),
+)
 
 
 class Logs(Options):
@@ -91,25 +96,13 @@ class Json(Options):
     json: bool = flag("print one JSON object and nothing else")
 
 
-def seed(text: str) -> int:
-    """A seed of a random generator, from 0."""
-    if not (text.isascii() and text.isdecimal()) or len(text) > 10 or int(text) >= 1 << 32:
-        raise argparse.ArgumentTypeError(
-            f"{text!r:.60} is no seed; give a whole number from 0 to {(1 << 32) - 1}"
-        )
-    return int(text)
-
-
+#: The type of a seed of a random generator.
+seed = whole(0, (1 << 32) - 1, f"no seed; give a whole number from 0 to {(1 << 32) - 1}")
 #: Most processes that may be asked for.
 MOST_PROCESSES = 1024
 
 
 def processes(what: str, default: int | None = None) -> Any:
     """The option ``--jobs``: how many processes do something."""
-    return option(f"processes that {what}", default, metavar="N", type=_processes)
-
-
-def _processes(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text[:9]) <= MOST_PROCESSES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 1 to {MOST_PROCESSES}")
-    return int(text)
+    number = whole(1, MOST_PROCESSES, f"no number of processes; give 1 to {MOST_PROCESSES}")
+    return option(f"processes that {what}", default, metavar="N", type=number)

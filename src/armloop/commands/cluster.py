@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armloop.commands.arguments import Json, Logs, seed
 from armloop.commands.options import option
+from armloop.util.errors import InputError
 
 HELP = "sort samples into static, constant-velocity and varying-velocity data"
 EXAMPLE = "armloop cluster out/logs/*.csv"
@@ -28,7 +29,6 @@ def run(options: Cluster) -> None:
     from armloop.data.signals import Conditioning, as_torque, preprocess
     from armloop.reports.tables import table
     from armloop.reports.words import percent
-    from armloop.util.errors import InputError
 
     logs = read_logs(options.logs, None, TORQUE)
     widths = {log.joints for log in logs}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armloop.commands.arguments import ARM_HELP, seed
 from armloop.commands.options import Options, argument, option, required
+from armloop.util.outputs import take_folder
 
 HELP = "simulate the paper's data collection in Drake, one log per condition"
 EXAMPLE = "armloop collect three_axis --out out/logs --seed 3"
@@ -27,12 +28,12 @@ class Collect(Options):
 
 def run(options: Collect) -> None:
     """Simulate a data collection."""
-    from armloop.commands.shared import out_folder, progress
+    from armloop.commands.shared import progress
     from armloop.data.log import write_log
     from armloop.experiment.sampling import CONDITIONS
     from armloop.workflows import collect_logs
 
-    folder = out_folder(options.out, (f"{name}.csv" for name in CONDITIONS))
+    folder = take_folder(options.out, (f"{name}.csv" for name in CONDITIONS))
     logs = collect_logs(options.arm, options.plan, options.seed, progress(options))
     for name, log in logs.items():
         write_log(folder / f"{name}.csv", log)

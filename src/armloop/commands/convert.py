@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
-from armloop.commands.arguments import ARM_HELP, Chain, Json, drive_gains, tau_unit
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from armloop.commands.arguments import ARM_HELP, Chain, Json, Recorded, drive_gains, tau_unit
 from armloop.commands.options import argument, flag, option
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_file
+
+if TYPE_CHECKING:
+    from armloop.convert import Converted
+    from armloop.robot.arm import Arm
 
 HELP = (
     "turn other programs' logs (ROS bags, RTDE, libfranka, LeRobot, .mat, .npz, any table) into a motion log"
@@ -16,7 +25,7 @@ EXAMPLE = (
 )
 
 
-class Convert(Chain, Json):
+class Convert(Chain, Recorded, Json):
     """The options."""
 
     sources: list[str] = argument(
@@ -42,68 +51,73 @@ class Convert(Chain, Json):
 
 def run(options: Convert) -> None:
     """Convert, or suggest a map."""
-    from pathlib import Path
-
-    from armloop.commands.shared import CURRENTS_ONLY, drive_gains, out_file, print_json, stated_arm
+    from armloop.commands.shared import print_json, recorded_as, stated_arm
     from armloop.convert import Answers, convert, read_map
     from armloop.data.log import said_of_log
     from armloop.data.tables import CSV, PARQUET, kind_of, write_columns
-    from armloop.util.errors import InputError
 
     arm = stated_arm(options)
-    if options.drive_gains is not None and options.tau_unit == "N*m":
-        raise InputError(CURRENTS_ONLY)
+    recorded = recorded_as(options, {"unit": None, "drive_gains": None})
     if options.suggest:
         _suggest(options, arm)
         return
     if options.out is None:
         raise InputError("convert: --out is missing; give the log to write, such as --out run.parquet")
     out = Path(options.out)
-    out_file(options.out, "--out")
+    take_file(out, "--out")
     if kind_of(out) not in (CSV, PARQUET):
         raise InputError(f"{out}: unknown suffix {out.suffix!r}; --out must end in .parquet or .csv")
     mapping = read_map(options.map) if options.map else None
-    answers = Answers(options.tau_unit, drive_gains(options.drive_gains), options.angle_unit)
+    answers = Answers(recorded["unit"], recorded["drive_gains"], options.angle_unit)
     found = convert(options.sources, arm=arm, mapping=mapping, answers=answers, topic=options.topic)
     write_columns(out, found.columns(), said_of_log(found.log))
-    if options.json:
-        print_json(_answer(found, out))
+    if not options.json:
+        _tell(found, out, arm)
         return
-    _tell(found, out, arm)
+    log = found.log
+    print_json(
+        {
+            "log": str(out),
+            "kinds": found.kinds,
+            "samples": log.samples,
+            "period": log.period,
+            "runs": [[run.start, run.stop] for run in log.runs()],
+            "joints": found.joints,
+            "tau_unit": log.tau_unit,
+            "kept": list(found.extra),
+            "notes": found.notes,
+        }
+    )
 
 
-def _suggest(options: Convert, arm: object) -> None:
-    from pathlib import Path
-
-    from armloop.commands.shared import out_file, print_json
+def _suggest(options: Convert, arm: Arm | None) -> None:
+    from armloop.commands.shared import print_json
     from armloop.convert import doubts, read_sources, suggested, written
-    from armloop.util.errors import InputError
     from armloop.util.files import write_text
 
-    out = None if options.out is None else Path(options.out)
+    place = None
     if options.map is not None:
-        place: Path | None = Path(options.map)
-    elif out is not None:
+        place = Path(options.map)
+    elif options.out is not None:
+        out = Path(options.out)
         place = out if out.suffix in (".yaml", ".yml") else out.with_suffix(".map.yaml")
-    else:
-        place = None
     if place is not None:
         if place.exists() and not options.force:
             raise InputError(
                 f"{place}: exists; --suggest writes a new map, give another name with --map, or add --force"
             )
-        out_file(str(place), "--map")
-    recording = read_sources(options.sources[:1], arm, options.topic)[0]  # type: ignore[arg-type]
-    mapping, unsure = suggested(recording, arm)  # type: ignore[arg-type]
+        take_file(place, "--map")
+    recording = read_sources(options.sources[:1], arm, options.topic)[0]
+    mapping, unsure = suggested(recording, arm)
     text = written(mapping, unsure, recording)
     if place is not None:
         write_text(place, text)
     known = "?" not in mapping.q.names()
     if options.json:
-        answer = {"map": None if place is None else str(place), "kind": recording.kind}
         print_json(
             {
-                **answer,
+                "map": None if place is None else str(place),
+                "kind": recording.kind,
                 "samples": recording.samples,
                 "joints": mapping.n if known else 0,
                 "unsure": unsure,
@@ -127,53 +141,29 @@ def _suggest(options: Convert, arm: object) -> None:
     )
 
 
-def _answer(found: object, out: object) -> dict[str, object]:
-    from armloop.convert import Converted
-
-    assert isinstance(found, Converted)
-    log = found.log
-    return {
-        "log": str(out),
-        "kinds": found.kinds,
-        "samples": log.samples,
-        "period": log.period,
-        "runs": [[run.start, run.stop] for run in log.runs()],
-        "joints": found.joints,
-        "tau_unit": log.tau_unit,
-        "kept": list(found.extra),
-        "notes": found.notes,
-    }
-
-
-def _tell(found: object, out: object, arm: object) -> None:
+def _tell(found: Converted, out: Path, arm: Arm | None) -> None:
     import numpy as np
 
-    from armloop.convert import Converted
+    from armloop.convert.recording import some
     from armloop.reports.tables import table
-    from armloop.robot.arm import Arm
 
-    assert isinstance(found, Converted) and isinstance(arm, Arm | None)
-    log = found.log
-    seconds = sum(float(log.time[run.stop - 1] - log.time[run.start]) for run in log.runs())
-    runs = log.runs()
+    log, runs = found.log, found.log.runs()
+    seconds = sum(float(log.time[run.stop - 1] - log.time[run.start]) for run in runs)
     print(
         f"{', '.join(dict.fromkeys(found.kinds))}: {log.samples} samples at {1 / log.period:.4g} Hz, {seconds:.4g} s, "
         f"{len(runs)} run{'s' if len(runs) > 1 else ''}"
     )
-    rows = []
-    for j in range(log.joints):
-        name = "" if arm is None else arm.joints[j].name
-        reach = f"{log.q[:, j].min():.4g} … {log.q[:, j].max():.4g}"
-        rows.append(
-            [
-                j + 1,
-                name,
-                found.joints[j],
-                reach,
-                f"{np.abs(log.v[:, j]).max():.4g}",
-                f"{np.abs(log.tau[:, j]).max():.4g}",
-            ]
-        )
+    rows = [
+        [
+            j + 1,
+            "" if arm is None else arm.joints[j].name,
+            found.joints[j],
+            f"{log.q[:, j].min():.4g} … {log.q[:, j].max():.4g}",
+            f"{np.abs(log.v[:, j]).max():.4g}",
+            f"{np.abs(log.tau[:, j]).max():.4g}",
+        ]
+        for j in range(log.joints)
+    ]
     unit = "A" if log.tau_unit == "A" else "N·m"
     print(
         table(["joint", "arm", "source", "q, rad (m)", "largest |v|, rad/s", f"largest |tau|, {unit}"], rows)
@@ -181,7 +171,7 @@ def _tell(found: object, out: object, arm: object) -> None:
     for note in found.notes:
         print(f"  {note}")
     if found.extra:
-        print(f"  kept beside it: {', '.join(list(found.extra)[:12])}{' …' if len(found.extra) > 12 else ''}")
+        print(f"  kept beside it: {some(found.extra, 12)}")
     print(f"wrote {out}")
     if log.tau_unit == "A":
         print("tau is in A: later commands need --tau-unit A (or --drive-gains to make it a torque)")

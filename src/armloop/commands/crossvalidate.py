@@ -7,10 +7,8 @@ from typing import Any
 from armloop.commands.arguments import (
     ARM_HELP,
     CUTOFF,
-    CUTOFF_HELP,
     MAX_ORDER,
-    MAX_ORDER_HELP,
-    METHOD_HELP,
+    METHOD,
     Chain,
     Json,
     Logs,
@@ -18,6 +16,8 @@ from armloop.commands.arguments import (
     processes,
 )
 from armloop.commands.options import flag, option, positive, required
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_folder
 
 HELP = "reconstruct with each log, or alternating blocks, left out in turn, and score what was left out"
 EXAMPLE = "armloop crossvalidate run1.csv run2.csv run3.csv --arm arm.urdf"
@@ -38,10 +38,10 @@ class Crossvalidate(Logs, Chain, Recorded, Json):
         metavar="SECONDS",
         check=positive("give a positive number of seconds"),
     )
-    method: str = option(METHOD_HELP, "stepwise")
+    method: str = METHOD
     library: str | None = option("as of armloop reconstruct (default: by number of joints)")
-    cutoff: float | None = option(CUTOFF_HELP, check=CUTOFF)
-    max_order: int = option(MAX_ORDER_HELP, 4, check=MAX_ORDER)
+    cutoff: float | None = CUTOFF
+    max_order: int = MAX_ORDER
     no_physical: bool = flag(
         "do not keep M(q) positive definite and friction from driving", but_not="physical"
     )
@@ -61,7 +61,6 @@ def run(options: Crossvalidate) -> None:
     from armloop.commands.shared import (
         TORQUE,
         arm_of,
-        out_folder,
         print_json,
         progress,
         read_logs,
@@ -76,7 +75,6 @@ def run(options: Crossvalidate) -> None:
         physical_table,
     )
     from armloop.util.checkpoints import Kept
-    from armloop.util.errors import InputError
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
 
@@ -87,7 +85,7 @@ def run(options: Crossvalidate) -> None:
         )
     arm = arm_of(options)
     logs = read_logs(options.logs, arm, recorded_as(options, TORQUE))
-    folder = None if options.out is None else out_folder(options.out, ("crossvalidation.json",))
+    folder = None if options.out is None else take_folder(options.out, ("crossvalidation.json",))
     kept = Kept(folder, "crossvalidate")
     how: dict[str, Any] = {
         "leave_out": options.leave_out,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from armloop.commands.arguments import HeldOut, Json, OfModel, processes
 from armloop.commands.next_run import NextRun
 from armloop.commands.options import flag, required
+from armloop.util.outputs import take_folder
 
 HELP = "find what a model lacks on a measured run, trace it to a physical effect, and add it"
 EXAMPLE = "armloop diagnose model.json run.csv --out out/diagnosis"
@@ -26,14 +27,14 @@ class Diagnose(HeldOut, OfModel, NextRun, Json):
 def run(options: Diagnose) -> None:
     """Trace what a model lacks on a run."""
     from armloop.commands.next_run import plan, wish
-    from armloop.commands.shared import held_out_logs, model_and_logs, out_folder, print_json, progress
+    from armloop.commands.shared import held_out_logs, model_and_logs, print_json, progress
     from armloop.diagnosis import close
     from armloop.diagnosis import diagnose as run
     from armloop.reports.diagnosis_report import diagnosis_report
     from armloop.reports.diagnosis_tables import diagnosis_table
     from armloop.util.files import write_json, write_text
 
-    folder = out_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
+    folder = take_folder(options.out, ("diagnosis.json", "model.json", "report.html"))
     model, logs = model_and_logs(options)
     held_out = held_out_logs(options, model, logs)
     wanted = wish(options, model)

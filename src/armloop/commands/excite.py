@@ -5,6 +5,7 @@ from __future__ import annotations
 from armloop.commands.arguments import ARM_HELP, Chain, Json, seed
 from armloop.commands.options import argument, flag, option, required, within
 from armloop.commands.ranges import Ranges, numbers, ranges, read_ranges
+from armloop.util.outputs import take_file
 
 HELP = "design an exciting reference within an arm's limits, optimised for the library that will be regressed"
 EXAMPLE = "armloop excite three_axis --out reference.csv --compare --report reference.html"
@@ -56,20 +57,16 @@ class Excite(Ranges, Chain, Json):
 
 def run(options: Excite) -> None:
     """Design an exciting reference and write it."""
-    from armloop.commands.shared import arm_of, out_file, print_json, progress
-    from armloop.data.tables import CSV, PARQUET
+    from armloop.commands.shared import arm_of, print_json, progress, take_reference
     from armloop.experiment.design import Settings, baseline_noise, excite
     from armloop.experiment.excitation import write_reference
     from armloop.identification.reconstruction.reconstruct import default_conditioning, default_library
     from armloop.model import load_model
-    from armloop.util.errors import InputError
     from armloop.util.files import write_text
     from armloop.util.resources import urdf_names
 
-    for name in ("out", "report"):
-        out_file(getattr(options, name), f"--{name}")
-    if not options.out.lower().endswith((CSV, PARQUET)):
-        raise InputError(f"--out {options.out}: a reference ends in {CSV} or {PARQUET}")
+    take_reference(options.out, "--out")
+    take_file(options.report, "--report")
     arm = arm_of(options)
     library = options.library or default_library(arm)
     model = load_model(options.model, arm) if options.model else None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from armloop.commands.arguments import REFUSE_OTHERS, Json
 from armloop.commands.options import argument, option, required, several
+from armloop.util.outputs import take_file, take_folder
 
 if TYPE_CHECKING:
     from armloop.export import Exported
@@ -38,16 +39,16 @@ class Export(Json):
 
 def run(options: Export) -> None:
     """Export."""
-    from armloop.commands.shared import out_file, out_folder, print_json, read_logs
+    from armloop.commands.shared import print_json, read_logs
     from armloop.data.signals import preprocess
     from armloop.export import export, states_of
     from armloop.model import load_model
     from armloop.robot.arm import load_arm
 
     if options.to == "drake":
-        out_folder(options.out)
+        take_folder(options.out)
     else:
-        out_file(options.out, "--out")
+        take_file(options.out, "--out")
     model = load_model(options.model, load_arm(options.arm) if options.arm else None)
     motion = None
     if options.log:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armloop.commands.arguments import seed
 from armloop.commands.options import Options, flag, option
+from armloop.util.outputs import take_folder
 
 HELP = "the main job: collect, reconstruct, track, measure again, find the undeclared effect, add it, track again"
 EXAMPLE = "armloop loop --out out/loop"
@@ -22,22 +23,16 @@ class Loop(Options):
 
 def run(options: Loop) -> None:
     """Run the whole loop."""
-    from armloop.commands.shared import out_folder, progress
-    from armloop.workflows import LOOP_FILES, run_loop
+    from armloop.commands.shared import progress
 
-    if options.measured:
-        _measured(options)
+    if not options.measured:
+        from armloop.workflows import LOOP_FILES, run_loop
+
+        run_loop(take_folder(options.out, LOOP_FILES), options.seed, progress(options))
         return
-    folder = out_folder(options.out, LOOP_FILES)
-    run_loop(folder, options.seed, progress(options))
-
-
-def _measured(options: Loop) -> None:
-    """Run the measured loop and print what it found."""
-    from armloop.commands.shared import out_folder, progress
     from armloop.reports.measured_report import measured_words
     from armloop.workflows.measured import MEASURED_FILES, run_measured
 
-    folder = out_folder(options.out, MEASURED_FILES)
+    folder = take_folder(options.out, MEASURED_FILES)
     print(measured_words(run_measured(folder, progress(options))))
     print(f"written: {folder}/{', '.join(MEASURED_FILES)}")

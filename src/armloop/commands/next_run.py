@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armloop.commands.options import option
 from armloop.commands.ranges import Ranges, acceleration, ranges, ranges_stated, read_ranges, reserve_stated
+from armloop.util.errors import InputError
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Diagnosis
@@ -39,18 +40,14 @@ class NextRun(Ranges):
 
 def wish(options: NextRun, model: ReconstructedModel) -> Wish | None:
     """What the options say of the motion; None if none is wanted. Faults are found before any work is done."""
-    from armloop.commands.shared import out_file
-    from armloop.data.tables import CSV, PARQUET
+    from armloop.commands.shared import take_reference
     from armloop.diagnosis.next_run import Wish, training_ranges
-    from armloop.util.errors import InputError
 
     if options.next_run is None:
         if ranges_stated(options) or reserve_stated(options) or options.next_run_duration is not None:
             raise InputError("ranges, reserve and duration are those of --next-run REF.csv: give it, too")
         return None
-    out_file(options.next_run, "--next-run")
-    if not options.next_run.lower().endswith((CSV, PARQUET)):
-        raise InputError(f"--next-run {options.next_run}: a reference ends in {CSV} or {PARQUET}")
+    take_reference(options.next_run, "--next-run")
     duration = 60.0 if options.next_run_duration is None else options.next_run_duration
     known = training_ranges(model)
     stated = read_ranges(options, model.arm, "urdf", known) if ranges_stated(options) else known
@@ -95,7 +92,6 @@ _NOTHING = (
 def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Planned:
     """Design the motion. A diagnosis is not lost where the limits exclude any."""
     from armloop.diagnosis.next_run import next_run
-    from armloop.util.errors import InputError
 
     try:
         return Planned(path, next_run(diagnosis, wanted, tell))

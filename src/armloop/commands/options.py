@@ -37,6 +37,25 @@ def positive(wrong: str) -> Check:
     return Check(lambda x: 0 < x < math.inf, wrong)
 
 
+def comma_numbers(text: str, option: str) -> list[float]:
+    """The numbers of an option with one per joint; raises ``InputError``."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"{option} {text!r}: give one number per joint, separated by commas") from error
+
+
+def whole(least: int, most: int, wrong: str) -> Callable[[str], int]:
+    """The type of an option that takes a whole number from ``least`` to ``most``; ``wrong`` is said of any other text."""
+
+    def parse(text: str) -> int:
+        if not (text.isascii() and text.isdecimal()) or len(text) > 10 or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"{text!r:.60} is {wrong}")
+        return int(text)
+
+    return parse
+
+
 class Option:
     """One option or argument: of the class it gives the default, of an object what was given (a descriptor).
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from armloop.commands.options import Options, option
+from armloop.commands.options import Options, comma_numbers, option
+from armloop.util.errors import InputError
 
 if TYPE_CHECKING:
     from armloop.experiment.excitation import MotionRanges
@@ -54,13 +55,8 @@ def reserve_stated(options: Ranges) -> bool:
 
 
 def read_ranges(options: Ranges, arm: Arm, plant: str, known: MotionRanges | None = None) -> MotionRanges:
-    """The ranges of ``--ranges``, else ``known``, else those of ``plant``, with what the options say instead.
-
-    Raises:
-        InputError: a range is empty, beyond the URDF's limits, or not one number per joint.
-    """
+    """The ranges of ``--ranges``, else ``known``, else ``plant``'s, with what the options say; raises ``InputError``."""
     from armloop.experiment.excitation import ranges_with
-    from armloop.util.errors import InputError
 
     stated = {key: numbers(getattr(options, key), f"--{key}", arm) for key in _NAMES}
     if options.ranges is None and known is not None:
@@ -78,14 +74,9 @@ def read_ranges(options: Ranges, arm: Arm, plant: str, known: MotionRanges | Non
 
 def numbers(text: str | None, option: str, arm: Arm) -> tuple[float, ...] | None:
     """One finite number per joint."""
-    from armloop.util.errors import InputError
-
     if text is None:
         return None
-    try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError as error:
-        raise InputError(f"{option} {text!r}: give one number per joint, separated by commas") from error
+    values = tuple(comma_numbers(text, option))
     if len(values) != arm.n or not all(map(isfinite, values)):
         raise InputError(f"{option} {text!r}: give {arm.n} numbers, one per joint of {arm.name}")
     return values

@@ -7,10 +7,8 @@ import math
 from armloop.commands.arguments import (
     ARM_HELP,
     CUTOFF,
-    CUTOFF_HELP,
     MAX_ORDER,
-    MAX_ORDER_HELP,
-    METHOD_HELP,
+    METHOD,
     Chain,
     Json,
     Logs,
@@ -18,6 +16,8 @@ from armloop.commands.arguments import (
     processes,
 )
 from armloop.commands.options import flag, option, positive, required
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_file
 
 HELP = "reconstruct a readable model of the joint torques from logs"
 EXAMPLE = "armloop reconstruct out/logs/*.csv --arm three_axis --out model.json"
@@ -28,7 +28,7 @@ class Reconstruct(Logs, Chain, Recorded, Json):
 
     arm: str = required(ARM_HELP)
     out: str = required("the model file, JSON")
-    method: str = option(METHOD_HELP, "stepwise")
+    method: str = METHOD
     library: str | None = option(
         "double-feature-set (the paper's, up to four joints), rigid-body (base parameters of the URDF's chain) or "
         "lagrangian (few terms of the energies, found without the URDF's lengths); default: all of them, and of those that "
@@ -49,8 +49,8 @@ class Reconstruct(Logs, Chain, Recorded, Json):
         "0): coefficients are corrected for this noise after the terms are chosen",
         metavar="Q,V,VDOT",
     )
-    max_order: int = option(MAX_ORDER_HELP, 4, check=MAX_ORDER)
-    cutoff: float | None = option(CUTOFF_HELP, check=CUTOFF)
+    max_order: int = MAX_ORDER
+    cutoff: float | None = CUTOFF
     coefficients: bool = flag("print every coefficient with its standard error, too")
     friction: str | None = option(
         "friction laws that may be chosen with rigid-body and lagrangian, such as coulomb,viscous: coulomb, coulomb_fading "
@@ -78,7 +78,6 @@ def run(options: Reconstruct) -> None:
         TORQUE,
         arm_of,
         check_columns,
-        out_file,
         print_json,
         progress,
         recorded_as,
@@ -100,8 +99,8 @@ def run(options: Reconstruct) -> None:
     from armloop.util.workers import Cluster, Processes
 
     sparse, snr = Sparse(options.estimator, options.penalty), _snr(options)
-    for name in ("out", "report"):
-        out_file(getattr(options, name), f"--{name}")
+    take_file(options.out, "--out")
+    take_file(options.report, "--report")
     arm = arm_of(options)
     check_columns(options.logs, arm)
     recorded = recorded_as(options, TORQUE)
@@ -170,8 +169,6 @@ def _laws(text: str | None) -> tuple[str, ...] | None:
 
 def _snr(options: Reconstruct) -> tuple[float, float, float] | None:
     """The signal-to-noise ratios of q, v and vdot, or None."""
-    from armloop.util.errors import InputError
-
     if options.snr is None:
         return None
     try:
@@ -180,8 +177,15 @@ def _snr(options: Reconstruct) -> tuple[float, float, float] | None:
         raise InputError(f"--snr {options.snr}: give three numbers in dB, such as 60,40,20") from None
     if not all(0 < level < math.inf for level in (q, v, vdot)):
         raise InputError(f"--snr {options.snr}: ratios in dB must be positive")
-    if options.cutoff != 0:
-        raise InputError("--snr is for samples that are no time series; give --cutoff 0 with it")
-    if options.method != "stepwise" or options.library not in (None, "double-feature-set"):
-        raise InputError("--snr works with the stepwise method and the library double-feature-set")
+    require_ratios_used("--snr", "--cutoff 0", options.method, options.library, options.cutoff)
     return q, v, vdot
+
+
+def require_ratios_used(
+    snr: str, unfiltered: str, method: str, library: str | None, cutoff: float | None
+) -> None:
+    """Raise ``InputError``, by the names that the options have, where signal-to-noise ratios would not be looked at."""
+    if cutoff != 0:
+        raise InputError(f"{snr} is for samples that are no time series; give {unfiltered} with it")
+    if method != "stepwise" or library not in (None, "double-feature-set"):
+        raise InputError(f"{snr} works with the stepwise method and the library double-feature-set")

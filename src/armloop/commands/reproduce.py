@@ -6,6 +6,8 @@ from typing import Any
 
 from armloop.commands.arguments import Json
 from armloop.commands.options import argument, option, required, within
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_folder
 
 HELP = "reproduce the paper's tables and figures, ours beside the paper's"
 EXAMPLE = "armloop reproduce table2 fig9 --out out/reproduction"
@@ -33,10 +35,9 @@ def run(options: Reproduce) -> None:
     import time
     from functools import partial
 
-    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.commands.shared import print_json, progress
     from armloop.reports.html import Section
     from armloop.util.checkpoints import Kept
-    from armloop.util.errors import InputError
     from armloop.util.files import write_json, write_text
 
     try:
@@ -50,7 +51,7 @@ def run(options: Reproduce) -> None:
         ) from None
 
     names = chosen(options.items)
-    folder = out_folder(options.out, ("reproduction.json", "report.html"))
+    folder = take_folder(options.out, ("reproduction.json", "report.html"))
     tell = progress(options)
     context = Context(draws=options.draws, progress=tell)
     kept = Kept(folder, {"draws": options.draws})

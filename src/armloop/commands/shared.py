@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
-from armloop.commands.options import Options
+from armloop.commands.options import Options, comma_numbers
 from armloop.data.header import check_header
 from armloop.data.log import GAINS, MotionLog, read_log
 from armloop.data.repeats import require_not_fitted
 from armloop.data.signals import preprocess
+from armloop.data.tables import CSV, PARQUET
 from armloop.model import ReconstructedModel, load_model
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.doubts import said
 from armloop.util.errors import InputError, LogError, ModelError
 from armloop.util.files import strict
-from armloop.util.outputs import take_file, take_folder
+from armloop.util.outputs import take_file
 from armloop.util.progress import Progress, silent, with_time_left
 
 #: Ends of names of packed files.
@@ -42,14 +42,11 @@ def print_json(value: Any) -> None:
     print(strict({**value, "warnings": said()} if said() else value))
 
 
-def out_folder(path: str, names: Iterable[str] = ()) -> Path:
-    """The output folder with the files that will go into it; see :func:`armloop.util.outputs.take_folder`."""
-    return take_folder(path, names)
-
-
-def out_file(path: str | None, option: str) -> None:
-    """Check the place of an output file before any work is done; see :func:`armloop.util.outputs.take_file`."""
+def take_reference(path: str, option: str) -> None:
+    """Check the place and the name of a reference that will be written; raises ``InputError``."""
     take_file(path, option)
+    if not path.lower().endswith((CSV, PARQUET)):
+        raise InputError(f"{option} {path}: a reference ends in {CSV} or {PARQUET}")
 
 
 def arm_of(options: Chain) -> Arm:
@@ -82,10 +79,7 @@ def drive_gains(text: str | None) -> list[float] | None:
     """The numbers of ``--drive-gains``; raises ``InputError`` for anything else."""
     if text is None:
         return None
-    try:
-        gains = [float(part) for part in text.split(",")]
-    except ValueError as error:
-        raise InputError(f"--drive-gains {text!r}: give one number per joint, separated by commas") from error
+    gains = comma_numbers(text, "--drive-gains")
     if not all(GAINS[0] <= g <= GAINS[1] for g in gains):
         raise InputError(
             f"--drive-gains {text!r:.60}: every gain must be a positive number of N·m/A, {GAINS[0]:g} to {GAINS[1]:g}"
@@ -93,15 +87,14 @@ def drive_gains(text: str | None) -> list[float] | None:
     return gains
 
 
-CURRENTS_ONLY = "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
-
-
 def recorded_as(options: Recorded, default: dict[str, Any]) -> dict[str, Any]:
     """What the torque columns hold, by the options or else as ``default`` says."""
     gains = drive_gains(options.drive_gains)
     unit = options.tau_unit
     if gains is not None and unit == "N*m":
-        raise InputError(CURRENTS_ONLY)
+        raise InputError(
+            "--drive-gains turn currents into torques, but --tau-unit says that tau is N*m already"
+        )
     if gains is None and unit is None:
         return default
     if gains is not None:

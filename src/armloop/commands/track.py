@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 from armloop.commands.arguments import Json
 from armloop.commands.options import Check, argument, flag, option, several
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_folder
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.scenarios import TrackingScenario
@@ -61,12 +63,11 @@ class Track(Json):
 def run(options: Track) -> None:
     """Compare controllers in closed loop."""
     # Whatever can be wrong is told before Drake is imported, which takes a second.
-    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.commands.shared import print_json, progress
     from armloop.model import load_model
-    from armloop.util.errors import InputError
     from armloop.util.resources import find_scenario
 
-    folder = out_folder(options.out, _FILES) if options.out else None
+    folder = take_folder(options.out, _FILES) if options.out else None
     find_scenario(options.scenario)
     if options.rate is not None and not options.meshcat:
         raise InputError("--rate is the pace of --meshcat; give both, or leave it out")
@@ -109,8 +110,6 @@ def run(options: Track) -> None:
 
 def _paths(items: list[str]) -> dict[str, str]:
     """The files of ``--model`` by their names."""
-    from armloop.util.errors import InputError
-
     paths: dict[str, str] = {}
     for item in items:
         name, equals, path = item.partition("=")
@@ -127,7 +126,6 @@ def _paths(items: list[str]) -> dict[str, str]:
 def _view(options: Track, scenario: TrackingScenario) -> LiveView:
     """The live view of ``--meshcat``, its address told, once a browser looks or nobody came."""
     from armloop.drake.view.live import LiveView
-    from armloop.util.errors import InputError
 
     if scenario.wear is not None:
         raise InputError(f"--meshcat: {scenario.name} runs many times at once; there is nothing to look at")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from armloop.commands.arguments import Json
 from armloop.commands.options import argument, option
+from armloop.util.outputs import take_folder
 
 HELP = "margins of a tracking scenario's PID gains, and gains for a wanted bandwidth and phase margin"
 EXAMPLE = "armloop tune three_axis_tracking --bandwidth 5 --margin 60 --out out/tune"
@@ -27,11 +28,13 @@ def run(options: Tune) -> None:
     """Analyse the gains of a scenario and propose others."""
     from math import pi
 
-    from armloop.commands.shared import out_folder, print_json, progress
+    from armloop.commands.shared import print_json, progress
     from armloop.util.resources import find_scenario
 
     folder = (
-        out_folder(options.out, ("tune.json", "report.html", "bode.png", "step.png")) if options.out else None
+        take_folder(options.out, ("tune.json", "report.html", "bode.png", "step.png"))
+        if options.out
+        else None
     )
     find_scenario(options.scenario)  # before Drake is imported
     from armloop.drake.experiments.scenarios import load_tracking

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from armloop.commands.arguments import Json, processes
-from armloop.commands.options import flag, option, required
-
-if TYPE_CHECKING:
-    from armloop.watch.store import Store
+from armloop.commands.options import flag, option, required, whole
+from armloop.util.errors import InputError
+from armloop.util.outputs import take_file
 
 HELP = "watch many logs of many arms over time: alarms with a stated false alarm rate, then a diagnosis"
 EXAMPLE = "armloop watch --models models --logs logs --store store --report watch.html"
@@ -26,12 +25,6 @@ def _hours(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is no time; give a positive number of hours")
     return value
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of them; give a whole number from 1")
-    return int(text)
 
 
 class Watch(Json):
@@ -55,7 +48,7 @@ class Watch(Json):
         "the first N logs of an arm are known to be healthy: how warmth matters is learned there (default: %(default)s)",
         20,
         metavar="N",
-        type=_count,
+        type=whole(1, 10**9, "no number of them; give a whole number from 1"),
     )
     sums_only: bool = flag(
         "name a change from the store's sums alone, without a diagnosis of the logs themselves"
@@ -70,31 +63,28 @@ def run(options: Watch) -> int:
     """Watch; the exit status is 3 if there is a new alarm; raises ``InputError`` where every log was set aside."""
     import sys
 
-    from armloop.commands.shared import out_file, print_json, progress
-    from armloop.util.errors import InputError
+    from armloop.commands.shared import print_json, progress
     from armloop.util.files import write_text
     from armloop.watch import Options, watch
     from armloop.watch.ingest import Counts
     from armloop.watch.sources import find_logs
-    from armloop.watch.store import Store as Folder
 
     if options.arm is not None and options.report is None:
         raise InputError("--arm chooses whose trends the page of --report shows: give it, too")
-    out_file(options.report, "--report")
+    take_file(options.report, "--report")
     how = Options(
         options.false_alarm_hours, options.healthy, not options.sums_only, options.scheduler, options.jobs
     )
     tell = progress(options)
     told: list[str] = []
     outcome, counts = None, Counts()
-    batches = _batches(sys.stdin) if options.logs == ["-"] else iter([options.logs])
-    for places in batches:
+    for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
         outcome = watch(options.models, find_logs(places), options.store, how, tell)
         if not options.json:
             from armloop.reports.watch_tables import watch_words
 
             print(watch_words(outcome), flush=True)
-            _announce(Folder(options.store), outcome.new)
+            _announce(options.store, outcome.new)
         told += outcome.new
         counts += outcome.counts
     if outcome is None:
@@ -106,7 +96,7 @@ def run(options: Watch) -> int:
     if options.json:
         print_json({**outcome.to_dict(), "new": [alarm for alarm in outcome.alarms if alarm["id"] in told]})
         sys.stdout.flush()
-        _announce(Folder(options.store), told)
+        _announce(options.store, told)
     elif options.report is not None:
         print(f"written: {options.report}")
     if not told and counts.aside and not counts.read + counts.known:
@@ -117,10 +107,12 @@ def run(options: Watch) -> int:
     return NEW_ALARM if told else 0
 
 
-def _announce(store: Store, names: Sequence[str]) -> None:
+def _announce(store: str, names: Sequence[str]) -> None:
     """After they were told: a call that is killed before tells them again."""
+    from armloop.watch.store import Store
+
     if names:
-        store.announce(names)
+        Store(store).announce(names)
 
 
 def _batches(stream: TextIO) -> Iterator[list[str]]:

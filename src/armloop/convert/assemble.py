@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
-from armloop.convert.recording import Array, Recording
-from armloop.convert.units import CURRENTS, FACTORS, canonical
+from armloop.convert.recording import Array, Recording, some
+from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
@@ -35,30 +35,18 @@ class Answers:
 
 @dataclass(eq=False)
 class Part:
-    """One source as a motion log.
+    """One source as a motion log."""
 
-    Attributes:
-        log: with the times of the source, counted from its first sample.
-        extra: further columns by name, each (N,).
-        starts: index of the first sample of each part that must become a run of its own.
-        joints: the source's name of each joint, base to tip.
-        epoch: s since 1970 of the first sample, where the source says it.
-    """
-
-    log: MotionLog
-    extra: dict[str, Array]
-    starts: list[int]
-    joints: list[str]
-    epoch: float | None
+    log: MotionLog  # with the times of the source, counted from its first sample
+    extra: dict[str, Array]  # further columns by name, each (N,)
+    starts: list[int]  # first sample of each part that must become a run of its own
+    joints: list[str]  # the source's name of each joint, base to tip
+    epoch: float | None  # s since 1970 of the first sample, where the source says it
     notes: list[str] = field(default_factory=list)
 
 
 def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answers) -> Part:
-    """One source as a motion log, in SI units, base to tip.
-
-    Raises:
-        LogError: a column is missing or holds no numbers, a unit is not said, or joints do not match the arm's.
-    """
+    """One source as a motion log in SI units, base to tip; raises ``LogError``, which names the column at fault."""
     where = str(recording.path)
     if recording.samples < FEWEST_SAMPLES:
         raise LogError(
@@ -83,7 +71,11 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     if "v" not in cells:
         cells["v"] = _differences(time, cells["q"], starts)
         notes.append("v: central differences of q, for the source has no velocities")
-    unit = "A" if mapping.tau.gains is None and canonical(_unit(mapping.tau, 0), "tau") in CURRENTS else "N*m"
+    unit = (
+        "A"
+        if mapping.tau.gains is None and canonical(mapping.tau.units()[0] or "", "tau") in CURRENTS
+        else "N*m"
+    )
     beyond = None if arm is None or unit == "A" else _beyond_limits(cells["tau"], arm)
     if beyond is not None:
         notes.append(beyond)
@@ -92,7 +84,7 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     used, extra = mapping.used(), {}
     for name in recording.columns if mapping.keep == "all" else mapping.keep:
         if name not in recording.columns:
-            raise LogError(f"{where}: no column {name} to keep; {_there_are(recording)}")
+            raise LogError(f"{where}: no column {name} to keep; there are: {some(recording.columns, 12)}")
         if name not in used:
             extra[f"source.{name}" if _OWN.fullmatch(name) else name] = recording.columns[name][keep]
     if len(keep) < N:
@@ -106,31 +98,24 @@ def joined(parts: Sequence[Part]) -> tuple[MotionLog, dict[str, Array]]:
 
     Sources that say when they were recorded, and were so one after the other, keep their distance in time.
     """
-    clocks, logs, last = [], [one.log for one in parts], 0.0
+    clocks: list[Array] = []
+    logs = [one.log for one in parts]
     if len({log.tau_unit for log in logs}) > 1:
         raise LogError("the sources hold torques and currents; say --drive-gains, or convert them one by one")
-    epochs = [one.epoch for one in parts]
-    for index, one in enumerate(parts):
+    first = parts[0].epoch
+    for one in parts:
         time = _spread(one.log.time, one.starts)
-        if index:
-            step = max(1.0, _GAP * one.log.period)
-            shift = last + step
-            first, epoch = epochs[0], epochs[index]
-            if first is not None and epoch is not None and epoch - first > last:
-                shift = epoch - first
-            time = time + shift
+        if clocks:
+            last = float(clocks[-1][-1])
+            since = 0.0 if first is None or one.epoch is None else one.epoch - first
+            time = time + (since if since > last else last + max(1.0, _GAP * one.log.period))
         clocks.append(time)
-        last = float(time[-1])
     has_vdot = all(log.vdot is not None for log in logs)
-    log = unchecked_log(
-        time=np.concatenate(clocks),
-        q=np.concatenate([one.q for one in logs]),
-        v=np.concatenate([one.v for one in logs]),
-        tau=np.concatenate([one.tau for one in logs]),
-        vdot=np.concatenate([one.vdot for one in logs if one.vdot is not None]) if has_vdot else None,
-        name=logs[0].name,
-        tau_unit=logs[0].tau_unit,
-    )
+    cells = {
+        key: np.concatenate([getattr(one, key) for one in logs])
+        for key in ("q", "v", "tau", *(["vdot"] if has_vdot else []))
+    }
+    log = unchecked_log(time=np.concatenate(clocks), **cells, name=logs[0].name, tau_unit=logs[0].tau_unit)
     names = dict.fromkeys(name for one in parts for name in one.extra)
     extra = {
         name: np.concatenate([one.extra.get(name, np.full(one.log.samples, np.nan)) for one in parts])
@@ -158,33 +143,30 @@ def _answered(recording: Recording, mapping: Mapping, arm: Arm | None, answers: 
     elif answers.tau_unit is not None:
         tau = replace(tau, unit=answers.tau_unit)
     if answers.angle_unit is not None:
-        told = {
-            str(canonical(unit, "q")) for unit in (q.unit if isinstance(q.unit, list) else [q.unit]) if unit
-        }
+        told = {str(canonical(unit, "q")) for unit in q.units() if unit}
         if told & {"rad", "deg"} - {answers.angle_unit}:
             raise LogError(
                 f"{where}: --angle-unit {answers.angle_unit}, but the {recording.kind} says itself that q is in "
                 f"{', '.join(sorted(told))}; leave the option out, or write the right unit in a --map"
             )
-        rates = {"rad": "rad/s", "deg": "deg/s"}
         q = replace(q, unit=_said(q.unit, answers.angle_unit))
         if v is not None:
-            v = replace(v, unit=_said(v.unit, rates[answers.angle_unit]))
-    if not _is_said(tau):
+            v = replace(v, unit=_said(v.unit, RATES[answers.angle_unit]))
+    if None in tau.units():
         asked.append(
             "what tau holds (--tau-unit N*m; --tau-unit A; or --drive-gains k1,..,kn in N·m/A"
             f"{_sizes(recording, mapping, arm)})"
         )
-    elif canonical(_unit(tau, 0), "tau") == "%" and tau.gains is None:
+    elif canonical(tau.units()[0] or "", "tau") == "%" and tau.gains is None:
         raise LogError(f"{where}: tau is in percent of a rating: give gains (N·m per percent) in a --map")
-    if not _is_said(q) or (v is not None and not _is_said(v)):
+    if None in q.units() or (v is not None and None in v.units()):
         asked.append("the unit of positions and velocities (--angle-unit rad or deg)")
     if mapping.time.rate is None and mapping.time.column is None:
         asked.append("the time (no column of it was found; --map with time: {rate: HZ})")
     if asked:
-        what = recording.kind
         raise LogError(
-            f"{where}: the {what} does not say {' nor '.join(asked)}; say it, or answer in the map that --suggest writes"
+            f"{where}: the {recording.kind} does not say {' nor '.join(asked)}; say it, or answer in the map that "
+            "--suggest writes"
         )
     unit = mapping.time.unit
     if mapping.time.column is not None and (unit is None or unit == UNSAID):
@@ -220,13 +202,9 @@ def _beyond_limits(tau: Array, arm: Arm) -> str | None:
 
 def _time_unit(recording: Recording, mapping: Mapping, q: QuantityMap, v: QuantityMap | None) -> str:
     """The unit of time with which v is the rate of q: measured, not guessed; raises ``LogError`` if none fits."""
-    if v is not None:
-        time = recording.columns.get(mapping.time.column or "")
-        if time is not None and len(time) > 2:
-            ratio = rate_ratio(time, recording, q, v)
-            for unit, factor in FACTORS["time"].items():
-                if 0.7 < ratio / factor < 1.4:
-                    return unit
+    time = recording.columns.get(mapping.time.column or "")
+    if v is not None and time is not None and (unit := time_unit(rate_ratio(time, recording, q, v))):
+        return unit
     raise LogError(
         f"{recording.path}: the unit of the column {mapping.time.column} is not said, and no velocity tells it; "
         "say it in a --map: time: {column: …, unit: s, ms, us or ns}"
@@ -252,15 +230,6 @@ def _said(unit: str | list[str] | None, answer: str) -> str | list[str]:
     return answer if unit is None or unit == UNSAID else unit
 
 
-def _is_said(quantity: QuantityMap) -> bool:
-    units = quantity.unit if isinstance(quantity.unit, list) else [quantity.unit]
-    return not any(unit is None or unit == UNSAID for unit in units)
-
-
-def _unit(quantity: QuantityMap, j: int) -> str:
-    return str(quantity.unit[j] if isinstance(quantity.unit, list) else quantity.unit)
-
-
 def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[str]) -> list[int]:
     names, where = mapping.joints, str(recording.path)
     if arm is None:
@@ -284,27 +253,28 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
 def _column(recording: Recording, quantity: QuantityMap, kind: str, j: int) -> Array:
     """One column of the source in SI units."""
     n, name = len(quantity.names()), quantity.names()[j]
-    cells = recording.columns.get(name)
-    if cells is None:
-        raise LogError(
-            f"{recording.path}: no column {name}, which {kind} of joint {j + 1} needs; {_there_are(recording)}"
-        )
-    bad = np.flatnonzero(~np.isfinite(cells))
-    if len(bad):
-        raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
-            f"({len(bad)} of {len(cells)}); correct or drop what was not measured"
-        )
-    unit = canonical(_unit(quantity, j), kind)
+    cells = _cells(recording, name, f", which {kind} of joint {j + 1} needs", "or drop what was not measured")
+    unit = canonical(quantity.units()[j] or "", kind)
     factor = FACTORS[kind][unit] if unit is not None else 1.0
     if quantity.gains is not None:
         factor = factor * per_joint(quantity.gains, n)[j]
     return (cells + per_joint(quantity.offset, n)[j]) * (factor * per_joint(quantity.sign, n)[j])
 
 
-def _there_are(recording: Recording) -> str:
-    names = list(recording.columns)
-    return f"there are: {', '.join(names[:12])}{' …' if len(names) > 12 else ''}"
+def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
+    """(N,) numbers of a column; raises ``LogError`` where it is not there, or one of them is none."""
+    cells = recording.columns.get(name)
+    if cells is None:
+        raise LogError(
+            f"{recording.path}: no column {name}{needed}; there are: {some(recording.columns, 12)}"
+        )
+    bad = np.flatnonzero(~np.isfinite(cells))
+    if len(bad):
+        raise LogError(
+            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
+            f"({len(bad)} of {len(cells)}); correct {correct}"
+        )
+    return cells
 
 
 def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.intp], list[int]]:
@@ -312,15 +282,8 @@ def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.int
     N = recording.samples
     if mapping.time.rate is not None:
         return np.arange(N) / mapping.time.rate, np.arange(N), list(recording.starts)
-    name = mapping.time.column
-    raw = recording.columns.get(name or "")
-    if raw is None:
-        raise LogError(f"{recording.path}: no column {name} for the time; {_there_are(recording)}")
-    bad = np.flatnonzero(~np.isfinite(raw))
-    if len(bad):
-        raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number; correct the time"
-        )
+    name = mapping.time.column or ""
+    raw = _cells(recording, name, " for the time", "the time")
     edges = set(recording.starts)
     step = np.diff(raw, prepend=raw[0] - 1)
     step[list(edges)] = 1.0

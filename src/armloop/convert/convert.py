@@ -21,21 +21,13 @@ from armloop.util.errors import LogError
 
 @dataclass(eq=False)
 class Converted:
-    """What a conversion gave.
+    """What a conversion gave."""
 
-    Attributes:
-        log: in SI units, base to tip; ``tau_unit`` says whether tau is a torque or a current.
-        extra: further columns that are kept, by name, each (N,).
-        joints: the name that the source gives each joint, base to tip.
-        kinds: what each source is.
-        notes: what was read, left and decided, one line each.
-    """
-
-    log: MotionLog
-    extra: dict[str, Array]
-    joints: list[str]
-    kinds: list[str]
-    notes: list[str]
+    log: MotionLog  # in SI units, base to tip; tau_unit says whether tau is a torque or a current
+    extra: dict[str, Array]  # further columns that are kept, by name, each (N,)
+    joints: list[str]  # the name that the source gives each joint, base to tip
+    kinds: list[str]  # what each source is
+    notes: list[str]  # what was read, left and decided, one line each
 
     def columns(self) -> dict[str, Array]:
         """The columns of the log's file, in its order."""

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from armloop.convert.lerobot import is_lerobot, read_lerobot
+from armloop.convert.libfranka import is_libfranka, read_libfranka
+from armloop.convert.matlab import read_matlab
+from armloop.convert.numpy_archive import read_npz
 from armloop.convert.recording import Recording
+from armloop.convert.rosbag import read_rosbag
+from armloop.convert.rtde import is_rtde, read_rtde
+from armloop.convert.table import read_table
+from armloop.convert.text import header_of
 from armloop.data.tables import check_name
 from armloop.util.errors import LogError
 
@@ -26,53 +34,28 @@ def read_source(path: Path, topic: str | None = None, wanted: Sequence[str] | No
         check_name(path)
     try:
         if suffix in (".db3", ".mcap", ".bag") or (path.is_dir() and (path / "metadata.yaml").is_file()):
-            from armloop.convert.rosbag import read_rosbag
-
             return read_rosbag(path, topic, wanted)
         if topic is not None:
             raise LogError(f"{path}: --topic belongs to ROS bags")
         if path.is_dir() or suffix == ".parquet":
-            return _folder_or_parquet(path)
+            if is_lerobot(path):
+                return read_lerobot(path)
+            if path.is_dir():
+                raise LogError(
+                    f"{path}: a folder with neither metadata.yaml (a ROS 2 bag) nor meta/info.json (LeRobot)"
+                )
+            return read_table(path)
         if suffix == ".mat":
-            from armloop.convert.matlab import read_matlab
-
             return read_matlab(path)
         if suffix == ".npz":
-            from armloop.convert.numpy_archive import read_npz
-
             return read_npz(path)
         if suffix in (".csv", ".tsv", ".txt", ".log", ".dat"):
-            return _text(path)
+            header = header_of(path)
+            if is_rtde(header):
+                return read_rtde(path)
+            return read_libfranka(path) if is_libfranka(header) else read_table(path)
     except OSError as error:
         raise LogError(
             f"{path}: cannot be read ({error.strerror or error}); check its permissions"
         ) from error
     raise LogError(f"{path}: unknown format {path.suffix!r}; give {KNOWN}")
-
-
-def _folder_or_parquet(path: Path) -> Recording:
-    from armloop.convert.lerobot import is_lerobot, read_lerobot
-
-    if is_lerobot(path):
-        return read_lerobot(path)
-    if path.is_dir():
-        raise LogError(
-            f"{path}: a folder with neither metadata.yaml (a ROS 2 bag) nor meta/info.json (LeRobot)"
-        )
-    from armloop.convert.table import read_table
-
-    return read_table(path)
-
-
-def _text(path: Path) -> Recording:
-    from armloop.convert.libfranka import is_libfranka, read_libfranka
-    from armloop.convert.rtde import is_rtde, read_rtde
-    from armloop.convert.table import read_table
-    from armloop.convert.text import header_of
-
-    header = header_of(path)
-    if is_rtde(header):
-        return read_rtde(path)
-    if is_libfranka(header):
-        return read_libfranka(path)
-    return read_table(path)

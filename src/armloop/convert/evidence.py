@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.convert.units import FACTORS, RATES
 from armloop.convert.vocabulary import wanted
@@ -37,33 +36,19 @@ _FACTORS = np.array(
 
 @dataclass(frozen=True)
 class Evidence:
-    """What columns show.
+    """What columns show."""
 
-    Attributes:
-        clocks: columns that rise throughout, those that do not simply count first.
-        counters: the clocks among them that rise by one from row to row.
-        constant: columns with one value, or none.
-        rates: by column, the column that is its derivative, their correlation, and how many times the column's rate
-            per unit of the first clock (per row without one) that derivative is.
-    """
-
-    clocks: list[str]
-    counters: list[str]
-    constant: list[str]
+    clocks: list[str]  # rise throughout, those that do not simply count first
+    counters: list[str]  # the clocks among them that rise by one from row to row
+    constant: list[str]  # have one value, or none
+    # by column, the column that is its derivative, their correlation, and how many times the column's rate per unit of
+    # the first clock (per row without one) that derivative is
     rates: dict[str, tuple[str, float, float]]
 
     @property
     def used(self) -> set[str]:
         """Columns that are neither positions nor torques."""
         return {*self.clocks, *self.constant}
-
-    def order(self, column: str) -> int:
-        """How often a column is the derivative of another one: 0 for a position, 1 for a velocity."""
-        primitive = {rate: name for name, (rate, *_) in self.rates.items()}
-        count = 0
-        while column in primitive and count < len(primitive):
-            column, count = primitive[column], count + 1
-        return count
 
 
 def evidence(
@@ -111,7 +96,8 @@ def _rates(columns: dict[str, Array], time: Array) -> dict[str, tuple[str, float
         likeness = np.nan_to_num(product / np.outer(*sizes))
         ratio = np.nan_to_num(product / sizes[0][:, None] ** 2)
     np.fill_diagonal(likeness, 0.0)
-    likeness = np.where(_is_factor(ratio), likeness, 0.0)
+    is_factor = (np.abs(ratio[..., None] / _FACTORS - 1) < _NEAR).any(axis=-1)
+    likeness = np.where(is_factor, likeness, 0.0)
     found: dict[str, tuple[str, float, float]] = {}
     taken: set[int] = set()
     for flat in np.argsort(-likeness, axis=None):
@@ -124,10 +110,6 @@ def _rates(columns: dict[str, Array], time: Array) -> dict[str, tuple[str, float
         found[names[a]] = (names[b], float(likeness[a, b]), float(ratio[a, b]))
         taken.add(b)
     return found
-
-
-def _is_factor(ratio: Array) -> NDArray[np.bool_]:
-    return np.asarray((np.abs(ratio[..., None] / _FACTORS - 1) < _NEAR).any(axis=-1))
 
 
 def _over_span(steps: Array) -> Array:

@@ -11,23 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
-from armloop.convert.units import canonical
+from armloop.convert.units import canonical, spelt
 from armloop.convert.vocabulary import CURRENT, WANTED, WORDS, kind_of, words_of
 
 _BRACKETS = str.maketrans("（）［］【】", "()[][]")
 _UNIT = re.compile(r"[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*)[\])]\s*$")
-_UNIT_WORDS = {
-    "deg": "deg",
-    "degrees": "deg",
-    "rad": "rad",
-    "mm": "mm",
-    "nm": "N*m",
-    "amp": "A",
-    "ms": "ms",
-    "us": "us",
-    "ns": "ns",
-    "ma": "mA",
-}
+_UNIT_WORDS = {"deg", "degrees", "rad", "mm", "nm", "amp", "ms", "us", "ns", "ma"}
 
 
 @dataclass(frozen=True)
@@ -60,13 +49,12 @@ def suggest(
     unsure: dict[str, str] = {}
     groups = groups_of(columns, joints, units)
     best: dict[str, list[Group]] = {kind: ranked(kind, groups) for kind in ("q", "v", "tau", "vdot")}
-    if not best["q"] or not best["tau"]:
-        missing = " and ".join(
-            {"q": "positions", "tau": "torques or currents"}[k] for k in ("q", "tau") if not best[k]
-        )
-        return Suggestion(None, {"columns": f"no columns of {missing} were recognised"})
+    needed = {"q": "positions", "tau": "torques or currents"}
+    missing = [words for kind, words in needed.items() if not best[kind]]
+    if missing:
+        return Suggestion(None, {"columns": f"no columns of {' and '.join(missing)} were recognised"})
     q = best["q"][0]
-    fields: dict[str, QuantityMap | None] = {"v": None, "vdot": None}
+    fields: dict[str, QuantityMap] = {}
     for kind, likely in best.items():
         fitting = [ordered for group in likely if (ordered := _in_order(group, q)) is not None]
         if not fitting:
@@ -80,13 +68,16 @@ def suggest(
     time, doubt = time_of(columns, units)
     if doubt:
         unsure["time"] = doubt
-    found = fields["q"], fields["tau"]
-    assert found[0] is not None and found[1] is not None
     named = not q.joints[0].isdecimal()
     mapping = Mapping(
-        time, found[0], found[1], fields["v"], fields["vdot"], list(q.joints) if named else None
+        time,
+        fields["q"],
+        fields["tau"],
+        fields.get("v"),
+        fields.get("vdot"),
+        list(q.joints) if named else None,
     )
-    if fields["v"] is None:
+    if "v" not in fields:
         unsure["v"] = "no velocities were recognised; they will be differenced from q"
     if not named:
         unsure["joints"] = "the columns are taken base to tip"
@@ -96,11 +87,8 @@ def suggest(
 def _in_order(group: Group, first: Group) -> Group | None:
     """The group with its columns in the order of the joints of another, or None where the joints differ."""
     if first.joints[0].isdecimal() or group.joints[0].isdecimal():
-        same = (
-            len(group.columns) == len(first.columns)
-            and group.joints[0].isdecimal() == first.joints[0].isdecimal()
-        )
-        return group if same else None
+        both = group.joints[0].isdecimal() and first.joints[0].isdecimal()
+        return group if both and len(group.columns) == len(first.columns) else None
     if set(group.joints) != set(first.joints):
         return None
     columns = dict(zip(group.joints, group.columns, strict=True))
@@ -123,7 +111,7 @@ def _split_unit(name: str, units: Mapping_[str, str]) -> tuple[str, str]:
         return name[: found.start()].strip(), found[1]
     last = words_of(name)[-1:]
     if last and last[0] in _UNIT_WORDS and len(words_of(name)) > 1:
-        return name, _UNIT_WORDS[last[0]]
+        return name, spelt(last[0])
     return name, ""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from armloop.convert.evidence import Evidence, evidence
 from armloop.convert.headers import Group, groups_of, ranked, time_of, unit_of
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, TimeMap
-from armloop.convert.recording import Recording
+from armloop.convert.recording import Recording, some
 from armloop.convert.units import canonical
 from armloop.convert.vocabulary import WANTED, wanted
 
@@ -109,10 +109,11 @@ def _positions(
     unsure: dict[str, str],
 ) -> list[str]:
     """Columns that have a derivative among the others and are none themselves, else the one group that may be them."""
+    derivatives = {rate for rate, *_ in seen.rates.values()}
     found = [
         name
         for name in free
-        if name in seen.rates and seen.order(name) == 0 and not {name, seen.rates[name][0]} & {*tau}
+        if name in seen.rates and name not in derivatives and not {name, seen.rates[name][0]} & {*tau}
     ]
     count = len(tau) or len(joints)
     if found and (not count or len(found) == count):
@@ -132,7 +133,7 @@ def _positions(
         unsure["q"] = f"the only {count} columns of one kind that are left"
         return list(fitting[0])
     may = [name for name in free if name not in tau]
-    unsure["q"] = f"which of {_some(may)} are positions? one per joint, base to tip"
+    unsure["q"] = f"which of {some(may)} are positions? one per joint, base to tip"
     return []
 
 
@@ -150,11 +151,12 @@ def _forces(left: Sequence[str], n: int, groups: Sequence[Group], unsure: dict[s
     fitting = [
         group.columns for group in groups if n and len(group.columns) == n and {*group.columns} <= {*likely}
     ]
-    for only in [*fitting[:1]] if len(fitting) == 1 else [tuple(likely)] if n and len(likely) == n else []:
+    only = fitting[0] if len(fitting) == 1 else likely if n and len(likely) == n else None
+    if only is not None:
         unsure["tau"] = f"the only {n} columns that are left; torques or currents?"
         return list(only)
     unsure["tau"] = (
-        f"which of {_some(likely)} are torques or currents? one per joint, base to tip"
+        f"which of {some(likely)} are torques or currents? one per joint, base to tip"
         if likely
         else "no columns are left; without torques or motor currents it is no log of an arm's dynamics"
     )
@@ -163,7 +165,3 @@ def _forces(left: Sequence[str], n: int, groups: Sequence[Group], unsure: dict[s
 
 def _said(kind: str, group: Group | None, names: Sequence[str]) -> str | None:
     return unit_of(kind, group) if group is not None and list(group.columns) == list(names) else None
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(names[:8]) + (" …" if len(names) > 8 else "")

@@ -9,14 +9,11 @@ from armloop.util.errors import LogError
 
 
 def match(names: Sequence[str], joints: Sequence[str], where: str) -> list[int]:
-    """The index in ``names`` of each joint of the arm.
+    """The index in ``names`` of each joint of the arm; raises ``LogError`` with both lists for none, or more than one.
 
     A name is that of the joint, or ends in it, or begins with it, apart from upper case and separators
     (``ur10_elbow_joint`` for ``elbow_joint``), if no other name does so as well, or if it is the one that has the prefix
     which all joints of the arm have (``panda_joint1`` beside ``panda_finger_joint1`` for ``joint1``).
-
-    Raises:
-        LogError: a joint is not found, or more than once: one line with both lists.
     """
     listed = f"the source has {', '.join(names)}; the arm has {', '.join(joints)}"
     if len(set(names)) < len(names):

@@ -50,7 +50,7 @@ def is_lerobot(path: Path) -> bool:
 
 
 def read_lerobot(path: Path) -> Recording:
-    """Read all episodes, each a run of its own; raises ``LogError`` where torques are missing."""
+    """Read all episodes, each a run of its own; a map has to say where the torques are if no name does."""
     import pyarrow.parquet
 
     files = sorted((path / "data").rglob("*.parquet")) if path.is_dir() else [path]
@@ -72,16 +72,27 @@ def read_lerobot(path: Path) -> Recording:
             columns |= {f"{name}/{entry}": values[:, k] for k, entry in enumerate(entries)}
         else:
             columns |= flatten({name: values})
-    mapping, named = _mapping(columns, _rate(info, path))
+    mapping = _mapping(columns, _rate(info, path))
+    unsure = {}
     if mapping is None:
-        raise LogError(
-            f"{path}: no torques or currents among {', '.join(sorted(arrays))}; a log needs them "
-            "(observation.effort, or a state with …effort or …current), or a --map that says where they are"
+        unsure["columns"] = (
+            f"no torques or currents among {', '.join(sorted(arrays))}; a log needs them (observation.effort, or a state "
+            "with …effort or …current)"
         )
     episode = arrays.get("episode_index")
     starts = [0] if episode is None else [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(episode)))]
     notes = [f"{len(starts)} episode{'s' * (len(starts) != 1)}"]
-    return Recording(path, "LeRobot data set", columns, mapping, named=named, starts=starts, notes=notes)
+    named = mapping is not None and mapping.joints is not None
+    return Recording(
+        path,
+        "LeRobot data set",
+        columns,
+        mapping,
+        named=named,
+        starts=starts,
+        notes=notes,
+        unsure=unsure,
+    )
 
 
 def _rate(info: dict[str, Any], path: Path) -> float | None:
@@ -94,7 +105,7 @@ def _rate(info: dict[str, Any], path: Path) -> float | None:
     return float(fps)
 
 
-def _mapping(columns: dict[str, Array], fps: float | None) -> tuple[Mapping | None, bool]:
+def _mapping(columns: dict[str, Array], fps: float | None) -> Mapping | None:
     time = TimeMap("timestamp", "s") if "timestamp" in columns else TimeMap(rate=fps)
     states = [name for name in columns if name.startswith("observation.state")]
     by_ending = {kind: [n for n in states if _ending(n) in endings] for kind, endings in _ENDINGS.items()}
@@ -104,15 +115,10 @@ def _mapping(columns: dict[str, Array], fps: float | None) -> tuple[Mapping | No
     positions, torques, velocities = _paired(positions, torques, velocities)
     if not positions or len(torques) != len(positions):
         guess = suggest(list(columns)).mapping
-        return (
-            (None, False) if guess is None or guess.time.column is None else (guess, guess.joints is not None)
-        )
+        return None if guess is None or guess.time.column is None else guess
     v = QuantityMap(velocities) if len(velocities) == len(positions) else None
-    names = [_joint(name) for name in positions]
-    named = "/" in positions[0]
-    return Mapping(
-        time, QuantityMap(positions), QuantityMap(torques), v, joints=names if named else None
-    ), named
+    joints = [_joint(name) for name in positions] if "/" in positions[0] else None
+    return Mapping(time, QuantityMap(positions), QuantityMap(torques), v, joints=joints)
 
 
 def _paired(q: list[str], tau: list[str], v: list[str]) -> tuple[list[str], list[str], list[str]]:
@@ -176,17 +182,10 @@ def _array(column: Any) -> Any:
     import pyarrow
 
     kind = column.type
-    if (
-        pyarrow.types.is_list(kind)
-        or pyarrow.types.is_large_list(kind)
-        or pyarrow.types.is_fixed_size_list(kind)
-    ):
-        rows = column.combine_chunks()
-        inner = kind.value_type
-        if not is_number(inner):
+    if isinstance(kind, pyarrow.ListType | pyarrow.LargeListType | pyarrow.FixedSizeListType):
+        if not is_number(kind.value_type):
             return None
+        rows = column.combine_chunks()
         flat = np.asarray(rows.flatten().to_numpy(zero_copy_only=False), dtype=np.float64)
         return flat.reshape(len(rows), -1) if len(rows) and len(flat) % len(rows) == 0 else None
-    if is_number(kind):
-        return column.to_numpy().astype(np.float64)
-    return None
+    return column.to_numpy().astype(np.float64) if is_number(kind) else None

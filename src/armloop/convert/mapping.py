@@ -64,6 +64,11 @@ class QuantityMap(msgspec.Struct, forbid_unknown_fields=True):
         before, after = self.columns[: found.start()], self.columns[found.end() :]
         return [f"{before}{k}{after}" for k in range(first, last + 1)]
 
+    def units(self) -> list[str | None]:
+        """The columns' units; None where one is not said."""
+        units = self.unit if isinstance(self.unit, list) else [self.unit] * len(self.names())
+        return [None if unit == UNSAID else unit for unit in units]
+
 
 class Mapping(msgspec.Struct, forbid_unknown_fields=True):
     """What each column of a source is; see the module."""
@@ -96,11 +101,7 @@ class Mapping(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_map(path: str | Path) -> Mapping:
-    """Read and check a map.
-
-    Raises:
-        InputError: the file is missing or no map: one line that names the field.
-    """
+    """Read and check a map; raises ``InputError``, which names the field, where it is none."""
     try:
         mapping = checked(read_yaml(path, InputError, "a map, a YAML file"), Mapping)
     except Misfit as misfit:
@@ -137,12 +138,12 @@ def check_map(mapping: Mapping, where: str) -> None:
             raise InputError(
                 f"{where}: {name}: {len(quantity.names())} columns, but q has {n}; give one per joint"
             )
-        for unit in [quantity.unit] if isinstance(quantity.unit, str | None) else quantity.unit:
-            _check_unit(unit, name, where)
         for field in ("unit", "sign", "offset", "gains"):
             value = getattr(quantity, field)
             if isinstance(value, list) and len(value) != n:
                 raise InputError(f"{where}: {name}: {field} has {len(value)} entries; give one, or {n}")
+        for unit in quantity.units():
+            _check_unit(unit, name, where)
         if any(abs(sign) != 1 for sign in per_joint(quantity.sign, n)):
             raise InputError(f"{where}: {name}: sign must be 1 or -1")
         if quantity.gains is not None and name != "tau":
@@ -159,9 +160,7 @@ def per_joint(value: T | list[T], n: int) -> list[T]:
 
 
 def _check_unit(unit: str | None, quantity: str, where: str) -> None:
-    if unit is None or unit == UNSAID:
-        return
-    if canonical(unit, quantity) is None:
+    if unit not in (None, UNSAID) and canonical(unit or "", quantity) is None:
         raise InputError(
             f"{where}: {quantity}: unit {unit!r} is unknown; it must be one of {', '.join(FACTORS[quantity])}"
         )

@@ -13,11 +13,7 @@ from armloop.util.errors import LogError
 
 
 def read_matlab(path: Path) -> Recording:
-    """Read all numeric variables; what they mean is suggested by their names.
-
-    Raises:
-        LogError: the file is none that can be read, or holds nothing that looks like a log.
-    """
+    """Read all numeric variables, which their names explain; raises ``LogError`` for what is no file of logs."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 

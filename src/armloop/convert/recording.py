@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,39 +15,32 @@ from armloop.util.arrays import Array
 
 @dataclass(eq=False)
 class Recording:
-    """One source.
+    """One source."""
 
-    Attributes:
-        path: of the file or folder.
-        kind: what it is, in words ("ROS 2 bag", ...).
-        columns: the numeric columns by name, each (N,); not a number where a cell was empty.
-        mapping: what the format fixes; a unit of None is one that it does not say. None where a map is needed.
-        named: the joints' names say which is which, so that they have to be matched with the arm's.
-        starts: index of the first sample of each part that the source itself keeps apart (an episode, a
-            header that is repeated); 0 is one of them.
-        epoch: what the time column counts from, s since 1970, where the format says so.
-        rows: what to call a row ("row", "message").
-        notes: what was read and what was left, one line each.
-        unsure: what the columns' names leave open, by field of the map.
-        units: by column, the unit that a row below the header says.
-    """
-
-    path: Path
-    kind: str
-    columns: dict[str, Array]
-    mapping: Mapping | None = None
-    named: bool = False
-    starts: Sequence[int] = (0,)
-    epoch: float | None = None
-    rows: str = "row"
-    notes: list[str] = field(default_factory=list)
-    unsure: dict[str, str] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
+    path: Path  # of the file or folder
+    kind: str  # what it is, in words ("ROS 2 bag", ...)
+    columns: dict[str, Array]  # the numeric ones by name, each (N,); not a number where a cell was empty
+    mapping: Mapping | None = None  # what the format fixes, unit None where it does not say; else needed
+    named: bool = False  # the joints' names say which is which: they have to be matched with the arm's
+    starts: Sequence[int] = (0,)  # first sample of each part kept apart (an episode, a repeated header)
+    epoch: float | None = None  # what the time column counts from, s since 1970, where the format says so
+    rows: str = "row"  # what to call a row ("row", "message")
+    notes: list[str] = field(default_factory=list)  # what was read and what was left, one line each
+    unsure: dict[str, str] = field(
+        default_factory=dict
+    )  # what the columns' names leave open, by field of the map
+    units: dict[str, str] = field(default_factory=dict)  # by column, what a row below the header says
 
     @property
     def samples(self) -> int:
         """The number of rows."""
         return len(next(iter(self.columns.values()))) if self.columns else 0
+
+
+def some(names: Iterable[str], most: int = 8) -> str:
+    """The first of the names, for a message."""
+    listed = list(names)
+    return ", ".join(listed[:most]) + (" …" if len(listed) > most else "")
 
 
 def flatten(arrays: dict[str, NDArray[np.generic]]) -> dict[str, Array]:
@@ -57,11 +50,9 @@ def flatten(arrays: dict[str, NDArray[np.generic]]) -> dict[str, Array]:
     holds no numbers is left out.
     """
     numeric = {
-        name: np.asarray(values)
-        for name, values in arrays.items()
-        if np.asarray(values).dtype.kind in "fiub"
-        and np.asarray(values).ndim in (1, 2)
-        and np.size(values) > 1
+        name: values
+        for name, values in zip(arrays, map(np.asarray, arrays.values()), strict=True)
+        if values.dtype.kind in "fiub" and values.ndim in (1, 2) and values.size > 1
     }
     lengths = [max(values.shape) for values in numeric.values()]
     if not lengths:

@@ -25,15 +25,9 @@ _FIRST = 100
 
 
 def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> Recording:
-    """Read the joint states of one bag.
+    """Read the joint states of one bag, of ``topic`` where it has several; raises ``LogError`` where there are none.
 
-    Args:
-        topic: which one, where a bag has several.
-        wanted: the joints' names; messages without them (of a gripper's driver) are left out. None takes the
-            names of the first message.
-
-    Raises:
-        LogError: the bag is unreadable, holds no joint states, or several that only ``topic`` can tell apart.
+    Messages without the joints ``wanted`` (of a gripper's driver) are left out; None takes the names of the first message.
     """
     import msgspec
     from rosbags.highlevel import AnyReader, AnyReaderError
@@ -68,7 +62,11 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
                 moving = len(message.velocity) > 0 if not rows else len(rows[0][1]) > 0
                 sizes = len(message.position), len(message.velocity), len(message.effort)
                 if sizes != (len(found), len(found) * moving, len(found)):
-                    raise _short(path, chosen, len(rows) + 1, message, len(found))
+                    raise LogError(
+                        f"{path}: {chosen}, message {len(rows) + 1}: {sizes[0]} positions, {sizes[1]} velocities, "
+                        f"{sizes[2]} efforts for {len(found)} joints; a log needs every joint's position and effort in each "
+                        "message, and its velocity in each or in none, so record a driver that publishes them"
+                    )
                 stamp = message.header.stamp
                 stamps.append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
                 received.append(at)
@@ -161,11 +159,3 @@ def _has_joints(reader: Any, topic: str, wanted: Sequence[str]) -> bool:
             match(reader.deserialize(raw, connection.msgtype).name, wanted, topic)
             return True
     return False
-
-
-def _short(path: Path, topic: str, row: int, message: Any, n: int) -> LogError:
-    sizes = f"{len(message.position)} positions, {len(message.velocity)} velocities, {len(message.effort)} efforts"
-    return LogError(
-        f"{path}: {topic}, message {row}: {sizes} for {n} joints; a log needs every joint's position and effort in each "
-        "message, and its velocity in each or in none, so record a driver that publishes them"
-    )

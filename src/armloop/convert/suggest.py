@@ -11,8 +11,8 @@ from armloop.convert.assemble import rate_ratio
 from armloop.convert.headers import suggest
 from armloop.convert.inferred import alternatives, described, inferred
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
-from armloop.convert.recording import Recording
-from armloop.convert.units import FACTORS, RATES, canonical, fitting
+from armloop.convert.recording import Recording, some
+from armloop.convert.units import FACTORS, RATES, canonical, fitting, time_unit
 from armloop.robot.arm import Arm
 
 _BARE = re.compile(r"[A-Za-z_][\w./ +-]*")
@@ -88,9 +88,7 @@ def written(mapping: Mapping, unsure: dict[str, str], recording: Recording) -> s
     if "v" in unsure and mapping.v is None:
         lines.append(f"# v: unsure: {unsure['v']}")
     extra = [name for name in recording.columns if name not in mapping.used()]
-    lines.append(
-        "keep: all" + (f"  # {', '.join(extra[:8])}{' …' if len(extra) > 8 else ''}" if extra else "")
-    )
+    lines.append(f"keep: all  # {some(extra)}" if extra else "keep: all")
     return "\n".join(lines) + "\n"
 
 
@@ -122,10 +120,8 @@ def _time_evidence(recording: Recording, mapping: Mapping) -> str:
     if mapping.v is not None and mapping.v.unit is None and mapping.q.unit is None:
         # With the rates of the positions' unit, whichever it is.
         plain = QuantityMap(mapping.q.columns, "rad"), QuantityMap(mapping.v.columns, RATES["rad"])
-        ratio = rate_ratio(time, recording, *plain)
-        for unit, factor in FACTORS["time"].items():
-            if 0.7 < ratio / factor < 1.4:
-                return f"{text}; v agrees with the rate of q if it is {unit}"
+        if unit := time_unit(rate_ratio(time, recording, *plain)):
+            return f"{text}; v agrees with the rate of q if it is {unit}"
     return f"{text}: s, ms, us or ns?"
 
 

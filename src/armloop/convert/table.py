@@ -16,33 +16,18 @@ def read_table(path: Path) -> Recording:
     """Read one table; raises ``LogError`` where it cannot be read."""
     table = _parquet(path) if kind_of(path) == PARQUET else read_text(path)
     columns, units, said = table.columns, table.units, [*table.notes, *table.left_out()]
-    own = _own(columns) if not units else None
-    if own is not None:
-        _require_once(path, own, table.twice)
-        return Recording(path, "motion log", columns, own, starts=table.starts, notes=said)
-    found = suggest(list(columns), units=units)
-    _require_once(path, found.mapping, table.twice)
-    return Recording(
-        path,
-        "table",
-        columns,
-        found.mapping,
-        starts=table.starts,
-        notes=said,
-        unsure=found.unsure,
-        units=units,
-    )
-
-
-def _require_once(path: Path, mapping: Mapping | None, twice: list[str]) -> None:
-    """Raise ``LogError`` where a column that is needed stands twice with other numbers."""
+    kind, mapping, unsure = "motion log", None if units else _own(columns), {}
     if mapping is None:
-        return  # a map will say what is needed
-    for name in twice:
-        if name in mapping.used():
+        found = suggest(list(columns), units=units)
+        kind, mapping, unsure = "table", found.mapping, found.unsure
+    for name in table.twice:  # without a map it is not known yet what is needed
+        if mapping is not None and name in mapping.used():
             raise LogError(
                 f"{path}: column {name} stands twice, with other numbers; give each a name of its own"
             )
+    return Recording(
+        path, kind, columns, mapping, starts=table.starts, notes=said, unsure=unsure, units=units
+    )
 
 
 def _own(columns: dict[str, Array]) -> Mapping | None:

@@ -44,22 +44,14 @@ class TextTable:
 
 
 def header_of(path: Path) -> list[str]:
-    """The names of a text table's columns, or an empty list where no line looks like a header.
-
-    Raises:
-        LogError: the file is not text.
-    """
+    """The names of a table's columns, none where no line looks like a header; raises ``LogError`` for what is no text."""
     lines, _ = _lines(path)
     separator, at = _layout(lines)
     return [] if at is None else _names(lines[at], separator)
 
 
 def read_text(path: Path) -> TextTable:
-    """Read a text table; a line that repeats the header starts a new part.
-
-    Raises:
-        LogError: the file is not text, has no header, or a row has too few or too many cells.
-    """
+    """Read a text table, a line that repeats the header starts a new part; raises ``LogError``, which names the line."""
     import pyarrow
     import pyarrow.csv
 
@@ -79,7 +71,7 @@ def read_text(path: Path) -> TextTable:
         notes.append(f"units from line {below + 1}: {', '.join(dict.fromkeys(units.values()))}")
     heads = [k for k in range(first, len(lines)) if lines[k].strip() and _is_header(lines[k], separator)]
     repeated = set(heads[1:])
-    body, starts, numbers, rows = [], [], [], 0
+    body, numbers = [], []
     for k in range(first + 1, len(lines)):
         if k in repeated:
             if _names(lines[k], separator) != names:
@@ -90,10 +82,9 @@ def read_text(path: Path) -> TextTable:
         if lines[k].strip() and not lines[k].lstrip().startswith("#"):
             body.append(lines[k])
             numbers.append(k + 1)
-            rows += 1
     if not body:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
-    starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {rows})
+    starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {len(body)})
     decimal = "," if separator != "," and any(re.search(r"\d,\d", line) for line in body[:50]) else "."
     if separator != "," or decimal != ".":
         between = {"\t": "tabs", ";": "semicolons", " ": "blanks", ",": "commas"}[separator]
@@ -104,7 +95,10 @@ def read_text(path: Path) -> TextTable:
     width = len(body[0].rstrip("\r").split(separator))
     extra = width - len(names)
     if extra == 1 and all(not line.rstrip("\r ").endswith(separator) for line in body[:3]):
-        names_read = _with_empty(names, body[0].split(separator))
+        # An empty name where the rows have an empty cell more than the header (libfranka's ``,,``).
+        empty = (k for k, cell in enumerate(body[0].split(separator)) if not cell.strip())
+        k = next(empty, len(names))
+        names_read = [*names[:k], "", *names[k:]]
     else:
         names_read = [*names, *[""] * max(extra, 0)]
     try:
@@ -128,15 +122,17 @@ def read_text(path: Path) -> TextTable:
         if not name:
             continue
         kind = cells.type
+        texts = [cell.as_py() for cell in cells] if pyarrow.types.is_string(kind) else []
+        bad = next((text for text in texts if text is not None and not _NUMBER.match(text)), None)
         if name in columns:
             dropped.append(f"{name} (a second column of that name)")
             if not is_number(kind) or not np.array_equal(numbers_of(cells), columns[name], equal_nan=True):
                 twice.append(name)
         elif is_number(kind) or pyarrow.types.is_boolean(kind):
             columns[name] = numbers_of(cells)
-        elif pyarrow.types.is_string(kind) and (bad := _first_text(cells)) is not None:
+        elif bad is not None:
             # A cell that is no number among numbers is a fault only where the column is needed.
-            columns[name] = _forgiving(cells)
+            columns[name] = np.array([_number(text) for text in texts])
             if np.isnan(columns[name]).all():
                 del columns[name]
                 dropped.append(f"{name} (no numbers: {bad!r})")
@@ -197,7 +193,7 @@ def _layout(lines: list[str]) -> tuple[str, int | None]:
             if len(names) < 2 or not _is_header(lines[k], separator):
                 continue
             rows = below[1:] if below and _is_units(below[0], separator, len(names)) else below[:1]
-            if rows and _width(rows[0], separator) == len(names) and _is_numbers(rows[0], separator):
+            if rows and _width(rows[0], separator) == len(names) and not _is_header(rows[0], separator):
                 return separator, k
     for k, line in enumerate(lines[:100]):
         text = line.strip()
@@ -226,11 +222,6 @@ def _width(line: str, separator: str) -> int:
     return len(cells) - (not cells[-1].strip())
 
 
-def _is_numbers(line: str, separator: str) -> bool:
-    cells = [cell for cell in _cells(line, separator) if cell.strip()]
-    return bool(cells) and sum(bool(_NUMBER.match(cell)) for cell in cells) >= len(cells) / 2
-
-
 def _is_units(line: str, separator: str, width: int) -> bool:
     """Whether a line below a header of so many names holds their units: most of its cells that say something do."""
     cells = [_bare(cell) for cell in _cells(line, separator)]
@@ -256,31 +247,12 @@ def _is_header(line: str, separator: str) -> bool:
     return bool(cells) and sum(not _NUMBER.match(cell) for cell in cells) > len(cells) / 2
 
 
-def _with_empty(names: list[str], cells: list[str]) -> list[str]:
-    """The names with an empty one where the rows have an empty cell more than the header (libfranka's ``,,``)."""
-    for k, cell in enumerate(cells):
-        if not cell.strip():
-            return [*names[:k], "", *names[k:]]
-    return [*names, ""]
-
-
-def _first_text(cells: object) -> str | None:
-    for value in cells:  # type: ignore[attr-defined]
-        text = value.as_py()
-        if text is not None and not _NUMBER.match(text):
-            return str(text)
-    return None
-
-
-def _forgiving(cells: object) -> Array:
-    def number(text: str | None) -> float:
-        try:
-            # not Python's own 1_000, nor digits of another script
-            return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
-        except ValueError:
-            return float("nan")
-
-    return np.array([number(value.as_py()) for value in cells])  # type: ignore[attr-defined]
+def _number(text: str | None) -> float:
+    """The number that a text is, NaN where it is none: not Python's own 1_000 either, nor digits of another script."""
+    try:
+        return float(text) if text is not None and text.isascii() and "_" not in text else float("nan")
+    except ValueError:
+        return float("nan")
 
 
 def _fault(

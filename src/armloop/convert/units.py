@@ -17,65 +17,35 @@ FACTORS: dict[str, dict[str, float]] = {
 }
 #: Units of `tau` that are no torque.
 CURRENTS = ("A", "mA")
-_ALIASES = {
-    "sec": "s",
-    "secs": "s",
-    "second": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "millisec": "ms",
-    "milliseconds": "ms",
-    "usec": "us",
-    "µs": "us",
-    "microseconds": "us",
-    "nsec": "ns",
-    "nanoseconds": "ns",
-    "radian": "rad",
-    "radians": "rad",
-    "degree": "deg",
-    "degrees": "deg",
-    "°": "deg",
-    "°/s": "deg/s",
-    "rads": "rad/s",
-    "degs": "deg/s",
-    "rad/s2": "rad/s^2",
-    "rad/s²": "rad/s^2",
-    "rad/s**2": "rad/s^2",
-    "deg/s2": "deg/s^2",
-    "deg/s²": "deg/s^2",
-    "m/s2": "m/s^2",
-    "m/s²": "m/s^2",
-    "nm": "N*m",
-    "n*m": "N*m",
-    "n·m": "N*m",
-    "n.m": "N*m",
-    "n m": "N*m",
-    "n-m": "N*m",
-    "newton": "N",
-    "n": "N",
-    "mnm": "mN*m",
-    "mn*m": "mN*m",
-    "a": "A",
-    "amp": "A",
-    "amps": "A",
-    "ampere": "A",
-    "ma": "mA",
-    "percent": "%",
-    "u/min": "rpm",
-    "1/min": "rpm",
-    "r/min": "rpm",
-    "rev/min": "rpm",
-    "grados": "deg",
-    "度": "deg",
-    "弧度": "rad",
-    "秒": "s",
-    "毫秒": "ms",
-    "牛米": "N*m",
-    "安": "A",
-    "安培": "A",
+#: By unit, how others spell it, lower case.
+_SPELT = {
+    "s": "sec, secs, second, seconds, 秒",
+    "ms": "msec, millisec, milliseconds, 毫秒",
+    "us": "usec, µs, microseconds",
+    "ns": "nsec, nanoseconds",
+    "rad": "radian, radians, 弧度",
+    "deg": "degree, degrees, °, grados, 度",
+    "deg/s": "°/s, degs",
+    "rad/s": "rads",
+    "rad/s^2": "rad/s2, rad/s², rad/s**2",
+    "deg/s^2": "deg/s2, deg/s²",
+    "m/s^2": "m/s2, m/s²",
+    "N*m": "nm, n*m, n·m, n.m, n m, n-m, 牛米",
+    "N": "newton, n",
+    "mN*m": "mnm, mn*m",
+    "A": "a, amp, amps, ampere, 安, 安培",
+    "mA": "ma",
+    "%": "percent",
+    "rpm": "u/min, 1/min, r/min, rev/min",
 }
+_ALIASES = {word: unit for unit, words in _SPELT.items() for word in words.split(", ")}
 #: The unit of the velocity that goes with a position's, and so on.
 RATES = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s"}
+
+
+def spelt(text: str) -> str:
+    """A unit as this module spells it, whatever it is of."""
+    return _ALIASES.get(text.lower(), text.lower())
 
 
 def canonical(text: str, quantity: str) -> str | None:
@@ -84,7 +54,7 @@ def canonical(text: str, quantity: str) -> str | None:
     known = FACTORS[quantity]
     if text in known:
         return text
-    alias = _ALIASES.get(text.lower(), text.lower())
+    alias = spelt(text)
     if alias in known:
         return alias
     if quantity == "v" and "/" in text:
@@ -92,6 +62,11 @@ def canonical(text: str, quantity: str) -> str | None:
         rate = RATES.get(canonical(of, "q") or "")
         return rate if canonical(per, "time") == "s" else None
     return None
+
+
+def time_unit(ratio: float) -> str | None:
+    """The unit of time with which v is the rate of q, where its numbers are ``ratio`` times q's rate per unit of time."""
+    return next((unit for unit, second in FACTORS["time"].items() if 0.7 < ratio / second < 1.4), None)
 
 
 def fitting(ratio: float) -> list[tuple[str, str]]:

@@ -59,7 +59,8 @@ def words_of(name: str) -> list[str]:
     Compounds are taken apart where their end is a known word: ``Sollposition1`` gives soll, position, 1, and
     ``关节1角度`` gives 关节, 1, 角度.
     """
-    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", _without_accents(name))
+    plain = re.sub(r"[\u0300-\u036f]", "", unicodedata.normalize("NFD", name))
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", unicodedata.normalize("NFC", plain))
     found: list[str] = []
     for word in re.findall(r"[^\W\d_]+|[%°]+|\d+", spaced.lower()):
         found += _parts(word)
@@ -87,8 +88,3 @@ def _parts(word: str) -> list[str]:
         return [word]
     end = next((known for known in _ENDINGS if word.endswith(known)), None)
     return [word] if end is None else [*_parts(word[: -len(end)]), end]
-
-
-def _without_accents(text: str) -> str:
-    decomposed = unicodedata.normalize("NFD", text)
-    return unicodedata.normalize("NFC", re.sub(r"[\u0300-\u036f]", "", decomposed))

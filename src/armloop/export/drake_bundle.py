@@ -55,11 +55,7 @@ print("q after 0.1 s without drives:", plant.GetPositions(plant.GetMyContextFrom
 
 
 def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exported:
-    """Write ``arm.urdf``, ``model.json`` and ``simulate.py``, run the program, and compare the torques.
-
-    Raises:
-        InputError: the place cannot be written to, or the program does not run.
-    """
+    """Write arm, model and program, run it, and compare the torques; raises ``InputError`` where that cannot be done."""
     what = said(model, nearest_friction=False)
     smoothing = _smoothing(model, what)
     texts = {"arm.urdf": urdf_text(what), "simulate.py": _PROGRAM.format(step=_STEP, smoothing=smoothing)}
@@ -97,7 +93,6 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
         for a in model.effects
         if a.effect.of_time
     ]
-    notes = _costs(model, _slower(model, smoothing), smoothing)
     return Exported(
         "drake",
         files,
@@ -106,7 +101,7 @@ def as_drake(model: ReconstructedModel, folder: Path, motion: Motion) -> Exporte
         np.abs(tau - expected).max(axis=0),
         np.abs(tau - whole).max(axis=0),
         missing,
-        [*notes, *what.notes, NAMES],
+        [*_costs(model, smoothing), *what.notes, NAMES],
     )
 
 
@@ -180,16 +175,6 @@ def _steepness(model: ReconstructedModel, widths: Sequence[float], loads: list[f
     return float((there - back) / (2 * speed))
 
 
-def _slower(model: ReconstructedModel, smoothing: Sequence[float]) -> list[int]:
-    """Joints (0-based) whose dry friction sets in over more than the model has it."""
-    loads, at_once = _loads(model), [1e-6] * model.arm.n
-    return [
-        j
-        for j in range(model.arm.n)
-        if _steepness(model, at_once, loads, j) > 1.01 * _steepness(model, smoothing, loads, j)
-    ]
-
-
 def _loads(model: ReconstructedModel) -> list[float]:
     """(n,) the largest torques at rest that load the joints, at the postures tried."""
     equations, still = ModelEquations(model, MATH), [0.0] * model.arm.n
@@ -197,13 +182,16 @@ def _loads(model: ReconstructedModel) -> list[float]:
     return [float(x) for x in np.abs([equations.load(q, still, still) for q in postures]).max(axis=0)]
 
 
-def _costs(model: ReconstructedModel, joints: Sequence[int], smoothing: Sequence[float]) -> list[str]:
-    """What the smoothing costs, in a line each."""
-    if not joints:
-        return []
+def _costs(model: ReconstructedModel, smoothing: Sequence[float]) -> list[str]:
+    """What the smoothing costs, in a line each, at the joints whose dry friction sets in over more than the model has it."""
+    loads, at_once = _loads(model), [1e-6] * model.arm.n
     each = ", ".join(
-        f"{smoothing[j]:g} {model.arm.joints[j].position_unit}/s at joint {j + 1}" for j in joints
+        f"{smoothing[j]:g} {joint.position_unit}/s at joint {j + 1}"
+        for j, joint in enumerate(model.arm.joints)
+        if _steepness(model, at_once, loads, j) > 1.01 * _steepness(model, smoothing, loads, j)
     )
+    if not each:
+        return []
     return [
         f"dry friction sets in as tanh(v/w) instead of at once, so that a step of {_STEP:g} s does not chatter: w is {each}",
         "below w a joint creeps where the model's sticks, and the friction is less than the model's; a step of half the "

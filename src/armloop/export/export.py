@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -57,24 +58,22 @@ def export(
 
 
 def _described(model: ReconstructedModel, target: str, path: Path, motion: Motion) -> Exported:
-    text, features, consumer, read = _FORMATS[target]
+    template, features, consumer, read = _FORMATS[target]
     what = said(model)
     notes = [*what.notes, NAMES]
     names = model.arm.joint_names
     whole = whole_torque(model, motion)
     difference = unsaid = None
-    source = text(what)
-    with tempfile.TemporaryDirectory() as folder:
-        # The consumers know a format by its name's end.
-        place = Path(folder) / f"arm{_SUFFIX[target]}"
-        place.write_text(source, encoding="utf-8")
+    source = template(what)
+    # The consumers know a format by its name's end.
+    with _draft(source, f"arm{_SUFFIX[target]}") as place:
         try:
             tau = read(place, names, motion.q, motion.v, motion.vdot)
         except NotInstalled as error:
             consumer = ""
             notes.append(str(error))
         except (RuntimeError, ValueError) as error:  # how Drake and MuJoCo refuse a file
-            why = str(error).replace(f"{folder}/", "")
+            why = str(error).replace(f"{place.parent}/", "")
             raise ModelError(f"{consumer} does not read the {target} of this model: {why}") from error
         else:
             difference = np.abs(tau - what.torque(motion.q, motion.v, motion.vdot, features)).max(axis=0)
@@ -85,17 +84,13 @@ def _described(model: ReconstructedModel, target: str, path: Path, motion: Motio
 
 def _as_c(model: ReconstructedModel, path: Path, motion: Motion) -> Exported:
     source, found = c_source(model)
-    notes, missing = [], list(found.left_out)
+    notes = []
     whole = whole_torque(model, motion)
-    difference, consumer = None, ""
-    program = compiler()
+    difference, program = None, compiler()
     if program is None:
         notes.append("no C compiler is at hand (cc, gcc or clang): the file was written, not compiled")
     else:
-        consumer = Path(program).name
-        with tempfile.TemporaryDirectory() as folder:
-            place = Path(folder) / "arm.c"
-            place.write_text(source, encoding="utf-8")
+        with _draft(source, "arm.c") as place:
             tau = CompiledTorque(place).torque(motion.q, motion.v, motion.vdot)
         difference = np.abs(tau - whole).max(axis=0)
     write_text(path, source)
@@ -104,7 +99,17 @@ def _as_c(model: ReconstructedModel, path: Path, motion: Motion) -> Exported:
             "armloop_torque_memory carries friction's memory and clock along in a struct; armloop_torque has it fully "
             "slid and warm"
         )
-    return Exported("c", [path], consumer, rms_of(whole), difference, difference, missing, notes)
+    consumer = Path(program or "").name
+    return Exported("c", [path], consumer, rms_of(whole), difference, difference, found.left_out, notes)
+
+
+@contextmanager
+def _draft(source: str, name: str) -> Iterator[Path]:
+    """A file of this name for its consumer: what that refuses is not written."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / name
+        place.write_text(source, encoding="utf-8")
+        yield place
 
 
 _SUFFIX = {"urdf": ".urdf", "sdf": ".sdf", "mjcf": ".xml"}

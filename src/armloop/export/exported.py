@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,27 +24,18 @@ NAMES = (
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """What was written and how it reads back.
+    """What was written and how it reads back; torques of n joints."""
 
-    Attributes:
-        target: one of ``armloop.export.TARGETS``.
-        files: what was written.
-        consumer: who read it back; empty where nobody could, which ``notes`` say.
-        rms: (n,) RMS of the model's torque over the states compared.
-        difference: (n,) largest difference between the torque read back and what the target can say of the model.
-        unsaid: (n,) largest difference between the torque read back and the whole model's.
-        missing: what the target cannot say, one line each.
-        notes: what else the user should know.
-    """
-
-    target: str
-    files: list[Path]
-    consumer: str
-    rms: Array
-    difference: Array | None
-    unsaid: Array | None
-    missing: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    target: str  # one of armloop.export.TARGETS
+    files: list[Path]  # what was written
+    consumer: str  # who read it back; empty where nobody could, which the notes say
+    rms: Array  # (n,) RMS of the model's torque over the states compared
+    difference: (
+        Array | None
+    )  # (n,) largest one of the torque read back from what the target can say of the model
+    unsaid: Array | None  # (n,) largest one of the torque read back from the whole model's
+    missing: list[str]  # what the target cannot say, one line each
+    notes: list[str]  # what else the user should know
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
@@ -70,13 +61,13 @@ def rms_of(tau: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(tau**2, axis=0)))
 
 
-def states_of(motion: Motion, moving: NDArray[np.bool_], most: int = _MOST) -> Motion:
-    """At most so many states of a log in which every joint slides, evenly over it.
+def states_of(motion: Motion, moving: NDArray[np.bool_]) -> Motion:
+    """At most 400 states of a log in which every joint slides, evenly over it.
 
     At rest dry friction is not determined, so that nothing could be compared. Where all joints never slide at once,
     those at rest count as the log has them.
     """
     rows = np.flatnonzero(moving.all(axis=1))
     rows = rows if len(rows) >= 20 else np.arange(motion.samples)
-    rows = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)]
+    rows = rows[np.linspace(0, len(rows) - 1, min(_MOST, len(rows))).astype(int)]
     return motion.take(rows)

@@ -33,30 +33,18 @@ _NO_BODY = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Said:
-    """An arm as descriptions have it, n joints.
+    """An arm as descriptions have it, n joints."""
 
-    Attributes:
-        arm: kinematics, names and limits.
-        links: (10 n,) inertial parameters of bodies that can exist.
-        rotors: (n,) inertias of the drives seen at the joint, kg m² (kg).
-        damping: (n,) viscous coefficients, N m s (N s/m).
-        dry: (n,) levels of dry friction, N m (N).
-        stiffness, rest: (n,) springs at the joints, N m/rad (N/m), and where they are relaxed, rad (m).
-        gravity: (3,) m/s² in the base frame.
-        missing: what of the model is in none of these, one line each.
-        notes: what was decided on the way.
-    """
-
-    arm: Arm
-    links: Array
-    rotors: Array
-    damping: Array
-    dry: Array
-    stiffness: Array
-    rest: Array
-    gravity: Array
-    missing: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    arm: Arm  # kinematics, names and limits
+    links: Array  # (10 n,) inertial parameters of bodies that can exist
+    rotors: Array  # (n,) inertias of the drives seen at the joint, kg m² (kg)
+    damping: Array  # (n,) viscous coefficients, N m s (N s/m)
+    dry: Array  # (n,) levels of dry friction, N m (N)
+    stiffness: Array  # (n,) springs at the joints, N m/rad (N/m)
+    rest: Array  # (n,) where they are relaxed, rad (m)
+    gravity: Array  # (3,) m/s² in the base frame
+    missing: list[str] = field(default_factory=list)  # what of the model is in none of these, one line each
+    notes: list[str] = field(default_factory=list)  # what was decided on the way
 
     def torque(self, q: Array, v: Array, vdot: Array, features: frozenset[str]) -> Array:
         """(N, n) torques of the drives by what a target with these features takes in."""
@@ -88,14 +76,10 @@ class Said:
 
 
 def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
-    """What descriptions can say of a model.
+    """What descriptions can say of a model; raises ``ModelError`` where no links with positive masses come near it.
 
-    Args:
-        nearest_friction: put the nearest damping and dry friction in place of laws that are neither; without it
-            the viscous terms alone are damping, and the rest is somebody else's.
-
-    Raises:
-        ModelError: no link inertias with positive masses come near the model's torques.
+    ``nearest_friction`` puts the nearest damping and dry friction in place of laws that are neither; without it the viscous
+    terms alone are damping, and the rest is somebody else's.
     """
     arm = model.arm
     missing: list[str] = []
@@ -127,6 +111,11 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     for j in np.flatnonzero(constants).tolist():
         missing.append(f"joint {j + 1}: a constant torque, {constants[j]:.4g} {arm.joints[j].torque_unit}")
     damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
+    if (damping < 0).any():
+        j = int(np.argmin(damping))
+        raise ModelError(
+            f"joint {j + 1}: viscous friction is {damping[j]:.3g}, and Drake takes no damping below 0"
+        )
     for j in range(arm.n):
         if stiffness[j] < 0:
             missing.append(f"joint {j + 1}: a spring that pushes, {stiffness[j]:.4g}")
@@ -200,7 +189,7 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     Where a joint's law is a sum of the two, they are its coefficients; else those nearest to it over the speeds that
     the model was fitted on, by least squares, and what they leave goes to ``missing``.
     """
-    damping, dry = _damping(model), _summed(model, "sign", "coulomb_friction", "level")
+    damping, dry = _viscous(model), _summed(model, "sign", "coulomb_friction", "level")
     others = _other_laws(model)
     if any(others) or (damping < 0).any() or (dry < 0).any():
         v, torques = friction_torques(model)
@@ -220,19 +209,9 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     return damping, dry
 
 
-def _damping(model: ReconstructedModel) -> Array:
-    return _summed(model, "viscous", "viscous_friction", "coefficient")
-
-
 def _viscous(model: ReconstructedModel) -> Array:
-    """The sums of the joints' viscous terms, which must not push."""
-    damping = _damping(model)
-    if (damping < 0).any():
-        j = int(np.argmin(damping))
-        raise ModelError(
-            f"joint {j + 1}: viscous friction is {damping[j]:.3g}, and Drake takes no damping below 0"
-        )
-    return damping
+    """(n,) sums of the joints' viscous coefficients."""
+    return _summed(model, "viscous", "viscous_friction", "coefficient")
 
 
 def _other_laws(model: ReconstructedModel) -> list[list[str]]:
@@ -284,7 +263,9 @@ def _bodies(
         notes.append(
             "the URDF gives no masses: what the torques do not reveal of the links is as small as can be"
         )
-    prior = _with_added(model, prior)
+    for added in model.effects:
+        if added.effect.name == "payload":
+            prior[-10:] += link_parameters(arm, {key: e.value for key, e in added.parameters.items()})
     found = consistent_inertia(arm, links, rotors, prior)
     if not found.exact:
         motion = random_motion(model, _STATES, seed=1)
@@ -298,15 +279,6 @@ def _bodies(
             f"torque by {listed} (RMS over RMS)"
         )
     return found
-
-
-def _with_added(model: ReconstructedModel, prior: Array) -> Array:
-    """The nominal links with the payloads that were found."""
-    prior = prior.copy()
-    for added in model.effects:
-        if added.effect.name == "payload":
-            prior[-10:] += link_parameters(model.arm, {key: e.value for key, e in added.parameters.items()})
-    return prior
 
 
 def body_of(parameters: Sequence[float] | Array) -> tuple[float, Array, Array]:

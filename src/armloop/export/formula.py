@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,31 +21,31 @@ _ROUNDING = 4e-16
 _MEMORY = ("hysteresis", "load_hysteresis")
 
 
-@dataclass(frozen=True)
-class Stop:
-    """One elasto-plastic element: its joint (from 0) and the stretch at which it yields, rad (m)."""
+class Stop(NamedTuple):
+    """One elasto-plastic element: its joint (from 0), the stretch at which it yields, rad (m), and its level there.
+
+    The level is in N·m (N), or per unit of the joint's load.
+    """
 
     joint: int
     width: float
+    level: float
+    by_load: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Formula:
-    """Torques as formulas.
+    """Torques as formulas."""
 
-    Attributes:
-        torque: (n,) as a controller supplies it: friction with memory as if fully slid, fading friction gone.
-        remembered: (n,) with the elements' states ``z[k]`` in [-1, 1] and the time ``t`` of the joints' start.
-        stops: the elements, in the order of their states.
-        fades: whether time matters.
-        left_out: what of the model is not in the formulas, one line each.
-    """
-
-    torque: list[Node]
-    remembered: list[Node]
-    stops: list[Stop]
-    fades: bool
-    left_out: list[str]
+    torque: list[
+        Node
+    ]  # (n,) as a controller supplies it: friction with memory fully slid, fading friction gone
+    remembered: list[
+        Node
+    ]  # (n,) with the elements' states z[k] in [-1, 1] and the time t of the joints' start
+    stops: list[Stop]  # the elements, in the order of their states
+    fades: bool  # whether time matters
+    left_out: list[str]  # what of the model is not in the formulas, one line each
 
     @property
     def has_memory(self) -> bool:
@@ -53,11 +54,7 @@ class Formula:
 
 
 def formula(model: ReconstructedModel) -> Formula:
-    """Run a model's equations on traced numbers: inputs ``q[j]``, ``v[j]``, ``vdot[j]``, ``z[k]``, ``t``.
-
-    Raises:
-        ModelError: an effect has no law of q, v and vdot.
-    """
+    """Run a model's equations on traced ``q[j]``, ``v[j]``, ``vdot[j]``, ``z[k]``, ``t``; raises ``ModelError``."""
     n = model.arm.n
     model = replace(model, arm=_exact_quarters(model.arm))
     graph = Graph(n)
@@ -65,7 +62,6 @@ def formula(model: ReconstructedModel) -> Formula:
     v = [graph.input(f"v[{j}]") for j in range(n)]
     vdot = [graph.input(f"vdot[{j}]") for j in range(n)]
     plain, left_out = _split(model)
-    stops: list[Stop] = []
 
     def torques(kept: ReconstructedModel, t: Node) -> tuple[list[Node], list[Node]]:
         equations = ModelEquations(kept, graph.functions())
@@ -78,13 +74,12 @@ def formula(model: ReconstructedModel) -> Formula:
 
     late = graph.constant(_LATE)
     torque, _ = torques(plain, late)
-    slid, elements = _without_memory(plain)
+    slid, stops = _without_memory(plain)
     fades = any(a.effect.of_time for a in plain.effects)
-    if not elements and not fades:
+    if not stops and not fades:
         return Formula(torque, torque, [], False, left_out)
     remembered, load = torques(slid, graph.input("t") if fades else late)
-    for k, (joint, width, level, by_load) in enumerate(elements):
-        stops.append(Stop(joint, width))
+    for k, (joint, _, level, by_load) in enumerate(stops):
         z = level * graph.input(f"z[{k}]")
         remembered[joint] = remembered[joint] + (z * abs(load[joint]) if by_load else z)
     return Formula(torque, remembered, stops, fades, left_out)
@@ -114,16 +109,14 @@ def _split(model: ReconstructedModel) -> tuple[ReconstructedModel, list[str]]:
     return replace(model, effects=tuple(kept)), left_out
 
 
-def _without_memory(
-    model: ReconstructedModel,
-) -> tuple[ReconstructedModel, list[tuple[int, float, float, bool]]]:
-    """The model without its elasto-plastic elements, and these: joint, width, level, whether per unit of load."""
-    elements: list[tuple[int, float, float, bool]] = []
+def _without_memory(model: ReconstructedModel) -> tuple[ReconstructedModel, list[Stop]]:
+    """The model without its elasto-plastic elements, and these."""
+    elements: list[Stop] = []
     terms = []
     for j, joint in enumerate(model.friction.terms):
         terms.append(tuple(term for term in joint if term.kind not in _MEMORY))
         elements += [
-            (j, float(t.parameter), float(t.coefficient), t.kind == "load_hysteresis")
+            Stop(j, float(t.parameter), float(t.coefficient), t.kind == "load_hysteresis")
             for t in joint
             if t.kind in _MEMORY
         ]
@@ -134,7 +127,7 @@ def _without_memory(
             continue
         assert added.effect.joint is not None
         values = {key: number(e.value) for key, e in added.parameters.items()}
-        elements.append((added.effect.joint - 1, values["width"], values["level"], False))
+        elements.append(Stop(added.effect.joint - 1, values["width"], values["level"]))
         if values.get("level_change"):
             # what a model that had learned the step has to take back stays a step
             change = replace(added.parameters["level"], value=0.0)

@@ -46,11 +46,8 @@ def drake_torque(path: Path, joints: Sequence[str], q: Array, v: Array, vdot: Ar
 def mujoco_torque(path: Path, joints: Sequence[str], q: Array, v: Array, vdot: Array) -> Array:
     """(N, n) inverse dynamics of an MJCF file in MuJoCo, sliding: armature, damping, springs, and frictionloss.
 
-    MuJoCo's dry friction is a constraint that resists up to frictionloss; where a joint slides it is that level against
-    the motion, which is how it is counted here.
-
-    Raises:
-        NotInstalled: there is no MuJoCo.
+    MuJoCo's dry friction is a constraint that resists up to frictionloss; where a joint slides it is that level against the
+    motion, which is how it is counted here. Raises ``NotInstalled`` where there is no MuJoCo.
     """
     try:
         import mujoco

@@ -9,12 +9,22 @@ addition theorem: an arm has few joints and a model many waves.
 from __future__ import annotations
 
 import math
+import operator
+from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 from armloop.util.functions import Functions
 
 Key = tuple[Any, ...]
+
+
+def _operators(sign: str) -> tuple[Callable[[Node, Any], Node], Callable[[Node, Any], Node]]:
+    """The method for a sign between a node and another number, and the one for another number and a node."""
+    return (
+        lambda self, other: self.graph.operate(sign, self, other),
+        lambda self, other: self.graph.operate(sign, other, self),
+    )
 
 
 class Node:
@@ -27,32 +37,13 @@ class Node:
         #: Whole multiples of the angles that this is the sum of, where it is one.
         self.angle = angle
 
-    def __add__(self, other: Any) -> Node:
-        return self.graph.add(self, other)
-
-    def __radd__(self, other: Any) -> Node:
-        return self.graph.add(other, self)
-
-    def __sub__(self, other: Any) -> Node:
-        return self.graph.subtract(self, other)
-
-    def __rsub__(self, other: Any) -> Node:
-        return self.graph.subtract(other, self)
-
-    def __mul__(self, other: Any) -> Node:
-        return self.graph.multiply(self, other)
-
-    def __rmul__(self, other: Any) -> Node:
-        return self.graph.multiply(other, self)
-
-    def __truediv__(self, other: Any) -> Node:
-        return self.graph.divide(self, other)
-
-    def __rtruediv__(self, other: Any) -> Node:
-        return self.graph.divide(other, self)
+    __add__, __radd__ = _operators("+")
+    __sub__, __rsub__ = _operators("-")
+    __mul__, __rmul__ = _operators("*")
+    __truediv__, __rtruediv__ = _operators("/")
 
     def __neg__(self) -> Node:
-        return self.graph.multiply(-1.0, self)
+        return -1.0 * self
 
     def __pos__(self) -> Node:
         return self
@@ -65,14 +56,14 @@ class Node:
             raise TypeError(f"only whole powers from 0 can be written, not {power}")
         result: Any = 1.0
         for _ in range(int(power)):
-            result = self.graph.multiply(result, self)
+            result = result * self
         return self.graph.node(result)
 
     def __bool__(self) -> bool:
-        raise TypeError("a law that branches on its arguments cannot be written as one formula")
+        return _branches()
 
 
-def _branches(x: Any, lower: Any, upper: Any) -> Any:
+def _branches(*_: Any) -> bool:
     raise TypeError("a law that branches on its arguments cannot be written as one formula")
 
 
@@ -113,39 +104,35 @@ class Graph:
             clip=_branches,
         )
 
-    def add(self, a: Any, b: Any) -> Node:
+    def operate(self, sign: str, a: Any, b: Any) -> Node:
+        """The sum, difference, product or quotient of two numbers."""
         a, b = self.node(a), self.node(b)
         x, y = _value(a), _value(b)
         if x is not None and y is not None:
-            return self.constant(x + y)
+            return self.constant(_ARITHMETIC[sign](x, y))
+        return {"+": self._sum, "-": self._difference, "*": self._product, "/": self._quotient}[sign](
+            a, b, x, y
+        )
+
+    def _sum(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if x == 0.0:
             return b
         if y == 0.0:
             return a
         if b.key[0] == "-" and b.key[2] is a:  # c + (1 - c) of a rotation about a coordinate axis
-            return b.key[1]
+            return cast(Node, b.key[1])
         if b.key[0] == "*" and _value(b.key[1]) == -1.0:
             return self._made(("-", a, b.key[2]), _combined(a, b, 1))
         return self._made(("+", a, b), _combined(a, b, 1))
 
-    def subtract(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x - y)
+    def _difference(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if y == 0.0:
             return a
-        if x == 0.0:
-            return self.multiply(-1.0, b)
-        return self._made(("-", a, b), _combined(a, b, -1))
+        return -b if x == 0.0 else self._made(("-", a, b), _combined(a, b, -1))
 
-    def multiply(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x * y)
+    def _product(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
         if y is not None:
-            a, b, x, y = b, a, y, x
+            a, b, x = b, a, y
         if x == 0.0:
             return self.constant(0.0)
         if x == 1.0:
@@ -155,16 +142,8 @@ class Graph:
             angle = tuple(int(x) * k for k in b.angle)
         return self._made(("*", a, b), angle)
 
-    def divide(self, a: Any, b: Any) -> Node:
-        a, b = self.node(a), self.node(b)
-        x, y = _value(a), _value(b)
-        if x is not None and y is not None:
-            return self.constant(x / y)
-        if x == 0.0:
-            return a
-        if y == 1.0:
-            return a
-        return self._made(("/", a, b), None)
+    def _quotient(self, a: Node, b: Node, x: float | None, y: float | None) -> Node:
+        return a if x == 0.0 or y == 1.0 else self._made(("/", a, b), None)
 
     def call(self, name: str, x: Any) -> Node:
         """A function of one number."""
@@ -215,6 +194,7 @@ class Graph:
 
 #: Multiples of an angle that are still built from single ones; a motor's ripple of order 101 is not.
 _HIGHEST = 8
+_ARITHMETIC = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 _FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sin": math.sin,
     "cos": math.cos,
@@ -236,28 +216,13 @@ def _combined(a: Node, b: Node, sign: int) -> tuple[int, ...] | None:
     return tuple(x + sign * y for x, y in zip(a.angle, b.angle, strict=True))
 
 
-def statements(outputs: Sequence[Node], temporary: str = "t") -> tuple[list[str], list[str]]:
+def statements(outputs: Sequence[Node]) -> tuple[list[str], list[str]]:
     """C statements that compute what several outputs need, each once, and the outputs' expressions.
 
     An operation that is used once is written where it is used; a sum of products stays a line to read.
     """
-    uses: dict[int, int] = {}
-    order: list[Node] = []
-    seen: set[int] = set()
-    stack: list[tuple[Node, bool]] = [(node, False) for node in reversed(outputs)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-            continue
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        stack.append((node, True))
-        stack += [(x, False) for x in reversed(_operands(node))]
-    for node in order:
-        for x in _operands(node):
-            uses[id(x)] = uses.get(id(x), 0) + 1
+    order = _ordered(outputs)
+    uses = Counter(id(x) for node in order for x in _operands(node))
     text: dict[int, str] = {}
     lines: list[str] = []
     for node in order:
@@ -273,8 +238,8 @@ def statements(outputs: Sequence[Node], temporary: str = "t") -> tuple[list[str]
             written = f"({operands[0]} {kind} {operands[1]})"
         else:
             written = f"{kind}({operands[0]})"
-        if uses.get(id(node), 0) > 1 or len(written) > _LONGEST:
-            name = f"{temporary}{len(lines)}"
+        if uses[id(node)] > 1 or len(written) > _LONGEST:
+            name = f"t{len(lines)}"
             lines.append(f"const double {name} = {_bare(written)};")
             written = name
         text[id(node)] = written
@@ -294,18 +259,21 @@ def literal(value: float) -> str:
 
 def inputs_used(outputs: Sequence[Node]) -> set[str]:
     """Names of the inputs that the outputs depend on."""
-    found: set[str] = set()
-    seen: set[int] = set()
-    stack = list(outputs)
+    return {node.key[1] for node in _ordered(outputs) if node.key[0] == "input"}
+
+
+def _ordered(outputs: Sequence[Node]) -> list[Node]:
+    """All nodes that the outputs depend on, each once, behind its operands (depth first)."""
+    found: dict[int, Node] = {}
+    stack = [(node, False) for node in reversed(outputs)]
     while stack:
-        node = stack.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        if node.key[0] == "input":
-            found.add(node.key[1])
-        stack += _operands(node)
-    return found
+        node, done = stack.pop()
+        if done:
+            found[id(node)] = node
+        elif id(node) not in found:
+            stack.append((node, True))
+            stack += [(x, False) for x in reversed(_operands(node))]
+    return list(found.values())
 
 
 def _operands(node: Node) -> list[Node]:

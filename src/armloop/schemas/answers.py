@@ -7,19 +7,18 @@ from typing import Annotated, Any, Literal
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from armloop.schemas.types import (
-    MOST_JOINTS,
     Count,
     Finite,
     JointNumber,
     Name,
     NotNegative,
     PerJoint,
+    PerJointOrNull,
     Seconds,
     Text,
 )
 
 _Share = Annotated[float, Meta(ge=-1e3, le=1e3, description="part of an energy; 1 is all of it")]
-_PerJoint = Annotated[list[NotNegative | None], Meta(min_length=1, max_length=MOST_JOINTS)]
 
 
 class AlternativeData(Struct):
@@ -51,9 +50,9 @@ class RemainsData(Struct):
     metric: Name
     held_out: bool
     unit: list[Name]
-    before: _PerJoint
-    after: _PerJoint
-    noise_floor: _PerJoint | None = None
+    before: PerJointOrNull
+    after: PerJointOrNull
+    noise_floor: PerJointOrNull | None = None
 
 
 class JointShareData(Struct):

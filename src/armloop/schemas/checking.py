@@ -51,9 +51,9 @@ def _misfit(message: str, value: Any, schema: Any) -> Misfit:
             steps.append(_key(message, value, schema, steps))
         else:
             steps.append(name or int(index))
-    found, kinds = value, [*_plain(info.type_info(schema))]
+    found, kinds = value, _plain(info.type_info(schema))
     for step in steps:
-        found, kinds = found[step], [kind for each in kinds for kind in _inner(each, step, found)]
+        found, kinds = found[step], [kind for each in kinds for kind in _inner(each, step)]
     place = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step[:_MANY]}" for step in steps)
     place = place.removeprefix(".")
     missing = re.search(r"missing required field `(.+?)`", wrong)
@@ -100,12 +100,8 @@ def _with(value: Any, steps: list[str | int], end: Any) -> Any:
     return copy
 
 
-def _inner(kind: Any, step: str | int, value: Any) -> list[Any]:
-    """Kinds of what is at a step within a kind of value."""
-    if isinstance(kind, info.Metadata):
-        return _inner(kind.type, step, value)
-    if isinstance(kind, info.UnionType):
-        return [inner for each in kind.types for inner in _inner(each, step, value)]
+def _inner(kind: Any, step: str | int) -> list[Any]:
+    """Kinds of what is at a step within a kind of value, as of :func:`_plain`."""
     if isinstance(kind, info.ListType):
         return _plain(kind.item_type)
     if isinstance(kind, info.DictType):

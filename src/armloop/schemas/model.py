@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from armloop.schemas.checking import Misfit, checked
@@ -239,11 +240,7 @@ _MIGRATIONS = {"armloop/model/1": _from_1}
 
 
 def model_data(data: Any) -> dict[str, Any]:
-    """Check what was read from a model file, of this schema or an earlier one; returned as one of this schema.
-
-    Raises:
-        ModelError: another schema, or a field is missing, misshapen, out of range, or does not go with the arm.
-    """
+    """What was read from a model file, checked, as one of this schema; raises ``ModelError``, which names the field."""
     found = data.get("schema") if isinstance(data, dict) else None
     while isinstance(found, str) and found in _MIGRATIONS:
         data = _MIGRATIONS[found](data)
@@ -263,7 +260,6 @@ def _agree(model: ModelData) -> None:
     """Raise ``ModelError`` where lengths do not go with the number of joints."""
     arm, n = model.arm, len(model.arm.joints)
     kept = model.history.encoder_zeros
-    zeros = [] if kept is None else [("history.encoder_zeros.spread", kept.spread)]
     lengths: list[tuple[str, Any]] = [
         *((f"arm.{key}", getattr(arm, key)) for key in ("X_PF", "axis", "mass", "com", "inertia")),
         ("friction", model.friction),
@@ -274,7 +270,7 @@ def _agree(model: ModelData) -> None:
         ),
         *((f"history.range[{k + 1}]", row) for k, row in enumerate(model.history.range or [])),
         ("history.slowest", model.history.slowest),
-        *zeros,
+        ("history.encoder_zeros.spread", kept and kept.spread),
         *(
             (f"uncertainty.{key}", getattr(model.uncertainty, key) or None)
             for key in ("joints", "friction", "stribeck")
@@ -325,42 +321,30 @@ def _agree(model: ModelData) -> None:
                 raise ModelError(f"effects[{k + 1}]: {name}: value and std_error are not of one length")
 
 
-def _dot(x: list[float], y: list[float]) -> float:
-    return sum(a * b for a, b in zip(x, y, strict=True))
-
-
 def _check_arm(arm: ArmData) -> None:
     """Raise ``ModelError`` where numbers of an arm, each right in itself, are no arm's together."""
-    poses = [*((f"arm.X_PF[{k + 1}]", pose) for k, pose in enumerate(arm.X_PF)), ("arm.X_tool", arm.X_tool)]
-    for place, pose in poses:
-        x, y, z = (row[:3] for row in pose[:3])
-        across = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-        turned = max(
-            abs(_dot(x, x) - 1),
-            abs(_dot(y, y) - 1),
-            abs(_dot(x, y)),
-            *(abs(a - b) for a, b in zip(across, z, strict=True)),
-        )
-        if turned > _ROUNDED or pose[3] != [0.0, 0.0, 0.0, 1.0]:
+    poses = {f"arm.X_PF[{k + 1}]": np.array(pose) for k, pose in enumerate(arm.X_PF)}
+    poses["arm.X_tool"] = np.array(arm.X_tool)
+    for place, X in poses.items():
+        x, y, z = X[:3, :3]
+        turned = np.concatenate([[x @ x - 1, y @ y - 1, x @ y], np.cross(x, y) - z])
+        if np.abs(turned).max() > _ROUNDED or X[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
             raise ModelError(f"{place} is no pose: a rotation and a place (m) above a row 0, 0, 0, 1")
     for k, axis in enumerate(arm.axis):
-        if abs(sum(x * x for x in axis) - 1.0) > 1e-6:
+        if abs(np.dot(axis, axis) - 1.0) > _ROUNDED:
             raise ModelError(f"arm.axis[{k + 1}] is {axis}; an axis must have the length 1")
-    for k, rows in enumerate(arm.inertia):
-        largest = max(abs(x) for row in rows for x in row)
-        skew = max(abs(rows[i][j] - rows[j][i]) for i in range(3) for j in range(3))
-        if skew > _ROUNDED * largest or any(rows[i][i] < -_ROUNDED * largest for i in range(3)):
+    for k, inertia in enumerate(map(np.array, arm.inertia)):
+        rounded = _ROUNDED * np.abs(inertia).max()
+        if np.abs(inertia - inertia.T).max() > rounded or (np.diag(inertia) < -rounded).any():
             raise ModelError(
                 f"arm.inertia[{k + 1}] is no inertia: it must be symmetric, and no moment negative"
             )
     for k, mass in enumerate(arm.mass):
         if not 0 <= mass <= HEAVIEST:
             raise ModelError(f"arm.mass[{k + 1}] is {mass:g}; a mass must be from 0 to {HEAVIEST:g} kg")
-    places = {f"arm.com[{k + 1}]": list(com) for k, com in enumerate(arm.com)}
-    framed = {"arm.X_tool": arm.X_tool} | {f"arm.X_PF[{k + 1}]": pose for k, pose in enumerate(arm.X_PF)}
-    places |= {name: [row[3] for row in pose[:3]] for name, pose in framed.items()}
-    for name, xyz in places.items():
-        farthest = max(abs(x) for x in xyz)
+    places = {f"arm.com[{k + 1}]": np.array(com) for k, com in enumerate(arm.com)}
+    for name, xyz in (places | {name: X[:3, 3] for name, X in poses.items()}).items():
+        farthest = np.abs(xyz).max()
         if farthest > FARTHEST:
             raise ModelError(f"{name} lies {farthest:g} m away, as no part of an arm does; give m")
     if not arm.name.isprintable():

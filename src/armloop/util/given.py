@@ -56,34 +56,37 @@ def require(kind: str, **given: Any) -> None:
 
 def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one per joint") -> Array:
     """What was given as an array of finite numbers of a shape; raises ``InputError`` where it is none."""
-    import numpy as np  # not for those who only name a path
+    import numpy as np
 
-    try:
-        found = np.asarray(given)
-        fits = found.dtype.kind in "fiu" and found.shape == shape
-    except (TypeError, ValueError):
-        fits = False
-    if not fits or not np.isfinite(found).all():
+    found = _array(given)
+    if found.shape != shape or not np.isfinite(found).all():
         size = " x ".join(map(str, shape))
         raise InputError(f"{what} must be {size} finite numbers, {each}; it is {_shown(given)}")
-    return found.astype(np.float64)
+    return found
 
 
 def levels_of(given: Any, n: int, what: str) -> Array:
     """What was given, one number for all or one per joint, as (n,) finite numbers of at least 0; raises ``InputError``."""
     import numpy as np
 
-    try:
-        found = np.asarray(given)
-        found = found if found.ndim else np.full(n, found)
-        fits = found.dtype.kind in "fiu" and found.shape == (n,)
-    except (TypeError, ValueError):
-        fits = False
-    if not fits or not (np.isfinite(found) & (found >= 0)).all():
+    found = _array(given)
+    found = found if found.ndim else np.full(n, found)
+    if found.shape != (n,) or not (np.isfinite(found) & (found >= 0)).all():
         raise InputError(
             f"{what} must be {n} finite numbers of at least 0, one per joint; it is {_shown(given)}"
         )
-    return found.astype(np.float64)
+    return found
+
+
+def _array(given: Any) -> Array:
+    """What was given as an array; one that is not a number where it is no array of numbers."""
+    import numpy as np  # not for those who only name a path
+
+    try:
+        found = np.asarray(given)
+    except (TypeError, ValueError):
+        return np.array(np.nan)
+    return found.astype(np.float64) if found.dtype.kind in "fiu" else np.array(np.nan)
 
 
 def _shown(value: Any) -> str:

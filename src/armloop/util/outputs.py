@@ -13,6 +13,7 @@ import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path
 
 from armloop.util.errors import InputError
@@ -75,11 +76,7 @@ def stamp() -> str | None:
 
 
 def target(path: str | Path, option: str = "") -> Path:
-    """The file that an output goes to, links followed.
-
-    Raises:
-        InputError: it is a folder or a device, it is read, or this command has not written it.
-    """
+    """The file of an output, links followed; raises ``InputError`` for a folder, a device, an input or a file of others."""
     where, name = str(path_of(path, option or "the path of an output")), option or "the output"
     _check_name(where, name)
     try:
@@ -133,11 +130,8 @@ def record(draft: Path, final: Path) -> None:
 def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--out") -> Path:
     """The output folder for this command alone, checked before any work is done, with the files that will go into it.
 
-    The folder is made, and taken away again if nothing is written. Nothing but a lock of the system holds it: it
-    ends with the command, however that ends.
-
-    Raises:
-        InputError: it cannot be made or written to, another run writes into it, or a file in it is not to be replaced.
+    The folder is made, and taken away again if nothing is written. Nothing but a lock of the system holds it: it ends with
+    the command, however that ends. Raises ``InputError`` where it cannot be had, or a file in it is not to be replaced.
     """
     folder = path_of(path, option)
     _check_name(str(path), option)
@@ -154,11 +148,7 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
 
 
 def take_file(path: str | Path | None, option: str) -> None:
-    """Check the place of an output file before any work is done; None is no output.
-
-    Raises:
-        InputError: as :func:`target`, its folder cannot be written to, or another output goes there.
-    """
+    """Check the place of an output file (None is none) before any work is done; raises as :func:`target`."""
     if path is None:
         return
     real = target(path, option)
@@ -203,11 +193,7 @@ def _check_name(where: str, option: str) -> None:
 
 
 def _lock(folder: Path, option: str, guard: _Guard) -> None:
-    missing = []
-    each = folder
-    while not each.exists():
-        missing.append(each)
-        each = each.parent
+    missing = list(takewhile(lambda each: not each.exists(), (folder, *folder.parents)))
     for each in reversed(missing):
         each.mkdir(exist_ok=True)
         guard.made.append(each)

@@ -9,7 +9,11 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import stat
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +28,7 @@ _DIGITS, _LEVELS, _VALUES = 64, 64, 50_000
 
 
 def read_bytes(path: str | Path, most: int, error: type[InputError], what: str = "a file") -> bytes:
-    """The content of a regular file of at most so many bytes.
-
-    Raises:
-        InputError: of the given class; no such file, no regular file, not readable, or too large.
-    """
+    """The content of a regular file of at most so many bytes; raises the ``InputError`` given for any other."""
     path = path_of(path, f"the path of {what}", error)
     try:
         # Without blocking: a pipe that nobody writes to would be waited for.
@@ -64,31 +64,35 @@ def read_text(path: str | Path, most: int, error: type[InputError], what: str = 
         raise error(f"{path}: cannot be read (byte {fault.start} is no UTF-8); give {what}") from fault
 
 
-def read_json(path: str | Path, error: type[InputError], what: str, most: int = RESULTS) -> Any:
-    """The value in a JSON file.
-
-    Raises:
-        InputError: of the given class; as :func:`read_bytes`, or it is no JSON of the kind described above.
-    """
-    text = read_text(path, most, error, what)
-    try:
-        return json.loads(
-            text,
-            object_pairs_hook=_once,
-            parse_constant=_no_constant,
-            parse_int=_whole,
-            parse_float=_number,
-        )
-    except json.JSONDecodeError as fault:
-        raise error(f"{path}: not JSON (line {fault.lineno}: {fault.msg}); give {what}") from fault
-    except _Doubt as fault:
-        raise error(f"{path}: {fault}") from None
-    except RecursionError as fault:
-        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
+def read_json(path: str | Path, error: type[InputError], what: str) -> Any:
+    """The value in a JSON file of the kind described above; raises the ``InputError`` given for any other."""
+    text = read_text(path, RESULTS, error, what)
+    with _refusing(path, error, what):
+        try:
+            return json.loads(
+                text,
+                object_pairs_hook=_once,
+                parse_constant=_no_constant,
+                parse_int=_whole,
+                parse_float=_number,
+            )
+        except json.JSONDecodeError as fault:
+            raise error(f"{path}: not JSON (line {fault.lineno}: {fault.msg}); give {what}") from fault
 
 
 class _Doubt(Exception):
     """What is wrong with a value."""
+
+
+@contextmanager
+def _refusing(path: str | Path, error: type[InputError], what: str) -> Iterator[None]:
+    """Say of which file a doubt is, and refuse one that nests without end."""
+    try:
+        yield
+    except _Doubt as fault:
+        raise error(f"{path}: {fault}") from None
+    except RecursionError as fault:
+        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -117,37 +121,27 @@ def _number(text: str) -> float:
     return value
 
 
-def read_yaml(path: str | Path, error: type[InputError], what: str, most: int = SETTINGS) -> Any:
-    """The value in a YAML file, by the safe subset: plain data, no tags that make objects.
-
-    Raises:
-        InputError: of the given class; as :func:`read_bytes`, or it is no YAML of the kind described above, or its
-            aliases stand for more than any settings hold.
-    """
+def read_yaml(path: str | Path, error: type[InputError], what: str) -> Any:
+    """The value in a YAML file by the safe subset: no tags that make objects, few aliases; raises as :func:`read_json`."""
     import yaml
 
-    text = read_text(path, most, error, what)
-    loader = None
-    try:
-        loader = _loader()(text)
-        node = loader.get_single_node()
-        if node is None:
-            return None
-        _size(node, {}, 0)
-        return loader.construct_document(node)
-    except yaml.YAMLError as fault:
-        mark = getattr(fault, "problem_mark", None)
-        line = f"line {mark.line + 1}: " if mark else ""
-        raise error(f"{path}: unreadable YAML: {line}{getattr(fault, 'problem', None) or fault}") from fault
-    except _Doubt as fault:
-        raise error(f"{path}: {fault}") from None
-    except RecursionError as fault:
-        raise error(f"{path}: lists within lists, too deep; give {what}") from fault
-    except ValueError as fault:
-        raise error(f"{path}: unreadable YAML: {fault}") from fault
-    finally:
-        if loader is not None:
-            loader.dispose()
+    text = read_text(path, SETTINGS, error, what)
+    with _refusing(path, error, what):
+        try:
+            loader = _loader()(text)
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            _size(node, {}, 0)
+            return loader.construct_document(node)
+        except yaml.YAMLError as fault:
+            mark = getattr(fault, "problem_mark", None)
+            line = f"line {mark.line + 1}: " if mark else ""
+            raise error(
+                f"{path}: unreadable YAML: {line}{getattr(fault, 'problem', None) or fault}"
+            ) from fault
+        except ValueError as fault:
+            raise error(f"{path}: unreadable YAML: {fault}") from fault
 
 
 def _size(node: Any, known: dict[int, int], level: int) -> int:
@@ -166,9 +160,7 @@ def _size(node: Any, known: dict[int, int], level: int) -> int:
                     line = key.start_mark.line + 1
                     raise _Doubt(f"line {line}: a field's name must be text; put it between quotes")
             keys = [key.value for key, _ in node.value]
-            twice = (
-                {key for key in keys if keys.count(key) > 1 and key != "<<"} if len(keys) < 1000 else set()
-            )
+            twice = [key for key, times in Counter(keys).items() if times > 1 and key != "<<"]
             if twice:
                 raise _Doubt(f"field {min(twice)[:60]!r} stands twice in one mapping; leave one out")
             total += sum(_size(each, known, level + 1) for pair in node.value for each in pair)
@@ -203,8 +195,6 @@ def _loader() -> Any:
 
     Loader.add_constructor("tag:yaml.org,2002:int", integer)
     Loader.add_constructor("tag:yaml.org,2002:float", number)
-    import re
-
     # YAML 1.1 wants a point and a sign in the exponent; people write 1e-3.
     Loader.add_implicit_resolver(
         "tag:yaml.org,2002:float", re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), list("-+0123456789.")

@@ -55,20 +55,14 @@ class Registry(Generic[T]):
         raise InputError(f"{where}: the name {thing.name!r} is taken by {taken}; choose another")
 
     def find(self, name: str) -> T | None:
-        """The one of this name, None if there is none.
-
-        Raises:
-            InputError: an installed one of that name cannot be loaded or is none of the kind.
-        """
+        """The one of this name, None if there is none; raises ``InputError`` for an installed one that is no good."""
         found = self.listed.get(name, self.session.get(name))
         return self._load(self.installed[name]) if found is None and name in self.installed else found
 
     def own(self) -> dict[str, T]:
-        """Every one of the user's by its name, installed ones loaded.
+        """Every one of the user's by its name, installed ones loaded; raises ``InputError`` for one that is no good.
 
-        Raises:
-            InputError: an installed one cannot be loaded or is none. It is not passed over: what lacks one without a
-                word would be something else.
+        It is not passed over: what lacks one without a word would be something else.
         """
         return {name: self._load(entry) for name, entry in self.installed.items()} | self.session
 
@@ -84,11 +78,7 @@ class Registry(Generic[T]):
 
     @cached_property
     def installed(self) -> dict[str, EntryPoint]:
-        """Entry points by name.
-
-        Raises:
-            InputError: a name is that of a listed one, or of two packages'.
-        """
+        """Entry points by name; raises ``InputError`` for a name that is a listed one's, or two packages'."""
         found: dict[str, EntryPoint] = {}
         for entry in entry_points(group=self.group):
             if entry.name in self.listed:

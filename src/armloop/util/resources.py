@@ -14,18 +14,12 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def urdf_path(name: str) -> Path:
-    """Return the URDF file of the built-in arm `name` (`three_axis`, `scara`).
-
-    Raises `ArmError` when there is no such arm; the message lists those there are.
-    """
+    """The URDF file of a built-in arm (`three_axis`, `scara`); raises `ArmError`, which lists them, for another name."""
     return _find("urdf", ".urdf", name, "arm", ArmError)
 
 
 def measured_folder(name: str) -> Path:
-    """Return the folder of measured logs that come with armloop (`ur5`), with licence and source.
-
-    Raises `InputError` when there is none of that name.
-    """
+    """The folder of measured logs that come with armloop (`ur5`), with licence and source; raises `InputError`."""
     folder = _folder("scenarios") / "measured" / name
     if folder.is_dir():
         return folder
@@ -33,20 +27,12 @@ def measured_folder(name: str) -> Path:
 
 
 def scenario_path(name: str) -> Path:
-    """Return the YAML file of the built-in scenario `name` (such as `three_axis_tracking`).
-
-    Raises `ScenarioError` when there is no such scenario; the message lists those there are.
-    """
+    """The YAML file of a built-in scenario; raises `ScenarioError`, which lists them, for another name."""
     return _find("scenarios", ".yaml", name, "scenario", ScenarioError)
 
 
 def find_scenario(spec: str | Path) -> tuple[Path, str | None]:
-    """Return the file of a scenario, and its name in the file where FILE:NAME says one.
-
-    spec : a built-in name, FILE, or either with a colon and a name behind it
-
-    Raises `ScenarioError` when there is no such file.
-    """
+    """The file of a scenario (a built-in name, FILE) and its name in it (FILE:NAME); raises `ScenarioError`."""
     spec = str(path_of(spec, "the scenario", ScenarioError))
     file, colon, name = spec.rpartition(":")
     if not colon or Path(spec).is_file():
@@ -59,17 +45,17 @@ def find_scenario(spec: str | Path) -> tuple[Path, str | None]:
 
 
 def urdf_names() -> list[str]:
-    """Return the names of the built-in arms, sorted."""
+    """The names of the built-in arms, sorted."""
     return _names("urdf", ".urdf")
 
 
 def scenario_names() -> list[str]:
-    """Return the names of the built-in scenarios, sorted."""
+    """The names of the built-in scenarios, sorted."""
     return _names("scenarios", ".yaml")
 
 
 def _folder(kind: str) -> Path:
-    """Return the folder `kind`: inside the package (wheel), else beside `src` (checkout)."""
+    """The folder `kind`: inside the package (wheel), else beside `src` (checkout)."""
     packed = _PACKAGE / kind
     return packed if packed.is_dir() else _PACKAGE.parents[1] / kind
 

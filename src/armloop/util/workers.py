@@ -13,13 +13,14 @@ import os
 import re
 import signal
 import socket
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import wraps
 from multiprocessing import get_context
 from threading import Thread
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from armloop.util.errors import InputError
 from armloop.util.quiet import quiet
@@ -41,27 +42,23 @@ _TEAM, _LOOK = 4, 0.5
 _forked = False
 
 
-class Workers(Protocol):
+class Workers(ABC):
     """Who applies a function to chunks."""
 
+    @abstractmethod
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         """Yield the answers in the order of the chunks; exceptions of the function come through."""
-        ...
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027
         """Let go of what was opened."""
-        ...
 
 
-class Serial:
+class Serial(Workers):
     """In this process."""
 
     def map(self, function: Callable[[Chunk], Answer], chunks: Sequence[Chunk]) -> Iterator[Answer]:
         # With one BLAS thread, as in every other worker: how many there are decides the order of a product's sums.
         return (_apply(function, chunk) for chunk in chunks)
-
-    def close(self) -> None:
-        pass
 
 
 class Pool(ProcessPoolExecutor):
@@ -105,7 +102,7 @@ def _begin(parent: int, prepare: Callable[..., None] | None, arguments: tuple[An
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     _die_with(parent)
-    _one_thread()
+    _threads()
     if prepare is not None:
         prepare(*arguments)
 
@@ -168,12 +165,8 @@ class Team:
         return [given[k % self.jobs][k // self.jobs] for k in range(count)]
 
 
-class Processes:
-    """In forked processes, one BLAS thread each; they inherit function and chunks, only answers are copied.
-
-    Args:
-        jobs: how many; all cores by default.
-    """
+class Processes(Workers):
+    """In forked processes, all cores by default, one BLAS thread each; function and chunks are inherited, answers copied."""
 
     def __init__(self, jobs: int | None = None) -> None:
         self.jobs = jobs or len(os.sched_getaffinity(0))
@@ -183,22 +176,14 @@ class Processes:
         if jobs <= 1:
             yield from Serial().map(function, chunks)
             return
-        with _inherited(function, chunks) as key:
-            with Pool(jobs) as pool:
-                yield from pool.map(_call, [key] * len(chunks), range(len(chunks)))
-
-    def close(self) -> None:
-        pass
+        with Pool(jobs, _hold, (function, chunks)) as pool:
+            yield from pool.map(_call, range(len(chunks)))
 
 
-class Cluster:
-    """On the workers of a Dask scheduler, which must have this package and see the same files.
+class Cluster(Workers):
+    """On the workers of a Dask scheduler (``tcp://10.0.0.7:8786``), which must have this package and see the same files.
 
-    Args:
-        address: of the scheduler, such as ``tcp://10.0.0.7:8786``.
-
-    Raises:
-        InputError: Dask is not installed, or nothing answers at the address.
+    Raises ``InputError`` where Dask is not installed, or nothing answers at the address.
     """
 
     def __init__(self, address: str) -> None:
@@ -270,18 +255,18 @@ def _apply(function: Callable[[Chunk], Answer], chunk: Chunk) -> Answer:
         return function(chunk)
 
 
-#: What forked processes inherit: functions and chunks that need not be picklable, nor copied.
-_INHERITED: dict[int, tuple[Callable[[Any], Any], Sequence[Any]]] = {}
+#: What a forked process inherits: a function and chunks that need not be picklable, nor copied.
+_held: tuple[Callable[[Any], Any], Sequence[Any]]
 
 
-@contextmanager
-def _inherited(function: Callable[[Any], Any], chunks: Sequence[Any]) -> Iterator[int]:
-    key = max(_INHERITED, default=0) + 1
-    _INHERITED[key] = (function, chunks)
-    try:
-        yield key
-    finally:
-        del _INHERITED[key]
+def _hold(function: Callable[[Any], Any], chunks: Sequence[Any]) -> None:
+    global _held
+    _held = function, chunks
+
+
+def _call(index: int) -> Any:
+    function, chunks = _held
+    return function(chunks[index])
 
 
 #: Of a process in a team: its number, what it holds, how many are done, and where all wait for each other.
@@ -307,11 +292,6 @@ def _share(function: Callable[[Any, Any, int], Any], task: Any, count: int, of: 
     return number, answers
 
 
-def _call(key: int, index: int) -> Any:
-    function, chunks = _INHERITED[key]
-    return function(chunks[index])
-
-
 def one_thread(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """The function with one BLAS thread: several wait for each other longer than they compute where matrices are small."""
 
@@ -327,7 +307,3 @@ def _threads() -> Any:
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(1)
-
-
-def _one_thread() -> None:
-    _threads()
