@@ -69,49 +69,37 @@ def Feedforward_(T: type) -> Any:
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments, self._n, self._stacked = (model, step), n, stacked
+            self._n, self._step = n, step
             if T is float:
-                self._drive = (_stacked_drive if stacked else _drive)(model, step)
+                self._drive = _drive(model, step)
             else:
                 assert isinstance(model, ReconstructedModel)
                 self._equations = ModelEquations(model, functions_of(T), step=step)
             names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
             self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
-            calc = self._calc_symbolic_tau_ff
-            if T is float:
-                calc = self._calc_stacked_tau_ff if stacked else self._calc_tau_ff
             # Named, or Drake would find out by writing all the formulas out.
-            self.DeclareVectorOutputPort("tau_ff", n, calc, {self.all_input_ports_ticket()})
+            self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, {self.all_input_ports_ticket()})
 
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
             require_predicts(model)
             require_joints(model, self._n, "this feedforward is for")
-            self._arguments = model, *self._arguments[1:]
-            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[1])
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, n=other._n, stacked=other._stacked, converter=converter)
+            self._given["model"] = model
+            self._drive = _drive(model, self._step)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
-            q, v, vdot = self._inputs
-            self._give(context, output, self._drive(q.Eval(context), v.Eval(context), vdot.Eval(context)))
-
-        def _calc_stacked_tau_ff(self, context: Any, output: Any) -> None:
-            self._give(context, output, self._drive(self._inputs[0].Eval(context)))
-
-        def _give(self, context: Any, output: Any, tau: Sequence[float]) -> None:
+            x = np.concatenate([port.Eval(context) for port in self._inputs])
+            if T is not float:
+                q, v, vdot = (part.tolist() for part in np.split(x, 3))
+                output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
+                return
+            tau = self._drive(x)
             # A NaN or an infinity shows in the sum; several times faster than numpy's test.
             if not isfinite(sum(tau)):
                 raise RuntimeError(
                     f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}"
                 )
             output.SetFromVector(tau)
-
-        def _calc_symbolic_tau_ff(self, context: Any, output: Any) -> None:
-            x = [y for port in self._inputs for y in port.Eval(context).tolist()]
-            q, v, vdot = (x[k * self._n : (k + 1) * self._n] for k in range(3))
-            output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
 
     return Impl
 
@@ -132,19 +120,8 @@ def _joints(model: FeedforwardModel, n: int | None) -> int:
     return int(known)
 
 
-def _drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
-    if isinstance(model, ReconstructedModel):
-        drive = model.drive(step)
-        return lambda q, v, vdot: drive(q, v, vdot).tolist()
-    return lambda q, v, vdot: np.asarray(model.feedforward(q, v, vdot, step)).tolist()
-
-
-def _stacked_drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
+def _drive(model: FeedforwardModel, step: int) -> Callable[[Array], Sequence[float]]:
+    """A model's torque at q, v and vdot behind each other, (3n,)."""
     if isinstance(model, ReconstructedModel):
         return model.stacked_drive(step)
-
-    def drive(x: Array) -> Sequence[float]:
-        n = len(x) // 3
-        return np.asarray(model.feedforward(x[:n], x[n : 2 * n], x[2 * n :], step)).tolist()
-
-    return drive
+    return lambda x: np.asarray(model.feedforward(*np.split(x, 3), step)).tolist()

@@ -46,16 +46,12 @@ def RateLimiter_(T: type) -> Any:
             if not (np.all(limits > 0) and np.all(rates > 0)):
                 raise InputError("effort and rate must be above 0")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = effort, rate, period
             self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))
             self._u = self.DeclareVectorInputPort("u", limits.size)
             self.DeclareDiscreteState(limits.size)
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
             sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
             self.DeclareVectorOutputPort("tau", limits.size, self._calc_tau, sources)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
 
         def set_torque(self, context: Any, tau: Any) -> None:
             """Let the drive have had the torques tau (n,) before, in this system's own context."""

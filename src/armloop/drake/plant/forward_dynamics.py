@@ -64,17 +64,13 @@ def ForwardDynamics_(T: type) -> Any:
             if check:
                 require_mass_matrix(model)
             LeafSystem_[T].__init__(self, converter=converter)
-            self._model = model
-            self._options = {"smoothing": smoothing, "symmetric": symmetric}
+            # What is converted has been checked: M does not change with the scalar type.
+            self._given["check"] = False
             self._equations = equations
             n = self._n = equations.n
             self._tau = self.DeclareVectorInputPort("tau", n)
             self.DeclareContinuousState(n, n, 0)
             self.DeclareVectorOutputPort("state", 2 * n, self._calc_state, {self.all_state_ticket()})
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            # What is converted has been checked: M does not change with the scalar type.
-            Impl._construct(self, other._model, **other._options, check=False, converter=converter)
 
         def _calc_state(self, context: Any, output: Any) -> None:
             output.SetFromVector(context.get_continuous_state_vector().CopyToVector())

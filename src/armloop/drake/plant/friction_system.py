@@ -48,20 +48,15 @@ def JointFrictionSystem_(T: type) -> Any:
             require("a number above 0", smoothing=smoothing)
             friction = _each_of(friction, JointFriction, "friction")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = friction, smoothing
-            self._n = len(self._arguments[0])
+            self._friction, self._smoothing, self._n = friction, smoothing, len(friction)
             self._state = self.DeclareVectorInputPort("state", 2 * self._n)
             self.DeclareVectorOutputPort("force", self._n, self._calc_force, {self.all_input_ports_ticket()})
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
-
         def _calc_force(self, context: Any, output: Any) -> None:
-            friction, smoothing = self._arguments
             functions = functions_of(T)
             force = [
-                -(f.level(v, functions) * functions.tanh(v / smoothing) + f.viscous * v)
-                for f, v in zip(friction, self._state.Eval(context).tolist()[self._n :], strict=True)
+                -(f.level(v, functions) * functions.tanh(v / self._smoothing) + f.viscous * v)
+                for f, v in zip(self._friction, self._state.Eval(context).tolist()[self._n :], strict=True)
             ]
             output.SetFromVector(vector(T, force))
 
@@ -114,24 +109,21 @@ def PreslidingFriction_(T: type) -> Any:
                 if not 1 <= e.joint <= n or e.level < 0:
                     raise InputError(f"{e}: joint must be from 1 to {n}, level at least 0 and width above 0")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = n, elements, period
+            self._n, self._elements = n, elements
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self.DeclareDiscreteState(n + len(elements))
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
             sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
             self.DeclareVectorOutputPort("force", n, self._calc_force, sources)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
-
         def set_relaxed(self, context: Any, q: Any) -> None:
             """Relax all elements at the positions q (n,), in this system's own context."""
-            memory = [*q, *(0.0 for _ in self._arguments[1])]
+            memory = [*q, *(0.0 for _ in self._elements)]
             context.SetDiscreteState(vector(T, memory))
 
         def _stretched(self, context: Any) -> tuple[list[Any], list[Any]]:
             """Return the positions now, and z of each element."""
-            n, elements, _ = self._arguments
+            n, elements = self._n, self._elements
             q = self._state.Eval(context).tolist()[:n]
             memory = context.get_discrete_state_vector().CopyToVector().tolist()
             z = [
@@ -145,9 +137,8 @@ def PreslidingFriction_(T: type) -> Any:
             discrete.set_value(vector(T, [*q, *z]))
 
         def _calc_force(self, context: Any, output: Any) -> None:
-            n, elements, _ = self._arguments
-            force: list[Any] = [0.0] * n
-            for e, z in zip(elements, self._stretched(context)[1], strict=True):
+            force: list[Any] = [0.0] * self._n
+            for e, z in zip(self._elements, self._stretched(context)[1], strict=True):
                 force[e.joint - 1] = force[e.joint - 1] - e.level / e.width * z
             output.SetFromVector(vector(T, force))
 

@@ -81,8 +81,6 @@ def JointLoads_(T: type) -> Any:
             LeafSystem_[T].__init__(self, converter=converter)
             n = len(friction)
             self._n = n
-            self._arguments = plant, friction
-            self._options = {"effects": effects, "servo": servo, "X_tool": X_tool, "law": law}
             # a clone predicts with the same plant, a conversion with one of its own scalar type
             plant = plant if isinstance(plant, MultibodyPlant_[T]) else plant.ToScalarType[T]()
             self._plant = plant
@@ -124,10 +122,6 @@ def JointLoads_(T: type) -> Any:
                 # Not a number until the first step: an element is relaxed where the motion starts.
                 self.DeclareDiscreteState(np.full(2 * len(self._memories), np.nan))
                 self.DeclarePeriodicDiscreteUpdateEvent(self._step, 0.0, self._stretch_on)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            plant, friction = other._arguments
-            Impl._construct(self, plant, friction, **other._options, converter=converter)
 
         def relax(self, context: Any) -> None:
             """Let elasto-plastic elements forget what they went through."""
