@@ -124,4 +124,9 @@ def _drive(model: FeedforwardModel, step: int) -> Callable[[Array], Sequence[flo
     """A model's torque at q, v and vdot behind each other, (3n,)."""
     if isinstance(model, ReconstructedModel):
         return model.stacked_drive(step)
-    return lambda x: np.asarray(model.feedforward(*np.split(x, 3), step)).tolist()
+
+    def drive(x: Array) -> Sequence[float]:
+        q, v, vdot = np.split(x, 3)
+        return np.asarray(model.feedforward(q, v, vdot, step)).tolist()
+
+    return drive

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-from armloop.util.workers import Pool
+from armloop.util.workers import Processes
 
 _RUNAWAY = 1e3
 """A joint faster than this has run away, rad/s (m/s): no log with such a speed would be read."""
@@ -80,29 +79,8 @@ def run_tracking(
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
     names = controllers_for(scenario, models)
-    if processes <= 1 or len(names) == 1:
-        return {name: track(scenario, name, models, effects) for name in names}
-    # Arguments of the initializer are inherited by the fork: nothing needs to be picklable on the way in.
-    with Pool(min(processes, len(names)), _inherit, (scenario, models, effects)) as pool:
-        return dict(zip(names, pool.map(_track_inherited, names), strict=True))
-
-
-_inherited: tuple[TrackingScenario, Mapping[str, FeedforwardModel], Sequence[UndeclaredEffect]]
-
-
-def _inherit(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect],
-) -> None:
-    global _inherited
-    gc.freeze()  # what was inherited will not become garbage: do not walk it during the simulation
-    _inherited = (scenario, models, effects)
-
-
-def _track_inherited(controller: str) -> TrackingResult:
-    scenario, models, effects = _inherited
-    return track(scenario, controller, models, effects)
+    results = Processes(processes).map(lambda name: track(scenario, name, models, effects), names)
+    return dict(zip(names, results, strict=True))
 
 
 def track(
@@ -117,12 +95,7 @@ def track(
     for the controller, `InputError` when the loop diverges.
     """
     run = RecordedArm(scenario, controller, models, effects)
-    simulator = Simulator(run.diagram)
-    run.systems.start_on_reference(simulator.get_mutable_context())
-    with refusing_divergence({controller: run}, simulator.get_context()):
-        simulator.Initialize()
-        simulator.AdvanceTo(scenario.reference.duration)
-    return run.result(simulator.get_context())
+    return _simulated({controller: run}, Simulator(run.diagram), scenario.reference.duration)[controller]
 
 
 def track_in_view(
@@ -137,13 +110,20 @@ def track_in_view(
         builder.AddNamedSystem(name, run.diagram)
     view.add_to(builder, {name: run.diagram for name, run in runs.items()})
     simulator = Simulator(builder.Build())
-    for run in runs.values():
-        run.systems.start_on_reference(simulator.get_mutable_context())
     view.pace(simulator)
-    with refusing_divergence(runs, simulator.get_context()):
+    return _simulated(runs, simulator, scenario.reference.duration)
+
+
+def _simulated(
+    runs: Mapping[str, RecordedArm], simulator: Simulator, duration: float
+) -> dict[str, TrackingResult]:
+    context = simulator.get_mutable_context()
+    for run in runs.values():
+        run.systems.start_on_reference(context)
+    with refusing_divergence(runs, context):
         simulator.Initialize()
-        simulator.AdvanceTo(scenario.reference.duration)
-    return {name: run.result(simulator.get_context()) for name, run in runs.items()}
+        simulator.AdvanceTo(duration)
+    return {name: run.result(context) for name, run in runs.items()}
 
 
 class RecordedArm:

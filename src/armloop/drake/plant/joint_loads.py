@@ -91,23 +91,10 @@ def JointLoads_(T: type) -> Any:
             self._damping = [self._step * drive.joint().default_damping() for drive in drives]
             # Python's own floats throughout: numpy's scalars take three times as long.
             self._rubbing = _rubbing(friction, effects.laws)
-            self._explicit_laws = [
-                Placed(along, soft)
-                for along, terms in effects.laws
-                if (soft := tuple(t for t in terms if t.element.part == "position"))
-            ]
-            self._memories = [
-                (along, term)
-                for along, terms in effects.laws
-                for term in terms
-                if term.element.way == "memory"
-            ]
-            self._rotors = [
-                (along, t.coefficient)
-                for along, terms in effects.laws
-                for t in terms
-                if t.element.part == "inertia"
-            ]
+            acting = [(along, term) for along, terms in effects.laws for term in terms]
+            self._soft = [(along, term) for along, term in acting if term.element.part == "position"]
+            self._memories = [(along, term) for along, term in acting if term.element.way == "memory"]
+            self._rotors = [(along, t.coefficient) for along, t in acting if t.element.part == "inertia"]
             self._contacts = effects.contacts
             self._tool = np.asarray(X_tool)[:3, 3]
             self._laws = [*effects.own, *([] if law is None else [law])]
@@ -149,9 +136,9 @@ def JointLoads_(T: type) -> Any:
         def _explicit(self, context: Any, q: list[float], v: list[float]) -> list[float]:
             """What the effects do that is soft enough to be taken at the step's start."""
             load, functions = [0.0] * self._n, functions_of(T)
-            for along, terms in self._explicit_laws:
+            for along, term in self._soft:
                 x = Sliding(along.of(q), 0.0, 0.0)
-                along.add(load, -torque_along(terms, x, 0.0, functions))
+                along.add(load, -torque_along([term], x, 0.0, functions))
             if self._memories:
                 for (along, term), z in zip(self._memories, self._stretches(context, q), strict=True):
                     x = Sliding(along.of(q), along.of(v), z / term.parameter, context.get_time())
@@ -160,19 +147,13 @@ def JointLoads_(T: type) -> Any:
                 load = [x - y for x, y in zip(load, law(q, v), strict=True)]
             for start, end, force in self._contacts:
                 if start <= context.get_time() < end:
-                    push = self._jacobian().T @ force
-                    load = [x + y for x, y in zip(load, push.tolist(), strict=True)]
+                    plant, world = self._plant, self._plant.world_frame()
+                    last = plant.GetFrameByName(f"link_{self._n}")
+                    J = plant.CalcJacobianTranslationalVelocity(
+                        self._scratch, JacobianWrtVariable.kV, last, self._tool, world, world
+                    )
+                    load = [x + y for x, y in zip(load, (J.T @ force).tolist(), strict=True)]
             return load
-
-        def _jacobian(self) -> Array:
-            """(3, n) of the tool's origin in the base frame, at the scratch context's posture."""
-            plant, world = self._plant, self._plant.world_frame()
-            last = plant.GetFrameByName(f"link_{self._n}")
-            return np.asarray(
-                plant.CalcJacobianTranslationalVelocity(
-                    self._scratch, JacobianWrtVariable.kV, last, self._tool, world, world
-                )
-            )
 
         def predict_with(self, inertia: Any, damping: Sequence[float]) -> None:
             """Let the last link have another spatial inertia, and the joints another damping (n,); float only."""

@@ -18,7 +18,6 @@ from pydrake.multibody.tree import (
     FixedOffsetFrame,
     PrismaticJoint,
     RevoluteJoint,
-    RotationalInertia,
     SpatialInertia,
     UnitInertia,
 )
@@ -116,17 +115,10 @@ class ArmPlant(Diagram):
 
     def _connect(self, builder: DiagramBuilder) -> None:
         plant, effects = self.plant, self.effects
-        loads = self._loads = builder.AddNamedSystem(
-            "loads",
-            JointLoads(
-                plant,
-                self.friction,
-                servo=self._servo,
-                effects=effects,
-                X_tool=self.arm.X_tool,
-                law=self._law,
-            ),
+        loads = JointLoads(
+            plant, self.friction, effects=effects, servo=self._servo, X_tool=self.arm.X_tool, law=self._law
         )
+        self._loads = builder.AddNamedSystem("loads", loads)
         builder.Connect(plant.get_state_output_port(), loads.GetInputPort("state"))
         builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
         if self._servo is None:
@@ -224,12 +216,8 @@ def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:
     """Return a link's spatial inertia; `inertia` is about the link frame's origin."""
     if mass <= 0:
         return SpatialInertia.Zero()
-    rotational = RotationalInertia(
-        inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
-    )
-    unit = UnitInertia()
-    unit.SetFromRotationalInertia(rotational, mass)
-    return SpatialInertia(mass, com, unit)
+    G = inertia / mass
+    return SpatialInertia(mass, com, UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2]))
 
 
 def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
@@ -237,9 +225,6 @@ def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
     if mass <= 0:
         return SpatialInertia.Zero()
     if own is None:
-        return SpatialInertia.SolidSphereWithDensity(PAYLOAD_DENSITY, _radius(mass)).Shift(-com)
+        radius = np.cbrt(3.0 * mass / (4.0 * np.pi * PAYLOAD_DENSITY))
+        return SpatialInertia.SolidSphereWithMass(mass, radius).Shift(-com)
     return SpatialInertia(mass, np.zeros(3), UnitInertia(*[own / mass] * 3)).Shift(-com)
-
-
-def _radius(mass: float) -> float:
-    return float((3.0 * mass / (4.0 * np.pi * PAYLOAD_DENSITY)) ** (1.0 / 3.0))
