@@ -25,7 +25,7 @@ from armloop.reports.plots.style import (
     thin,
     with_gaps,
 )
-from armloop.reports.residuals import held_out_residuals, joint_load, moving_joints, time_axis
+from armloop.reports.residuals import held_out_residuals, joint_load, longest_run, moving_joints, time_axis
 from armloop.reports.words import unit
 from armloop.util.arrays import Array
 
@@ -150,7 +150,7 @@ def _cloud(axes: Axes, x: Array, y: Array, color: str, label: str) -> None:
 def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: Series, j: int) -> None:
     """Amplitude density of the longest run; the samples at standstill count as zero."""
     samples, scale = diagnosis.samples, float(diagnosis.evidence.scale[j])
-    run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
+    run = longest_run(samples.motion)
     inside = (rows >= run.start) & (rows < run.stop)
     period = samples.period * float(np.median(np.diff(rows[inside]))) if inside.sum() > 1 else samples.period
     length = min(int(inside.sum()), max(64, round(_SPECTRUM_SECONDS / period)))

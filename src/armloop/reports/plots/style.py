@@ -165,20 +165,17 @@ def _add_room(made: Figure, rows: int) -> None:
     made.set_size_inches(width, higher)
 
 
-def legend(target: Axes | Figure, columns: int = 4) -> None:
-    """Add a frameless legend, each label once; on a figure it stands above the axes, which keep their size."""
+def legend(target: Figure, columns: int = 4) -> None:
+    """Add a frameless legend, each label once, above a figure's axes, which keep their size."""
     handles: dict[str, Artist] = {}
-    for axes in target.axes if isinstance(target, Figure) else [target]:
+    for axes in target.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     artists, labels = list(handles.values()), list(handles)
-    if isinstance(target, Figure):
-        columns = _fitting(labels, columns, float(target.get_size_inches()[0]))
-        made = legend_row(target, artists, labels, columns)
-        if len(labels) > columns:
-            _add_room(target, -(-len(labels) // columns) - 1)
-    else:
-        made = target.legend(artists, labels, loc="best", ncols=columns, **_LEGEND)
+    columns = _fitting(labels, columns, float(target.get_size_inches()[0]))
+    made = legend_row(target, artists, labels, columns)
+    if len(labels) > columns:
+        _add_room(target, -(-len(labels) // columns) - 1)
     for shown in made.legend_handles:
         if isinstance(shown, Line2D):
             shown.set_linewidth(2.4)
@@ -186,8 +183,6 @@ def legend(target: Axes | Figure, columns: int = 4) -> None:
             shown.set_sizes([24.0])
         if shown is not None:
             shown.set_alpha(0.9)
-    for text in made.get_texts():
-        text.set_color(INK)
 
 
 def legend_above(made: Figure, width: float) -> float:
@@ -247,7 +242,7 @@ def percent_tick(x: float, _: object) -> str:
 def log_percent(low: float, high: float) -> FuncFormatter:
     """Minor labels of a logarithmic axis in percent, the fewer the larger its span: all, 2 and 5, none."""
     labelled = tuple(range(2, 10)) if high < 3 * low else (2, 5) if high < 30 * low else ()
-    return FuncFormatter(partial(_leading_percent, labelled))
+    return FuncFormatter(partial(_leading_percent, labelled))  # pickled with its figure
 
 
 def _leading_percent(labelled: tuple[int, ...], x: float, _: object) -> str:

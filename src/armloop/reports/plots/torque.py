@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
 from armloop.reports.plots.style import GRID, INK, MUTED, STEPS, figure, legend, panels, polish, thin
+from armloop.reports.residuals import longest_run
 from armloop.reports.words import unit
-
-_ROMAN = {1: "I", 2: "II", 3: "III"}
 
 
 def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 20.0) -> Figure:
     """Two panels per joint over the first ``seconds`` of the longest run: measured, Step I, II and III; the residual."""
-    run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
-    time = samples.motion.time[run] - samples.motion.time[run.start]
-    shown = slice(run.start, run.start + int(np.searchsorted(time, seconds)))
-    time = time[: shown.stop - shown.start]
+    shown = longest_run(samples.motion, seconds)
+    time = samples.motion.time[shown] - samples.motion.time[shown.start]
     predicted = {step: smooth(samples, model.predict(samples.motion, step)) for step in STEPS}
     n = model.arm.n
     made = figure(10, 2.6 * n + 0.7)
@@ -39,7 +35,7 @@ def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 
                 color=color,
                 linewidth=1.4 if step == 3 else 1.1,
                 alpha=1.0 if step == 3 else 0.85,
-                label=f"predicted after Step {_ROMAN[step]}",
+                label=f"predicted after Step {'I' * step}",
                 zorder=1 + step,
             )
         axes.margins(x=0.01)

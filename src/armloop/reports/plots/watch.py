@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -79,6 +78,11 @@ def _inches(made: Figure, *box: float) -> tuple[float, float, float, float]:
     return left / width, bottom / height, across / width, high / height
 
 
+def _instant(seconds: Any) -> Any:
+    """Instants on an axis of dates, UTC, of s since 1970."""
+    return (1e6 * np.asarray(seconds)).astype("datetime64[us]")
+
+
 def trend_figure(
     when: Array,
     shown: Sequence[tuple[str, Array, Array]],
@@ -94,7 +98,7 @@ def trend_figure(
     """
     made = figure(10.0, 0.9 + 2.7 * len(shown))
     axes = panels(made, 2 * len(shown), 1, left=1.0, sharex=True, height_ratios=[2, 1] * len(shown))[:, 0]
-    days = [datetime.fromtimestamp(t, UTC) for t in when]
+    days = _instant(when)
     first = min((alarm["since"] for alarm in alarms), default=np.inf)
     healthy = when < first
     for k, (name, values, evidence) in enumerate(shown):
@@ -110,21 +114,14 @@ def trend_figure(
         under.axhline(limit, color=ORANGE, lw=1.2, label="threshold")
         for alarm in alarms:
             for panel in (top, under):
-                panel.axvline(
-                    datetime.fromtimestamp(alarm["since"], UTC),
-                    color=GREEN,
-                    lw=1.2,
-                    ls="--",
-                    label="change began",
-                )
-                panel.axvline(datetime.fromtimestamp(alarm["when"], UTC), color=ORANGE, lw=1.4, label="alarm")
+                panel.axvline(_instant(alarm["since"]), color=GREEN, lw=1.2, ls="--", label="change began")
+                panel.axvline(_instant(alarm["when"]), color=ORANGE, lw=1.4, label="alarm")
         polish(top, "", "score", name)
         polish(under, "", "log evidence", "")
         under.set_ylim(0, 1.25 * limit)
     if when.max() - when.min() < _LEAST_SPAN:  # logs of one moment would have an axis of years
         middle = 0.5 * (when.max() + when.min())
-        ends = [datetime.fromtimestamp(middle + side * _LEAST_SPAN, UTC) for side in (-0.5, 0.5)]
-        axes[-1].set_xlim(*ends)
+        axes[-1].set_xlim(_instant(middle + _LEAST_SPAN * np.array([-0.5, 0.5])))
     locator = AutoDateLocator()
     axes[-1].xaxis.set_major_locator(locator)
     axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
