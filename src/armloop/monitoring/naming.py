@@ -111,7 +111,7 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
             # what explains it best cannot be, and nothing explains it as well: it has no name
             break
         # of those that explain as much, the fewest parameters, and a law of the motion alone before one of the load
-        pick = min(equals, key=lambda place: (*_simplicity(columns, places[place]), -gain[place]))
+        pick = min(equals, key=lambda p: (len(places[p]), columns[places[p][0]].effect.needs_model, -gain[p]))
         chosen.append(pick)
         alike.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
         gains.append(gain[pick])
@@ -184,10 +184,6 @@ def _derivative(columns: Sequence[Column], full: Normal, chosen: Sequence[Place]
     return e.embed(x[list(chosen).index(place)])[1]
 
 
-def _simplicity(columns: Sequence[Column], index: NDArray[np.intp]) -> tuple[int, bool]:
-    return len(index), columns[index[0]].effect.needs_model
-
-
 def _shows(rest: Normal, index: NDArray[np.intp]) -> bool:
     """Whether columns are more than rounding errors (what an encoder of a vertical axis would do to the weight)."""
     size = np.einsum("upp->p", rest.gram)
@@ -209,9 +205,8 @@ def _as_good(best: Array, other: Array) -> bool:
     """Whether another explanation is not worse by more than a standard error over the units, or a fiftieth."""
     less = best - other
     error = np.sqrt(len(less)) * float(np.std(less, ddof=1)) if len(less) > 1 else 0.0
-    return float(less.sum()) <= min(error, 0.1 * abs(float(best.sum()))) or float(
-        less.sum()
-    ) <= _WORTH * float(best.sum())
+    whole = float(best.sum())
+    return float(less.sum()) <= max(min(error, 0.1 * abs(whole)), _WORTH * whole)
 
 
 def _solved(

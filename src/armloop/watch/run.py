@@ -102,7 +102,7 @@ def watch(
     known = find_models(models)
     with contextlib.ExitStack() as held:
         # what is wrong with them is said before a store is made
-        workers = held.enter_context(_workers(options))
+        workers = held.enter_context(contextlib.closing(_workers(options)))
         folder = Store(store)
         held.enter_context(_leaving_nothing(folder))
         held.enter_context(folder.locked(options.scheduler is not None))
@@ -140,16 +140,7 @@ def _leaving_nothing(store: Store) -> Iterator[None]:
         raise
 
 
-@contextlib.contextmanager
-def _workers(options: Options) -> Iterator[Workers]:
-    workers: Workers
+def _workers(options: Options) -> Workers:
     if options.scheduler is not None:
-        workers = Cluster(options.scheduler)
-    elif options.jobs != 1:
-        workers = Processes(options.jobs)
-    else:
-        workers = Serial()
-    try:
-        yield workers
-    finally:
-        workers.close()
+        return Cluster(options.scheduler)
+    return Serial() if options.jobs == 1 else Processes(options.jobs)

@@ -260,10 +260,7 @@ def _judge(
             earlier = store.alarm(task.arm, names[-2]) if len(names) > 1 else None
             judged |= _as_named(tested, named, earlier)
             last = replace(last, stream=_main_column(tested, named, alarm, last.evidence))
-    span = slice(tested.at(first), tested.at(until) + 1)
-    units = tested.history.units
-    how = course(units.when[span], tested.adjusted.values[span, last.stream], units.programme[span])
-    judged["course"] = {**how.to_dict(), "of": _label(tested.listed[last.stream])}
+    judged["course"] = _course(tested, first, until, last.stream)
     if judged != known:
         store.add_alarm(task.arm, last.name, judged)
     return last
@@ -323,8 +320,6 @@ def _explain(
     logs = sorted({int(units.log[u]) for u in window})
     at, since = tested.at(alarm.unit), tested.at(alarm.since)
     delay = float(units.seconds[since : at + 1].sum()) / 3600.0
-    span = slice(tested.at(max(alarm.from_unit, alarm.since - HORIZON)), at + 1)
-    how = course(units.when[span], tested.adjusted.values[span, column], units.programme[span])
     answer: dict[str, Any] = {
         "id": name,
         "arm": task.arm,
@@ -343,7 +338,7 @@ def _explain(
             "direction": "rose" if alarm.direction > 0 else "fell",
         },
         **_as_named(tested, named, earlier),
-        "course": {**how.to_dict(), "of": _label(tested.listed[column])},
+        "course": _course(tested, max(alarm.from_unit, alarm.since - HORIZON), alarm.unit, column),
         "notes": list(tested.notes),
     }
     if task.full and new:
@@ -363,10 +358,14 @@ def _equations(tested: Tested, index: Sequence[int], healthy: int) -> Normal:
     )
 
 
-def _label(stream: Stream) -> str:
+def _course(tested: Tested, first: int, last: int, column: int) -> dict[str, Any]:
+    """How a stream went from one unit to another: step or drift."""
+    span, units = slice(tested.at(first), tested.at(last) + 1), tested.history.units
+    how = course(units.when[span], tested.adjusted.values[span, column], units.programme[span])
+    stream = tested.listed[column]
     places = [str(j) for j in (stream.joint, stream.other_joint) if j is not None]
     name = stream.name.replace("_", " ")
-    return f"{name} at joint {' and '.join(places)}" if places else name
+    return {**how.to_dict(), "of": f"{name} at joint {' and '.join(places)}" if places else name}
 
 
 def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm, evidence: Sequence[float]) -> int:

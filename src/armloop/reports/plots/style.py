@@ -40,7 +40,6 @@ DASHES, HATCHES = ("-", (0, (5, 2)), (0, (1.5, 1.5))), ("", "////", "....")
 #: More points than this on a line cannot be seen.
 MOST_POINTS = 2000
 _LETTERS = 9.5  # points
-_LEGEND: dict[str, Any] = {"frameon": False, "fontsize": _LETTERS}
 #: Sizes of a figure's legend in inches: of a row, what stands before a label, between columns, and left and right of all.
 _ROW, _HANDLE, _BETWEEN, _SIDES = 0.21, 0.37, 0.27, 0.17
 
@@ -125,10 +124,11 @@ def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float
 
 def legend_row(made: Figure, artists: Sequence[Artist], labels: Sequence[str], columns: int) -> Legend:
     """Add a frameless legend above a figure's axes, row by row; matplotlib fills it column by column."""
+    how: dict[str, Any] = {"frameon": False, "fontsize": _LETTERS, "labelcolor": INK}
     where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 1.0)}
     order = _by_columns(len(labels), columns)
     names = [labels[k] for k in order]
-    return made.legend([artists[k] for k in order], names, ncols=columns, labelcolor=INK, **_LEGEND, **where)
+    return made.legend([artists[k] for k in order], names, ncols=columns, **how, **where)
 
 
 def _by_columns(count: int, columns: int) -> list[int]:
