@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pydrake.math as drake_math
 from numpy.typing import ArrayLike
 from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import vector, with_signature
+from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.util.errors import InputError
 from armloop.util.given import require
 
@@ -59,11 +58,11 @@ def RateLimiter_(T: type) -> Any:
 
         def _limited(self, context: Any) -> np.ndarray:
             last = context.get_discrete_state_vector().CopyToVector().tolist()
-            low, high = (min, max) if T is float else (drake_math.min, drake_math.max)
-            values = []
-            for u, y, (limit, step) in zip(self._u.Eval(context).tolist(), last, self._limits, strict=True):
-                wanted = low(high(u, -limit), limit)
-                values.append(low(high(wanted, y - step), y + step))
+            clip, asked = functions_of(T).clip, self._u.Eval(context).tolist()
+            values = [
+                clip(clip(u, -limit, limit), y - step, y + step)
+                for u, y, (limit, step) in zip(asked, last, self._limits, strict=True)
+            ]
             return vector(T, values)
 
         def _calc_tau(self, context: Any, output: Any) -> None:

@@ -100,7 +100,7 @@ def collect(
     jobs.sort(key=lambda job: (-duration(job), job))
     total, done = sum(map(duration, jobs)), 0.0
     recordings: dict[tuple[int, int], Recording] = {}
-    for job, recording in zip(jobs, Processes(processes).map(record, jobs), strict=True):
+    for job, recording in zip(jobs, Processes(max(processes, 1)).map(record, jobs), strict=True):
         recordings[job] = recording
         done += duration(job)
         progress(parts[job[0]].name, done / total)

@@ -79,7 +79,7 @@ def run_tracking(
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
     names = controllers_for(scenario, models)
-    results = Processes(processes).map(lambda name: track(scenario, name, models, effects), names)
+    results = Processes(max(processes, 1)).map(lambda name: track(scenario, name, models, effects), names)
     return dict(zip(names, results, strict=True))
 
 

@@ -69,11 +69,7 @@ def ForwardDynamics_(T: type) -> Any:
             self._equations = equations
             n = self._n = equations.n
             self._tau = self.DeclareVectorInputPort("tau", n)
-            self.DeclareContinuousState(n, n, 0)
-            self.DeclareVectorOutputPort("state", 2 * n, self._calc_state, {self.all_state_ticket()})
-
-        def _calc_state(self, context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_continuous_state_vector().CopyToVector())
+            self.DeclareStateOutputPort("state", self.DeclareContinuousState(n, n, 0))
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             state = context.get_continuous_state_vector().CopyToVector().tolist()

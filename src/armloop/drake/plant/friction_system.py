@@ -7,21 +7,13 @@ from typing import Any, NamedTuple
 
 from pydrake.systems.framework import LeafSystem_
 
-from armloop.drake.given import require_of
+from armloop.drake.given import require_each, require_of
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.laws.hysteresis import stop_step
 from armloop.util.errors import InputError
 from armloop.util.given import require
-
-
-def _each_of(given: Any, kind: type, name: str) -> tuple[Any, ...]:
-    """The list that was given; raises `InputError` where it is none of things of a class."""
-    require_of(Sequence, **{name: given})
-    for k, each in enumerate(given):
-        require_of(kind, **{f"{name} {k + 1}": each})
-    return tuple(given)
 
 
 @scalar_template("JointFrictionSystem_", __name__)
@@ -46,9 +38,10 @@ def JointFrictionSystem_(T: type) -> Any:
         ) -> None:
             """friction : n joints; smoothing : rad/s (m/s)."""
             require("a number above 0", smoothing=smoothing)
-            friction = _each_of(friction, JointFriction, "friction")
+            require_of(Sequence, friction=friction)
+            require_each(JointFriction, friction, "friction")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._friction, self._smoothing, self._n = friction, smoothing, len(friction)
+            self._friction, self._smoothing, self._n = tuple(friction), smoothing, len(friction)
             self._state = self.DeclareVectorInputPort("state", 2 * self._n)
             self.DeclareVectorOutputPort("force", self._n, self._calc_force, {self.all_input_ports_ticket()})
 
@@ -101,7 +94,8 @@ def PreslidingFriction_(T: type) -> Any:
             """n : joints; elements : any number of `Stop`; period : s."""
             require("a whole number above 0", n=n)
             require("a number above 0", period=period)
-            elements = _each_of(elements, Stop, "elements")
+            require_of(Sequence, elements=elements)
+            require_each(Stop, elements, "elements")
             for e in elements:
                 require("a whole number", joint=e.joint)
                 require("a number above 0", width=e.width)
@@ -109,7 +103,7 @@ def PreslidingFriction_(T: type) -> Any:
                 if not 1 <= e.joint <= n or e.level < 0:
                     raise InputError(f"{e}: joint must be from 1 to {n}, level at least 0 and width above 0")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._n, self._elements = n, elements
+            self._n, self._elements = n, tuple(elements)
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self.DeclareDiscreteState(n + len(elements))
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)

@@ -175,15 +175,10 @@ def JointLoads_(T: type) -> Any:
             bias = plant.CalcBiasTerm(scratch) - plant.CalcGravityGeneralizedForces(scratch)
             momentum = (inertia.dot(known[n:]) - h * bias).tolist()
             A = inertia.tolist()
-            laws: list[ClampedLaw] = []
-            pieces: list[int] = []
-            for along, rotor in self._rotors:
-                speed = along.of(v)
-                laws.append(
-                    ClampedLaw(along.joint, rotor * speed / h, rotor / h, math.inf, along.other, along.ratio)
-                )
-                pieces.append(0)
-            by_load = []
+            laws = [
+                ClampedLaw.along(along, rotor * along.of(v) / h, rotor / h) for along, rotor in self._rotors
+            ]
+            pieces, by_load = [0] * len(laws), []
             for rubbing in self._rubbing:
                 along, w = rubbing.along, rubbing.along.of(v)
                 if rubbing.alone is not None:
@@ -194,9 +189,7 @@ def JointLoads_(T: type) -> Any:
                 level, more = rubbing.level(x, functions), rubbing.more
                 if rubbing.smooth:
                     torque, slope = rubbing.smoothly(x, functions)
-                    laws.append(
-                        ClampedLaw(along.joint, slope * w - torque, slope, math.inf, along.other, along.ratio)
-                    )
+                    laws.append(ClampedLaw.along(along, slope * w - torque, slope))
                     pieces.append(0)
                 if more:
                     by_load.append((len(laws), along, level, torque_along(more, x, 1.0, functions)))

@@ -23,7 +23,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from armloop.drake.given import require_of
+from armloop.drake.given import require_each, require_of
 from armloop.drake.plant.fault_injection import Realisation, UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import JointLoads, Law, ServoGains
@@ -79,10 +79,8 @@ class ArmPlant(Diagram):
         """
         require_of(Arm, arm=arm)
         require_of(Sequence, friction=friction, effects=effects)
-        for j, each in enumerate(friction):
-            require_of(JointFriction, **{f"friction of joint {j + 1}": each})
-        for k, effect in enumerate(effects):
-            require_of(UndeclaredEffect, **{f"effect {k + 1}": effect})
+        require_each(JointFriction, friction, "friction of joint")
+        require_each(UndeclaredEffect, effects, "effect")
         require("a number above 0", time_step=time_step)
         super().__init__()
         if len(friction) != arm.n:
