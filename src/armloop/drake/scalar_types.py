@@ -56,6 +56,9 @@ def _remembering(system: Any) -> Any:
     def copy(self: Any, other: Any, converter: Any = None) -> None:
         remember(self, converter=converter, **other._given)
 
+    # where `help` and an editor look for the arguments
+    kept = [p for name, p in signature.parameters.items() if name not in ("self", "converter")]
+    system.__signature__ = signature.replace(parameters=kept)
     system._construct = remember
     if "_construct_copy" not in vars(system):
         system._construct_copy = copy

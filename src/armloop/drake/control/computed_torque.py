@@ -12,7 +12,7 @@ from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 from armloop.drake.control.pid import check_gains
 from armloop.drake.given import require_joints, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.model.pointwise import InverseDynamics
@@ -192,7 +192,7 @@ def ComputedTorque_(T: type) -> Any:
     return Impl
 
 
-ComputedTorque = with_signature(ComputedTorque_[None])
+ComputedTorque = ComputedTorque_[None]
 
 
 def _drive(model: InverseDynamicsModel) -> InverseDynamics:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, Protocol
 
@@ -11,7 +11,7 @@ from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
 from armloop.drake.given import require_joints, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -24,6 +24,10 @@ class FeedforwardModel(Protocol):
 
     def feedforward(self, q: Array, v: Array, vdot: Array, step: int) -> Array:
         """Return (n,) torques at q, v, vdot (n,) by the terms of the first `step` steps (1, 2 or 3)."""
+
+
+Models = Mapping[str, FeedforwardModel]
+"""Models by the names that controllers know them by."""
 
 
 @scalar_template("Feedforward_", __name__)
@@ -104,7 +108,7 @@ def Feedforward_(T: type) -> Any:
     return Impl
 
 
-Feedforward = with_signature(Feedforward_[None])
+Feedforward = Feedforward_[None]
 
 
 def _joints(model: FeedforwardModel, n: int | None) -> int:

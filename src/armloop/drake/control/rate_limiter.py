@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.util.errors import InputError
 from armloop.util.given import require
 
@@ -74,4 +74,4 @@ def RateLimiter_(T: type) -> Any:
     return Impl
 
 
-RateLimiter = with_signature(RateLimiter_[None])
+RateLimiter = RateLimiter_[None]

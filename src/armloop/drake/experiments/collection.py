@@ -15,7 +15,7 @@ import numpy as np
 from armloop.data.log import MotionLog
 from armloop.drake.experiments.speed_mode import Recording, SpeedModeArm
 from armloop.drake.plant.config import Instruments, PlantConfig
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.joint_loads import Law
 from armloop.experiment.excitation import (
     Reference,
@@ -158,7 +158,7 @@ def measure_run(
     *,
     duration: float = 50.0,
     rate: float = 500.0,
-    effects: Sequence[UndeclaredEffect] = (),
+    effects: Effects = (),
     reference: Reference | None = None,
     law: Law | None = None,
     progress: Progress = silent,

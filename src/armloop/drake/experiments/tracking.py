@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.drake.control.bounded_feedforward import BoundedReference
 from armloop.drake.control.controllers import MAIN_MODEL, Exact, controller_named, controller_of
-from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.feedforward import Models
 from armloop.drake.experiments.closed_loop import ControlledArm, add_arm_under
 from armloop.drake.experiments.metrics import Metrics, measure
 from armloop.drake.experiments.scenarios import TrackingScenario
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
@@ -55,7 +55,7 @@ def needs_model(controller: str) -> bool:
     return bool(controller_named(controller).models)
 
 
-def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
+def controllers_for(scenario: TrackingScenario, models: Models) -> list[str]:
     """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
     names = [name for name in scenario.controllers if controller_named(name).served_by(models)]
     own = [controller_of(name) for name in models if name not in (MAIN_MODEL, Exact.name)]
@@ -63,11 +63,7 @@ def controllers_for(scenario: TrackingScenario, models: Mapping[str, Feedforward
 
 
 def run_tracking(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
-    *,
-    processes: int = 2,
+    scenario: TrackingScenario, models: Models, effects: Effects = (), *, processes: int = 2
 ) -> dict[str, TrackingResult]:
     """Track the scenario's reference once per controller.
 
@@ -84,10 +80,7 @@ def run_tracking(
 
 
 def track(
-    scenario: TrackingScenario,
-    controller: str,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
+    scenario: TrackingScenario, controller: str, models: Models, effects: Effects = ()
 ) -> TrackingResult:
     """Run one controller over the scenario's reference, starting on it.
 
@@ -98,11 +91,7 @@ def track(
     return _simulated({controller: run}, Simulator(run.diagram), scenario.reference.duration)[controller]
 
 
-def track_in_view(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    view: LiveView,
-) -> dict[str, TrackingResult]:
+def track_in_view(scenario: TrackingScenario, models: Models, view: LiveView) -> dict[str, TrackingResult]:
     """Do as `run_tracking`, all controllers at once in one simulation that a live view shows and holds to its rate."""
     builder = DiagramBuilder()
     runs = {name: RecordedArm(scenario, name, models) for name in controllers_for(scenario, models)}
@@ -135,11 +124,7 @@ class RecordedArm:
     """
 
     def __init__(
-        self,
-        scenario: TrackingScenario,
-        controller: str,
-        models: Mapping[str, FeedforwardModel],
-        effects: Sequence[UndeclaredEffect] = (),
+        self, scenario: TrackingScenario, controller: str, models: Models, effects: Effects = ()
     ) -> None:
         """See `track`."""
         self._scenario, self._controller = scenario, controller
@@ -203,8 +188,8 @@ def add_controlled_arm(
     builder: DiagramBuilder,
     scenario: TrackingScenario,
     controller: str,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
+    models: Models,
+    effects: Effects = (),
 ) -> ControlledArm:
     """Add a scenario's plant, reference and one of its controllers, as `track` runs them.
 

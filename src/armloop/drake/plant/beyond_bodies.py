@@ -11,7 +11,7 @@ from pydrake.systems.framework import LeafSystem_
 from armloop.drake.given import require_model
 from armloop.drake.plant.friction_system import PreslidingFriction, Stop, presliding_of
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.laws.effects.base import number
 from armloop.laws.friction import KINDS, FrictionLaw
@@ -82,7 +82,7 @@ def BeyondBodies_(T: type) -> Any:
     return Impl
 
 
-BeyondBodies = with_signature(BeyondBodies_[None])
+BeyondBodies = BeyondBodies_[None]
 
 
 def presliding_elements(model: ReconstructedModel) -> list[Stop]:

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Adder
 
 from armloop.drake.given import require_of, require_order, require_plant
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature, within
+from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
 from armloop.laws.effects import Value, effect_kind
 from armloop.laws.effects.base import number
@@ -109,7 +109,7 @@ def EffectTorque_(T: type) -> Any:
     return Impl
 
 
-EffectTorque = with_signature(EffectTorque_[None])
+EffectTorque = EffectTorque_[None]
 
 
 def add_joint_forces(

@@ -70,6 +70,10 @@ class UndeclaredEffect:
         return effect(self.name, self.joint, self.other_joint)
 
 
+Effects = Sequence[UndeclaredEffect]
+"""What a plant has and nobody declared."""
+
+
 def _fault(kind: type[Effect], given: UndeclaredEffect) -> str:
     """Return what is wrong with an effect for a plant; empty if nothing is."""
     if (given.joint is None) == kind.joint_wise:
@@ -126,7 +130,7 @@ class Realisation:
     own: list[Law] = field(default_factory=list)
 
 
-def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
+def realise(arm: Arm, effects: Effects) -> Realisation:
     """Turn effects into what the plant of `arm` must be given; equal effects add up.
 
     Raises `ScenarioError` when a joint number is not one of the arm's.

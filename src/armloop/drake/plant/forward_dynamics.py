@@ -8,7 +8,7 @@ from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.given import require_model
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
 from armloop.util.given import require
@@ -81,4 +81,4 @@ def ForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-ForwardDynamics = with_signature(ForwardDynamics_[None])
+ForwardDynamics = ForwardDynamics_[None]

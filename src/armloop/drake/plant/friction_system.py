@@ -10,7 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 from armloop.drake.given import require_each, require_of
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.laws.hysteresis import stop_step
 from armloop.util.errors import InputError
 from armloop.util.given import require
@@ -56,7 +56,7 @@ def JointFrictionSystem_(T: type) -> Any:
     return Impl
 
 
-JointFrictionSystem = with_signature(JointFrictionSystem_[None])
+JointFrictionSystem = JointFrictionSystem_[None]
 
 
 class Stop(NamedTuple):
@@ -139,7 +139,7 @@ def PreslidingFriction_(T: type) -> Any:
     return Impl
 
 
-PreslidingFriction = with_signature(PreslidingFriction_[None])
+PreslidingFriction = PreslidingFriction_[None]
 
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:

@@ -24,7 +24,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from armloop.drake.given import require_each, require_of
-from armloop.drake.plant.fault_injection import Realisation, UndeclaredEffect, realise
+from armloop.drake.plant.fault_injection import Effects, Realisation, UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import JointLoads, Law, ServoGains
 from armloop.robot.arm import Arm
@@ -62,7 +62,7 @@ class ArmPlant(Diagram):
         arm: Arm,
         friction: Sequence[JointFriction],
         *,
-        effects: Sequence[UndeclaredEffect] = (),
+        effects: Effects = (),
         time_step: float = 1e-3,
         servo: ServoGains | None = None,
         law: Law | None = None,
@@ -149,7 +149,7 @@ class ArmPlant(Diagram):
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
         self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
 
-    def begin(self, root_context: Context, effects: Sequence[UndeclaredEffect]) -> None:
+    def begin(self, root_context: Context, effects: Effects) -> None:
         """Let effects begin in a running simulation: payloads, viscous friction; in addition to those there are.
 
         They stay with this plant: a simulation from the start needs a new one.

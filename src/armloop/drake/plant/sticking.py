@@ -10,7 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 from armloop.drake.given import require_model
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
@@ -88,4 +88,4 @@ def StickingForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-StickingForwardDynamics = with_signature(StickingForwardDynamics_[None])
+StickingForwardDynamics = StickingForwardDynamics_[None]
