@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PPoly
 
 from armloop.data.tables import place, read_columns, read_header, write_columns
 from armloop.experiment.excitation.reference import Reference
@@ -61,7 +61,9 @@ class TableReference:
         return q, np.where(outside, 0.0, v), np.where(outside, 0.0, vdot)
 
     @cached_property
-    def _quintics(self) -> PPoly:
+    def _quintics(self) -> Any:
+        from scipy.interpolate import PPoly  # most of what imports this room reads no table
+
         h = np.diff(self.time)[:, None]
         q0, v0, a0 = self.q[:-1], h * self.v[:-1], h**2 * self.vdot[:-1]
         v1, a1 = h * self.v[1:], h**2 * self.vdot[1:]
