@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -147,8 +146,10 @@ def _running_median(x: Array, first: int) -> Array:
     # in portions, so that the windows of a long history do not lie side by side in memory
     windows = sliding_window_view(padded, HORIZON, axis=0)
     for begin in range(0, len(windows), HORIZON):
-        with catch_warnings():
-            simplefilter("ignore", RuntimeWarning)  # of windows in which nothing says anything
-            middle = np.nanmedian(windows[begin : begin + HORIZON], axis=2)
-        out[first + begin : first + begin + len(middle)] = np.nan_to_num(middle)
+        # several times faster than numpy's nanmedian
+        ordered = np.sort(windows[begin : begin + HORIZON], axis=2)
+        count = np.isfinite(ordered).sum(axis=2)[:, :, None]
+        pair = (np.take_along_axis(ordered, np.maximum(k, 0), 2) for k in ((count - 1) // 2, count // 2))
+        middle = 0.5 * sum(pair, np.zeros_like(count, dtype=float))[:, :, 0]
+        out[first + begin : first + begin + len(middle)] = np.where(count[:, :, 0] > 0, middle, 0.0)
     return out

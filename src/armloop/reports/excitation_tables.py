@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armloop.experiment.design.limits import LIMITED
+from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import number
 
@@ -47,14 +48,4 @@ def use_table(result: Excitation) -> Table:
 
 def ratio_words(ratio: DataRatio, result: Excitation) -> str:
     """The comparison in a sentence."""
-    values = ratio.to_dict()
-    most = int(ratio.trajectories[-1])
-    if values["median"] is None:
-        need = f"more than {most} times as much data"
-    else:
-        high = number(values["high"], 2) if values["high"] else f"more than {most}"
-        need = f"{number(values['median'], 2)} times as much data ({number(values['low'], 2)} to {high})"
-    return (
-        f"For the coefficient error that {result.timing.period:g} s of it give, random references need {need}, each "
-        f"{result.timing.period:g} s a new one"
-    )
+    return Prose("excitation", values=ratio.to_dict(), period=f"{result.timing.period:g}")["ratio"]

@@ -162,17 +162,11 @@ def refusing_divergence(runs: Mapping[str, RecordedArm], root_context: Context) 
     It is looked for afterwards, in what was recorded: a look at every step would cost a tenth of the simulation. What
     ends a simulation whose numbers have ended is any system's error, and none of them says why.
     """
+    cause = None
     try:
         yield
     except Exception as error:
-        _require_no_divergence(runs, root_context, error)
-        raise
-    _require_no_divergence(runs, root_context)
-
-
-def _require_no_divergence(
-    runs: Mapping[str, RecordedArm], root_context: Context, cause: Exception | None = None
-) -> None:
+        cause = error
     for name, run in runs.items():
         time, state, _, _ = run.recorded(root_context)
         speeds = np.abs(state[:, state.shape[1] // 2 :])
@@ -182,6 +176,8 @@ def _require_no_divergence(
                 f"the loop under `{name}` diverges at t = {time[np.argmax(away)]:.3f} s: a joint is faster than "
                 f"{_RUNAWAY:g} rad/s (m/s); give it other gains"
             ) from cause
+    if cause is not None:
+        raise cause
 
 
 def add_controlled_arm(
