@@ -16,28 +16,9 @@ from armloop.watch.ingest import Counts, ingest
 from armloop.watch.running import stored
 from armloop.watch.sources import LogFile
 from armloop.watch.store import Store
-from armloop.watch.verdicts import Task, test_arm
+from armloop.watch.verdicts import Options, Task, test_arm
 
 SCHEMA = "armloop/watch/1"
-
-
-@dataclass(frozen=True)
-class Options:
-    """How arms are watched.
-
-    Attributes:
-        hours: mean time between false alarms of one whole arm that is promised, h of its operation.
-        healthy: first logs of an arm in which it is known to be healthy.
-        full: whether an alarm's window is diagnosed from its logs, too, where they are still there.
-        scheduler: address of a Dask scheduler, or None.
-        jobs: processes of this machine; 1 does all in this one.
-    """
-
-    hours: float = 1000.0
-    healthy: int = 20
-    full: bool = True
-    scheduler: str | None = None
-    jobs: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +99,7 @@ def watch(
             own = stored(folder, arm, digest)
             if own:
                 mine = {log: place for log, place in places.items() if log in own}
-                tasks.append(
-                    Task(folder.folder, arm, path, options.hours, options.healthy, mine, options.full)
-                )
+                tasks.append(Task(folder.folder, arm, path, mine, options))
         tell, arms = paced(progress), []
         for answer in workers.map(test_arm, tasks) if tasks else ():
             arms.append(answer)

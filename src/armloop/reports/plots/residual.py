@@ -22,8 +22,7 @@ from armloop.reports.plots.style import (
     legend,
     panels,
     polish,
-    thin,
-    with_gaps,
+    trace,
 )
 from armloop.reports.residuals import held_out_residuals, joint_load, longest_run, moving_joints, time_axis
 from armloop.reports.words import unit
@@ -50,15 +49,14 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
         _band(axes, float(scale[j]))
         if diagnosis.contacts:
             # Contacts happen at rest, too: there the residual is no measure of the model, but it shows the push.
-            line = thin(*with_gaps(time, whole[:, j]))
-            axes.plot(*line, color=GREY, linewidth=0.9, label="all samples, at rest too", rasterized=True)
+            label = "all samples, at rest too"
+            trace(axes, time, whole[:, j], color=GREY, linewidth=0.9, label=label, rasterized=True)
         for contact in diagnosis.contacts:
             start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
             inside = time[contact.rows & (samples.motion.time >= start) & (samples.motion.time <= end)]
             axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="event")
         for values, color, label in series:
-            line = thin(*with_gaps(time[rows], values[:, j]))
-            axes.plot(*line, color=color, linewidth=0.9, label=label, rasterized=True)
+            trace(axes, time[rows], values[:, j], color=color, linewidth=0.9, label=label, rasterized=True)
         axes.margins(x=0.01)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         u = unit(joint.torque_unit)

@@ -48,16 +48,16 @@ def controller_colors(names: Sequence[str]) -> dict[str, str]:
     """A colour per controller; the paper's three always have the same.
 
     No more than six stay apart for colour-blind eyes and on a dark page: what comes after has them again, see
-    :func:`rounds`.
+    :func:`apart`.
     """
     fixed = {"pid": ORANGE, "pid_step1": GREEN, "pid_step3": BLUE}
     spare = cycle([PINK, VIOLET, BROWN, GREEN, ORANGE, BLUE])
     return {name: fixed.get(name) or next(spare) for name in names}
 
 
-def rounds(colors: Sequence[str]) -> list[int]:
-    """How many before each have its colour: their lines are :data:`DASHES` apart, their bars :data:`HATCHES`."""
-    return [colors[:k].count(color) for k, color in enumerate(colors)]
+def apart(colors: Sequence[str], styles: Sequence[Any]) -> list[Any]:
+    """A style for each colour, another one wherever it comes again."""
+    return [styles[colors[:k].count(color) % len(styles)] for k, color in enumerate(colors)]
 
 
 def figure(width: float = 10.0, height: float = 4.0) -> Figure:
@@ -218,6 +218,11 @@ def thin(x: Array, y: Array, points: int = MOST_POINTS) -> tuple[Array, Array]:
     keep = np.sort(np.column_stack([start + low, start + high]), axis=1).ravel()
     keep = np.minimum(keep, len(x) - 1)
     return x[keep], y[keep]
+
+
+def trace(axes: Axes, x: Array, y: Array, **how: Any) -> None:
+    """Draw a line (N,), interrupted where x jumps, with no more points than can be seen."""
+    axes.plot(*thin(*with_gaps(x, y)), **how)
 
 
 def every(count: int, most: int) -> slice:
