@@ -60,11 +60,6 @@ class LogSums:
     temperature: Array
     since_start: Array
 
-    @property
-    def blocks(self) -> int:
-        """The number of blocks B."""
-        return len(self.start)
-
 
 def residual_scale(model: ReconstructedModel, samples: Samples | None = None) -> Array:
     """(n,) RMSE that the model leaves on held-out data of its own training runs; a hundredth of the torque without it."""

@@ -60,11 +60,6 @@ class Units:
         """The number of units U."""
         return len(self.when)
 
-    @property
-    def hours(self) -> float:
-        """Operation in all units together, h."""
-        return float(self.seconds.sum()) / 3600.0
-
     def take(self, index: NDArray[np.intp] | slice) -> Units:
         """Some of the units."""
         _, *arrays = fields(self)

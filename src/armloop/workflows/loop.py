@@ -22,7 +22,6 @@ from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.replay import write_replay
 from armloop.experiment.sampling import CONDITIONS
 from armloop.identification.reconstruction import Reconstruction, reconstruct
-from armloop.laws.effects import EFFECTS
 from armloop.model import ReconstructedModel, load_model
 from armloop.reports.loop_result import LoopResult
 from armloop.robot.arm import Arm
@@ -206,9 +205,8 @@ def _revealed(undeclared: UndeclaredEffect) -> dict[str, Any]:
 
 
 def _in_words(undeclared: UndeclaredEffect) -> str:
-    joint = undeclared.joint if EFFECTS[undeclared.name].joint_wise else None
     numbers = ", ".join(f"{key} {np.round(value, 4)}" for key, value in undeclared.parameters.items())
-    return EFFECTS[undeclared.name](joint).label() + f" ({numbers})"
+    return f"{undeclared.build().label()} ({numbers})"
 
 
 @contextmanager

@@ -99,6 +99,11 @@ def panels(
     return np.asarray(axes, dtype=object)
 
 
+def room_for(names: Sequence[str]) -> float:
+    """Inches left of a panel whose rows have names."""
+    return 0.4 + 0.085 * max(map(len, names), default=0)
+
+
 def polish(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "", grid: Grid = "both") -> Axes:
     """Give axes the common look: no box, a light grid, quiet ticks."""
     axes.set_facecolor("none")

@@ -10,12 +10,23 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
+from armloop.reports.plots.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    MUTED,
+    ORANGE,
+    figure,
+    legend,
+    panels,
+    polish,
+    room_for,
+)
 from armloop.util.arrays import Array
 
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60
-_INCHES_PER_LETTER = 0.085
 #: Inches of a cell, of the longest scale of colours, and of a figure on a page and on one as narrow as a phone's.
 _CELL, _BAR, WIDE, NARROW = 0.26, 4.0, 9.6, 4.0
 #: None lets the page through, light or dark.
@@ -39,7 +50,7 @@ def heat_figure(
         limit: (A,) threshold of each arm; alarmed: (A, E) true where an alarm was traced to the effect.
         width: inches; the effects are parted into blocks one below the other, as many as that takes.
     """
-    left = 0.4 + _INCHES_PER_LETTER * max([len(name) for name in arms], default=0)
+    left = room_for(arms)
     most = max(1, int((width - left - 0.2) / _CELL))
     each = -(-len(places) // (-(-len(places) // most) or 1)) or 1
     blocks = [slice(k, k + each) for k in range(0, max(len(places), 1), each)]
