@@ -128,7 +128,8 @@ class AdaptiveFeedforward(LeafSystem):
             if float(np.mean(taken.errors)) > _WORSE * taken.without:
                 refused = taken.refused | {added.effect.place for added in taken.now}
                 taken = _blended(taken, time, (), None)
-                taken = replace(taken, refused=refused, given_back=taken.given_back + 1)
+                # nothing is left to settle, not even of a later name
+                taken = replace(taken, refused=refused, given_back=taken.given_back + 1, settle_at=np.inf)
         elif time >= taken.settle_at:
             # the integrator went on learning during the ramp
             taken = _blended(taken, time, taken.now, _learned(taken, known.since, held))
