@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from pydrake.multibody.plant import MultibodyPlant
@@ -57,6 +58,12 @@ def require_of(kind: type, **given: Any) -> None:
     for name, value in given.items():
         if not isinstance(value, kind):
             raise InputError(f"{name} must be {kind.__name__}; it is of type {type(value).__name__}")
+
+
+def require_each(kind: type, given: Iterable[Any], name: str) -> None:
+    """Raise `InputError` for an entry that is not of a class, called by its name and number."""
+    for k, each in enumerate(given, 1):
+        require_of(kind, **{f"{name} {k}": each})
 
 
 def require_plant(plant: Any) -> None:

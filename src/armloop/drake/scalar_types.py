@@ -6,8 +6,10 @@ seconds of each start for a dozen of them.
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 from unittest.mock import patch
 
@@ -20,6 +22,9 @@ def scalar_template(
 ) -> Callable[[Callable[[Any], Any]], Any]:
     """Decorator that makes a scalar-convertible system template of a function from T to a ``LeafSystem_[T]``.
 
+    The class's ``_construct`` finds its arguments by name in ``self._given``, from which a clone or a conversion is made
+    anew unless the class has a ``_construct_copy`` of its own.
+
     Args:
         name: of the template; ends in an underscore.
         module: ``__name__`` of the module that defines it.
@@ -28,10 +33,33 @@ def scalar_template(
     scope = sys.modules[module]
 
     def decorator(system: Callable[[Any], Any]) -> Any:
-        template = TemplateSystem.define(name, T_list and list(T_list), scope=scope)(system)
+        make = TemplateSystem.define(name, T_list and list(T_list), scope=scope)
+        template = make(lambda T: _remembering(system(T)))
         # The templates that pydrake makes inside have no argument for it.
         with patch.object(cpp_template, "_get_module_from_stack", lambda frame=2: scope, create=True):
             template[float]
         return template
 
     return decorator
+
+
+def _remembering(system: Any) -> Any:
+    construct = system._construct
+    signature = inspect.signature(construct)
+
+    @wraps(construct)
+    def remember(self: Any, *arguments: Any, converter: Any = None, **options: Any) -> None:
+        self._given = signature.bind(self, *arguments, **options).arguments
+        del self._given["self"]
+        construct(self, *arguments, converter=converter, **options)
+
+    def copy(self: Any, other: Any, converter: Any = None) -> None:
+        remember(self, converter=converter, **other._given)
+
+    # where `help` and an editor look for the arguments
+    kept = [p for name, p in signature.parameters.items() if name not in ("self", "converter")]
+    system.__signature__ = signature.replace(parameters=kept)
+    system._construct = remember
+    if "_construct_copy" not in vars(system):
+        system._construct_copy = copy
+    return system

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Sequence
 from typing import Any
 
@@ -45,11 +44,3 @@ def vector(T: type, values: Sequence[Any]) -> np.ndarray:
     if T is float:
         return np.array(values, dtype=float)
     return np.array([x if isinstance(x, T) else T(x) for x in values], dtype=object)
-
-
-def with_signature(system: Any) -> Any:
-    """The class of a template, with the arguments of its `_construct` where `help` and an editor look for them."""
-    construct = inspect.signature(system._construct)
-    kept = [p for name, p in construct.parameters.items() if name not in ("self", "converter")]
-    system.__signature__ = construct.replace(parameters=kept)
-    return system

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,7 +57,7 @@ class Watch:
     Attributes:
         healthy: blocks learned from, until there are enough; then empty.
         null: (p,) healthy coefficients; limit: (p,) largest healthy score; normal: healthy normal equations.
-        up, down: (p,) cumulative sums; begun: (2, p) block at which each was last zero.
+        sums: (2, p) cumulative sums, upward and downward; begun: (2, p) block at which each was last zero.
         window: blocks since the change, or the last few.
         alarmed: number of blocks seen at the alarm; 0 before it.
         agreed: (place, how often in a row).
@@ -68,8 +69,7 @@ class Watch:
     null: Array | None = None
     limit: Array | None = None
     normal: Normal | None = None
-    up: Array | None = None
-    down: Array | None = None
+    sums: Array | None = None
     begun: Array | None = None
     window: tuple[BlockSums, ...] = ()
     alarmed: int = 0
@@ -80,9 +80,7 @@ class Watch:
     @property
     def score(self) -> Array | None:
         """(p,) the larger cumulative sum of each column as a part of the limit; None while learning."""
-        if self.up is None or self.down is None:
-            return None
-        return np.maximum(self.up, self.down) / LIMIT
+        return None if self.sums is None else self.sums.max(axis=0) / LIMIT
 
 
 def block_sums(
@@ -111,26 +109,17 @@ def advance(
     if watch.null is None:
         healthy = (*watch.healthy, block)
         return replace(watch, healthy=healthy) if len(healthy) < learn else _learned(watch, healthy)
-    assert (
-        watch.limit is not None
-        and watch.up is not None
-        and watch.down is not None
-        and watch.begun is not None
-    )
-    size = np.diag(block.gram)
+    assert watch.limit is not None and watch.sums is not None and watch.begun is not None
     score = _score(block, watch.null) / watch.limit
-    up = np.maximum(watch.up + score - ALLOWANCE, 0.0)
-    down = np.maximum(watch.down - score - ALLOWANCE, 0.0)
-    up, down = (np.where(size > 0, new, old) for new, old in ((up, watch.up), (down, watch.down)))
-    begun = np.where(np.stack([up, down]) > 0, watch.begun, watch.blocks)
-    watch = replace(watch, up=up, down=down, begun=begun)
+    sums = np.maximum(watch.sums + np.stack([score, -score]) - ALLOWANCE, 0.0)
+    sums = np.where(np.diag(block.gram) > 0, sums, watch.sums)
+    begun = np.where(sums > 0, watch.begun, watch.blocks)
+    watch = replace(watch, sums=sums, begun=begun)
     if not watch.alarmed:
         window = (*watch.window, block)[-_BACK:]
-        over = np.argwhere(np.stack([up, down]) >= LIMIT)
-        if not len(over):
+        if sums.max(initial=0.0) < LIMIT:
             return replace(watch, window=window)
-        side, column = max(over.tolist(), key=lambda at: float(np.stack([up, down])[at[0], at[1]]))
-        since = watch.blocks - int(begun[side, column])
+        since = watch.blocks - int(begun.flat[np.argmax(sums)])
         return replace(watch, alarmed=watch.blocks, window=window[-max(since, 1) :])
     return _name(model, columns, replace(watch, window=(*watch.window, block)[-_LONGEST:]))
 
@@ -141,55 +130,48 @@ def _score(block: BlockSums, null: Array) -> Array:
 
 
 def _learned(watch: Watch, healthy: tuple[BlockSums, ...]) -> Watch:
-    gram = np.array([block.gram for block in healthy])
-    moment = np.array([block.moment for block in healthy])
-    size = np.einsum("bpp->bp", gram)
-    whole = size.sum(axis=0)
-    null = np.where(whole > 0, moment.sum(axis=0) / np.where(whole > 0, whole, 1.0), 0.0)
+    normal = _normal(healthy)
+    whole = np.einsum("bpp->p", normal.gram)
+    null = np.where(whole > 0, normal.moment.sum(axis=0) / np.where(whole > 0, whole, 1.0), 0.0)
     largest = np.max(np.abs([_score(block, null) for block in healthy]), axis=0)
     # what did not show in the healthy blocks has no null: it cannot alarm
     limit = np.where((whole > 0) & (largest > 0), largest, np.inf)
-    zero = np.zeros(len(null))
-    energy = np.array([block.energy for block in healthy])
     return replace(
         watch,
         healthy=(),
         null=null,
         limit=limit,
-        normal=Normal(gram, moment, energy),
-        up=zero,
-        down=zero,
+        normal=normal,
+        sums=np.zeros((2, len(null))),
         begun=np.full((2, len(null)), watch.blocks),
     )
+
+
+def _normal(blocks: Sequence[BlockSums]) -> Normal:
+    gram, moment, energy = zip(*((b.gram, b.moment, b.energy) for b in blocks), strict=True)
+    return Normal(np.array(gram), np.array(moment), np.array(energy))
 
 
 def _name(model: ReconstructedModel, columns: tuple[Column, ...], watch: Watch) -> Watch:
     """Name what the window shows: at first when it agrees with itself, later whenever the window has doubled."""
     length, known = len(watch.window), watch.known
-    due = (
-        length >= _FEWEST
-        if known.revision == 0
-        else length in (2 * _FEWEST, 4 * _FEWEST, 8 * _FEWEST, _LONGEST)
-    )
     since = watch.blocks - watch.alarmed
-    if known.revision and (not due or since > _LONGEST):
-        return watch
+    if known.revision == 0:
+        due = length >= _FEWEST
+    else:
+        due = since <= _LONGEST and length in (2 * _FEWEST, 4 * _FEWEST, 8 * _FEWEST, _LONGEST)
     if not due:
         return watch
-    window = Normal(
-        np.array([block.gram for block in watch.window]),
-        np.array([block.moment for block in watch.window]),
-        np.array([block.energy for block in watch.window]),
-    )
-    named = name_change(model.arm, columns, watch.normal, window)
+    named = name_change(model.arm, columns, watch.normal, _normal(watch.window))
     place = named[0].place if named else None
     if known.revision == 0:
         often = watch.agreed[1] + 1 if place is not None and place == watch.agreed[0] else 1
         watch = replace(watch, agreed=(place, often))
         if place is None or often < _AGREE:
-            if since > _GIVE_UP and watch.up is not None:
-                zero = np.zeros_like(watch.up)
-                return replace(watch, alarmed=0, up=zero, down=zero, agreed=(None, 0), window=())
+            if since > _GIVE_UP:
+                return replace(
+                    watch, alarmed=0, sums=np.zeros((2, len(columns))), agreed=(None, 0), window=()
+                )
             return watch
     if not named:
         return watch

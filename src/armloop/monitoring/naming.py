@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.laws.effects import Estimate
+from armloop.laws.effects import Effect, Estimate
 from armloop.laws.effects.base import entry
 from armloop.monitoring.catalogue import Column, Place, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, solve
@@ -102,16 +102,16 @@ def name_change(arm: Arm, given: Sequence[Column], healthy: Normal | None, windo
         error = np.sqrt(len(last)) * float(np.std(held[best] - last, ddof=min(1, len(last) - 1)))
         if gain[best] <= max(2.0 * error, _WORTH * sum(gains)):
             break
-        equals = [
-            place
-            for place in gain
-            if _as_good(held[best], held[place]) and _possible(arm, columns, rest, chosen, place)
-        ]
+        equals = []
+        for place in gain:
+            if _as_good(held[best], held[place]):
+                effect, parameters = _estimates(arm, columns, rest, [*chosen, place], place)
+                equals += [place] if effect.plausible(arm, parameters) else []
         if not equals:
             # what explains it best cannot be, and nothing explains it as well: it has no name
             break
         # of those that explain as much, the fewest parameters, and a law of the motion alone before one of the load
-        pick = min(equals, key=lambda place: (*_simplicity(columns, places[place]), -gain[place]))
+        pick = min(equals, key=lambda p: (len(places[p]), columns[places[p][0]].effect.needs_model, -gain[p]))
         chosen.append(pick)
         alike.append(tuple(sorted((p for p in equals if p != pick), key=lambda p: -gain[p])))
         gains.append(gain[pick])
@@ -184,60 +184,48 @@ def _derivative(columns: Sequence[Column], full: Normal, chosen: Sequence[Place]
     return e.embed(x[list(chosen).index(place)])[1]
 
 
-def _simplicity(columns: Sequence[Column], index: NDArray[np.intp]) -> tuple[int, bool]:
-    return len(index), columns[index[0]].effect.needs_model
-
-
 def _shows(rest: Normal, index: NDArray[np.intp]) -> bool:
     """Whether columns are more than rounding errors (what an encoder of a vertical axis would do to the weight)."""
     size = np.einsum("upp->p", rest.gram)
     return bool((size[index] > _NOTHING * size.max(initial=0.0)).any())
 
 
-def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
-    """(U,) energy that columns explain on each unit, fitted on all others (on itself if it is alone)."""
+def _left_out(rest: Normal, index: NDArray[np.intp]) -> tuple[Normal, Array]:
+    """The problem of some columns, and (U, k) its coefficients with each unit left out (with it where it is alone)."""
     G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
     G_all, b_all = G.sum(axis=0), b.sum(axis=0)
-    out = np.empty(len(b))
-    for u in range(len(b)):
-        beta = ridge(G_all, b_all) if len(b) == 1 else ridge(G_all - G[u], b_all - b[u])
-        out[u] = 2 * float(beta @ b[u]) - float(beta @ G[u] @ beta)
-    return out
+    beta = [ridge(G_all - G[u], b_all - b[u]) for u in range(len(b))] if len(b) > 1 else [ridge(G_all, b_all)]
+    return Normal(G, b, rest.energy), np.array(beta)
+
+
+def _held_out(rest: Normal, index: NDArray[np.intp]) -> Array:
+    """(U,) energy that columns explain on each unit, fitted on all others (on itself if it is alone)."""
+    own, beta = _left_out(rest, index)
+    return np.einsum("up,up->u", beta, 2 * own.moment - np.einsum("upq,uq->up", own.gram, beta))
 
 
 def _as_good(best: Array, other: Array) -> bool:
     """Whether another explanation is not worse by more than a standard error over the units, or a fiftieth."""
     less = best - other
     error = np.sqrt(len(less)) * float(np.std(less, ddof=1)) if len(less) > 1 else 0.0
-    return float(less.sum()) <= min(error, 0.1 * abs(float(best.sum()))) or float(
-        less.sum()
-    ) <= _WORTH * float(best.sum())
+    whole = float(best.sum())
+    return float(less.sum()) <= max(min(error, 0.1 * abs(whole)), _WORTH * whole)
 
 
-def _solved(
-    rest: Normal, columns: Sequence[Column], chosen: Sequence[Place], place: Place
-) -> tuple[Array, Array, float]:
-    """Free parameters of one effect among the chosen, their jackknife covariance, and its nonlinear parameter."""
+def _estimates(
+    arm: Arm, columns: Sequence[Column], rest: Normal, chosen: Sequence[Place], place: Place
+) -> tuple[Effect, dict[str, Estimate]]:
+    """One effect among the chosen, and its parameters with standard errors by the jackknife."""
     places = groups(columns)
     index = np.concatenate([places[c] for c in chosen])
     first = sum(len(places[c]) for c in chosen[: list(chosen).index(place)])
     own = slice(first, first + len(places[place]))
-    G, b = rest.gram[:, index[:, None], index[None, :]], rest.moment[:, index]
-    G_all, b_all, U = G.sum(axis=0), b.sum(axis=0), len(b)
-    beta = ridge(G_all, b_all)[own]
-    if U == 1:
-        return beta, np.zeros((len(beta), len(beta))), columns[places[place][0]].shape
-    left = np.array([ridge(G_all - G[u], b_all - b[u])[own] for u in range(U)])
-    spread = left - left.mean(axis=0)
-    return beta, (U - 1) / U * (spread.T @ spread), columns[places[place][0]].shape
-
-
-def _possible(
-    arm: Arm, columns: Sequence[Column], rest: Normal, chosen: Sequence[Place], place: Place
-) -> bool:
-    x, covariance, shape = _solved(rest, columns, [*chosen, place], place)
-    effect = Column(*place, 0, shape).effect
-    return effect.plausible(arm, effect.estimates(arm, x, covariance, shape))
+    problem, left = _left_out(rest, index)
+    beta = ridge(problem.gram.sum(axis=0), problem.moment.sum(axis=0))[own]
+    spread = (left - left.mean(axis=0))[:, own]
+    covariance = (len(left) - 1) / len(left) * (spread.T @ spread)
+    column = columns[places[place][0]]
+    return column.effect, column.effect.estimates(arm, beta, covariance, column.shape)
 
 
 def later_part(since: int, last: int) -> range:
@@ -257,9 +245,7 @@ def _named(
     share: float,
     others: tuple[Place, ...],
 ) -> Named:
-    x, covariance, shape = _solved(rest, columns, chosen, place)
-    effect = Column(*place, 0, shape).effect
-    parameters = effect.estimates(arm, x, covariance, shape)
+    effect, parameters = _estimates(arm, columns, rest, chosen, place)
     return Named(place, parameters, share, effect.sentence(parameters), others)
 
 

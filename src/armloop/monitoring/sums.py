@@ -60,11 +60,6 @@ class LogSums:
     temperature: Array
     since_start: Array
 
-    @property
-    def blocks(self) -> int:
-        """The number of blocks B."""
-        return len(self.start)
-
 
 def residual_scale(model: ReconstructedModel, samples: Samples | None = None) -> Array:
     """(n,) RMSE that the model leaves on held-out data of its own training runs; a hundredth of the torque without it."""
@@ -112,32 +107,38 @@ def log_sums(
     number = block_numbers(motion, block_seconds)
     present, block = np.unique(number[kept], return_inverse=True)
     edges = np.searchsorted(block, np.arange(len(present) + 1))
-    B, p = len(present), x.shape[2]
-    sums = {key: np.zeros((B, n)) for key in ("mean", "energy", "lagged", "torque", "speed", "load", "rows")}
-    gram, moment = np.zeros((B, p, p)), np.zeros((B, p))
-    start, seconds = np.zeros(B), np.zeros(B)
-    for b, (first, last) in enumerate(pairwise(edges.tolist())):
-        here, on = slice(first, last), slides[first:last]
-        count = on.astype(float)
-        ub = u[here] * count
-        sums["rows"][b], sums["mean"][b] = count.sum(axis=0), ub.sum(axis=0)
-        sums["energy"][b], sums["lagged"][b] = (ub**2).sum(axis=0), (ub[1:] * ub[:-1]).sum(axis=0)
-        sums["torque"][b] = ((samples.tau[kept[here]] / scale * count) ** 2).sum(axis=0)
-        sums["speed"][b] = (motion.v[kept[here]] ** 2 * count).sum(axis=0)
-        sums["load"][b] = (known.load[here] ** 2 * count).sum(axis=0)
-        gram[b], moment[b] = joint_sums(x[here], ub, on)
-        times = motion.time[number == present[b]]
-        start[b], seconds[b] = times[0], times[-1] - times[0]
-    temperature, since = _known(log, motion.time[kept], edges, dict(extra or {}), n)
+    count = slides.astype(float)
+    u = u * count
+    following = np.append(u[1:], u[:1], axis=0)
+    following[edges[1:] - 1] = 0.0  # what comes after a block's last sample is another's
+    each = {
+        "rows": count,
+        "mean": u,
+        "energy": u**2,
+        "lagged": u * following,
+        "torque": (samples.tau[kept] / scale * count) ** 2,
+        "speed": motion.v[kept] ** 2 * count,
+        "load": known.load**2 * count,
+    }
+    normal = [joint_sums(x[a:b], u[a:b], slides[a:b]) for a, b in pairwise(edges.tolist())]
+    times = [motion.time[number == one] for one in present]
+    near = np.clip(np.searchsorted(log.time, motion.time[kept]), 0, len(log.time) - 1)
+
+    def mean(name: str, width: int) -> Array:
+        """(B, width) block means of a further column; NaN where it was not recorded."""
+        values = (extra or {}).get(name, np.full(len(log.time), np.nan)).reshape(len(log.time), -1)
+        rows = np.broadcast_to(values, (len(log.time), width))[near]
+        return np.add.reduceat(rows, edges[:-1]) / np.diff(edges)[:, None]
+
     return LogSums(
         columns=known.columns,
-        start=start,
-        seconds=seconds,
-        gram=gram,
-        moment=moment,
-        temperature=temperature,
-        since_start=since,
-        **sums,
+        start=np.array([t[0] for t in times]),
+        seconds=np.array([t[-1] - t[0] for t in times]),
+        gram=np.array([gram for gram, _ in normal]),
+        moment=np.array([moment for _, moment in normal]),
+        temperature=mean("temperature", n),
+        since_start=mean("since_start", 1)[:, 0],
+        **{name: np.add.reduceat(values, edges[:-1]) for name, values in each.items()},
     )
 
 
@@ -151,23 +152,3 @@ def joint_sums(x: Array, u: Array, slides: NDArray[np.bool_]) -> tuple[Array, Ar
         gram[np.ix_(used, used)] += X[:, used].T @ X[:, used]
         moment[used] += X[:, used].T @ u[slides[:, j], j]
     return gram, moment
-
-
-def _known(
-    log: MotionLog, time: Array, edges: NDArray[np.intp], extra: dict[str, Array], n: int
-) -> tuple[Array, Array]:
-    """Block means of temperature (B, n) and of the time since start (B,); NaN where they were not recorded."""
-    B = len(edges) - 1
-    temperature, since = np.full((B, n), np.nan), np.full(B, np.nan)
-    for name in ("temperature", "since_start"):
-        if name not in extra:
-            continue
-        values = extra[name].reshape(len(log.time), -1)
-        near = np.clip(np.searchsorted(log.time, time), 0, len(log.time) - 1)
-        for b, (first, last) in enumerate(pairwise(edges.tolist())):
-            mean = values[near[first:last]].mean(axis=0)
-            if name == "temperature":
-                temperature[b] = np.resize(mean, n)
-            else:
-                since[b] = mean[0]
-    return temperature, since

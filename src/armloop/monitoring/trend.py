@@ -81,8 +81,5 @@ def _best(shapes: Array, y: Array, level: NDArray[np.intp]) -> tuple[float, floa
 
 def _within(x: Array, level: NDArray[np.intp]) -> Array:
     """Rows (K, U) less their mean over the units of each level."""
-    out = np.empty_like(x)
-    for one in np.unique(level):
-        here = level == one
-        out[:, here] = x[:, here] - x[:, here].mean(axis=1, keepdims=True)
-    return out
+    same = level[:, None] == level
+    return np.asarray(x - x @ (same / same.sum(axis=0)))

@@ -60,11 +60,6 @@ class Units:
         """The number of units U."""
         return len(self.when)
 
-    @property
-    def hours(self) -> float:
-        """Operation in all units together, h."""
-        return float(self.seconds.sum()) / 3600.0
-
     def take(self, index: NDArray[np.intp] | slice) -> Units:
         """Some of the units."""
         _, *arrays = fields(self)
@@ -146,13 +141,10 @@ def _running_median(x: Array, first: int) -> Array:
     # in portions, so that the windows of a long history do not lie side by side in memory
     windows = sliding_window_view(padded, HORIZON, axis=0)
     for begin in range(0, len(windows), HORIZON):
+        # several times faster than numpy's nanmedian
         ordered = np.sort(windows[begin : begin + HORIZON], axis=2)
-        count = np.isfinite(ordered).sum(axis=2)
-        pair = [
-            np.take_along_axis(ordered, np.maximum(k, 0)[:, :, None], 2)[:, :, 0]
-            for k in ((count - 1) // 2, count // 2)
-        ]
-        middle = 0.5 * (pair[0] + np.where(count % 2 == 1, pair[0], pair[1]))
-        rows = slice(first + begin, first + begin + len(ordered))
-        out[rows] = np.where(count > 0, middle, 0.0)
+        count = np.isfinite(ordered).sum(axis=2)[:, :, None]
+        pair = (np.take_along_axis(ordered, np.maximum(k, 0), 2) for k in ((count - 1) // 2, count // 2))
+        middle = 0.5 * sum(pair, np.zeros_like(count, dtype=float))[:, :, 0]
+        out[first + begin : first + begin + len(middle)] = np.where(count[:, :, 0] > 0, middle, 0.0)
     return out

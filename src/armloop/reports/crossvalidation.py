@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armloop.reports.tables import Table, make_table
+from armloop.reports.tables import Table, make_table, mean_nrmse
 from armloop.reports.words import MISSING, number, percent
 
 if TYPE_CHECKING:
@@ -26,11 +26,11 @@ def crossvalidation_tables(result: CrossValidation) -> list[Table]:
     joints = [f"joint {j + 1}" for j in range(n)]
     rows: list[list[object]] = []
     for left_out in result.files:
-        errors = left_out.score.moving["nrmse"]
+        score = left_out.score
         rows.append(
-            [left_out.name, *(number(e) for e in errors), number(_mean(errors)), left_out.score.samples]
+            [left_out.name, *map(number, score.moving["nrmse"]), number(mean_nrmse(score)), score.samples]
         )
-    rows.append(["mean", *(number(e) for e in result.per_joint), number(result.mean), ""])
+    rows.append(["mean", *map(number, result.per_joint), number(result.mean), ""])
     what = "each log" if result.leave_out == "file" else f"alternating blocks of {result.block_seconds:g} s"
     moving = make_table(
         ["log", *joints, "mean", "samples"], rows, f"nRMSE of the moving joints on data left out: {what}"
@@ -95,8 +95,3 @@ def physical_table(comparison: PhysicalComparison) -> Table:
     return make_table(
         headers, rows, "Physical consistency (M at random postures within and beyond the motion)"
     )
-
-
-def _mean(values: list[float | None]) -> float | None:
-    known = [x for x in values if x is not None]
-    return float(np.mean(known)) if known else None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armloop.experiment.design.limits import LIMITED
+from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import number
 
@@ -37,40 +38,14 @@ def measures_table(result: Excitation) -> Table:
 
 def use_table(result: Excitation) -> Table:
     """The largest part of each limit that the reference uses, per joint."""
-    rows = []
-    for name, parts, bounded in zip(LIMITED, result.use, _bounded(result), strict=True):
-        rows.append(
-            [
-                name,
-                *(
-                    f"{100 * x:.0f} %" if known else "no limit"
-                    for x, known in zip(parts, bounded, strict=True)
-                ),
-            ]
-        )
+    bounded = np.ones_like(result.use, dtype=bool)
+    bounded[LIMITED.index("torque")] = np.isfinite(result.limits.effort)
+    shown = np.where(bounded, [[f"{100 * x:.0f} %" for x in parts] for parts in result.use], "no limit")
+    rows = [[name, *cells] for name, cells in zip(LIMITED, shown, strict=True)]
     title = f"Largest part used of the limits ({100 * result.settings.reserve:.0f} % of the effort kept in reserve)"
     return make_table(["limit", *(f"joint {j + 1}" for j in range(result.arm.n))], rows, title)
 
 
 def ratio_words(ratio: DataRatio, result: Excitation) -> str:
     """The comparison in a sentence."""
-    values = ratio.to_dict()
-    most = int(ratio.trajectories[-1])
-    if values["median"] is None:
-        need = f"more than {most} times as much data"
-    else:
-        low, high = (
-            number(values["low"], 2),
-            number(values["high"], 2) if values["high"] else f"more than {most}",
-        )
-        need = f"{number(values['median'], 2)} times as much data ({low} to {high})"
-    return (
-        f"For the coefficient error that {result.timing.period:g} s of it give, random references need {need}, each "
-        f"{result.timing.period:g} s a new one"
-    )
-
-
-def _bounded(result: Excitation) -> np.ndarray:
-    known = np.ones_like(result.use, dtype=bool)
-    known[3] = np.isfinite(result.limits.effort)
-    return known
+    return Prose("excitation", values=ratio.to_dict(), period=f"{result.timing.period:g}")["ratio"]

@@ -15,8 +15,8 @@ from armloop.reports.loop_stages import told_in_stages
 from armloop.reports.plots import column_figure, eta_figure, ring_figure, tracking_figure
 from armloop.reports.plots.style import AFTER, BEFORE
 from armloop.reports.prose import Prose
-from armloop.reports.reconstruction_report import conditions_section, mean_nrmse, reconstruction_sections
-from armloop.reports.tables import Table, eta_table, make_table, named_eta_table, seconds_table
+from armloop.reports.reconstruction_report import conditions_section, reconstruction_sections
+from armloop.reports.tables import Table, eta_table, make_table, mean_nrmse, named_eta_table, seconds_table
 from armloop.reports.words import (
     angle,
     controller,

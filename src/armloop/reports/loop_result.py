@@ -1,9 +1,10 @@
-"""Result of a run of the loop, as its report takes it, and what several parts of the report say of it."""
+"""Results of a run of the loop, simulated and measured, and what several parts of the report say of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from armloop.data.regimes import Clusters
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis
 from armloop.identification.reconstruction import Reconstruction
+from armloop.identification.scoring import Score
+from armloop.model import ReconstructedModel
 from armloop.reports.words import effect_name
 from armloop.robot.arm import Arm
 
@@ -20,44 +23,55 @@ if TYPE_CHECKING:  # the class lives among Drake's systems, which a report need 
     from armloop.drake.experiments.tracking import TrackingResult
 
 
-class LoopResult(Protocol):
-    """What a run of the loop hands over.
+@dataclass(frozen=True, eq=False)
+class LoopResult:
+    """Everything a run of the loop found.
 
-    ``logs`` are those the model was made from, by condition; ``clusters`` of their conditioned samples;
-    ``tracking`` by controller; ``undeclared`` holds effect, joint and parameters of what was hidden in the
-    plant, revealed after the verdict, ``right`` whether the verdict met it; ``tracking_before`` and
-    ``tracking_after`` are PID + Step III on the changed plant with the first and with the augmented model;
-    ``seconds`` per stage.
+    Attributes:
+        logs: what was collected, per condition; clusters: of their conditioned samples.
+        reconstruction, reference: the stepwise model, and one-shot SINDy on the same logs.
+        tracking: by controller, on the arm as it was collected.
+        diagnosis: of the second measured run.
+        undeclared: effect, joint and parameters of what was hidden in the plant, revealed after the verdict.
+        right: the verdict names exactly that effect at its joint, and no event beside it.
+        tracking_before, tracking_after: PID + Step III on the arm with the effect, with the model as collected and with the
+            augmented one.
+        seconds: wall time per stage.
     """
 
-    @property
-    def seed(self) -> int: ...
-    @property
-    def arm(self) -> Arm: ...
-    @property
-    def logs(self) -> Mapping[str, MotionLog]: ...
-    @property
-    def clusters(self) -> Clusters: ...
-    @property
-    def reconstruction(self) -> Reconstruction: ...
-    @property
-    def reference(self) -> Reconstruction | None: ...
-    @property
-    def tracking(self) -> Mapping[str, TrackingResult]: ...
-    @property
-    def diagnosis(self) -> Diagnosis: ...
-    @property
-    def undeclared(self) -> Mapping[str, Any]: ...
-    @property
-    def right(self) -> bool: ...
-    @property
-    def tracking_before(self) -> TrackingResult: ...
-    @property
-    def tracking_after(self) -> TrackingResult: ...
-    @property
-    def seconds(self) -> Mapping[str, float]: ...
-    @property
-    def notes(self) -> Sequence[str]: ...
+    seed: int
+    arm: Arm
+    logs: Mapping[str, MotionLog]
+    clusters: Clusters
+    reconstruction: Reconstruction
+    reference: Reconstruction | None
+    tracking: Mapping[str, TrackingResult]
+    diagnosis: Diagnosis
+    undeclared: Mapping[str, Any]
+    right: bool
+    tracking_before: TrackingResult
+    tracking_after: TrackingResult
+    seconds: Mapping[str, float]
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredResult:
+    """What the loop found on a measured arm.
+
+    Attributes:
+        model: of free motion.
+        free: its score on a free run of the motion that was pushed later, which it was not made of.
+        diagnosis: of the pushed run.
+        during: (n,) RMSE in the intervals found, ``before`` and ``after``, N·m; NaN where nothing was found.
+        record: what a force sensor showed in another run of that motion: least and largest ``seconds`` and ``force`` in N.
+    """
+
+    model: ReconstructedModel
+    free: Score
+    diagnosis: Diagnosis
+    during: Mapping[str, list[float]]
+    record: Mapping[str, tuple[float, float]]
 
 
 def mean_eta(result: TrackingResult) -> float:

@@ -23,8 +23,8 @@ from armloop.reports.plots.style import (
     PINK,
     controller_colors,
 )
-from armloop.reports.reconstruction_report import mean_nrmse
-from armloop.reports.residuals import held_out_residuals
+from armloop.reports.residuals import held_out_residuals, longest_run
+from armloop.reports.tables import mean_nrmse
 from armloop.reports.words import (
     angle,
     controller,
@@ -50,11 +50,11 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     diagnosis, tracking = result.diagnosis, dict(result.tracking)
     model = result.reconstruction.model
     loaded = int(np.argmax(np.sqrt(np.mean(samples.tau**2, axis=0))))
-    part = _piece(samples)
+    part = longest_run(samples.motion, _SPARK_SECONDS)
     time = samples.motion.time[part]
     predicted = smooth(samples, model.predict(samples.motion))[part, loaded]
     errors, j = diagnosis.errors(), strongest_joint(diagnosis)
-    left, again = held_out_residuals(diagnosis), _piece(diagnosis.samples)
+    left, again = held_out_residuals(diagnosis), longest_run(diagnosis.samples.motion, _SPARK_SECONDS)
     shown = (left.rows >= again.start) & (left.rows < again.stop)
     before, after = left.before[shown, j], left.after[shown, j]
     instants = diagnosis.samples.motion.time[left.rows[shown]]
@@ -146,12 +146,6 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
         f"{result.arm.name}, seed {result.seed}:  hidden was {truth_name(result)};  {verdict};  "
         f"{number(sum(result.seconds.values()), 2)} s in all",
     )
-
-
-def _piece(samples: Samples) -> slice:
-    run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
-    time = samples.motion.time[run] - samples.motion.time[run.start]
-    return slice(run.start, run.start + max(2, int(np.searchsorted(time, _SPARK_SECONDS))))
 
 
 def _short(name: str) -> str:

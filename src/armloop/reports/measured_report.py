@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
-
 import numpy as np
 
-from armloop.diagnosis import Diagnosis
-from armloop.identification.scoring import Score
-from armloop.model import ReconstructedModel
 from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, reasons
 from armloop.reports.html import Picture, Section
+from armloop.reports.loop_result import MeasuredResult
 from armloop.reports.plots import residual_time_figure
 from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table, score_table
 from armloop.reports.words import counted, number
 
 _TITLE = "The same on measured data"
-
-
-class MeasuredResult(Protocol):
-    """What the measured part hands over.
-
-    ``model`` of free motion, ``free`` its score on a run it was not made of, ``diagnosis`` of the pushed run, ``during``
-    the RMSE per joint in the intervals found, before and after, and ``record`` what a force sensor showed in another run
-    of that motion: smallest and largest, seconds and N.
-    """
-
-    @property
-    def model(self) -> ReconstructedModel: ...
-    @property
-    def free(self) -> Score: ...
-    @property
-    def diagnosis(self) -> Diagnosis: ...
-    @property
-    def during(self) -> Mapping[str, list[float]]: ...
-    @property
-    def record(self) -> Mapping[str, tuple[float, float]]: ...
 
 
 def measured_words(result: MeasuredResult) -> str:

@@ -7,12 +7,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from armloop.reports.words import counted, listed, number, numbers, percent, unit
+from armloop.reports.words import counted, listed, number, numbers, percent, place, unit
 
 _TEMPLATES = Environment(
     loader=PackageLoader("armloop.reports"), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
 )
-_TEMPLATES.filters |= {f.__name__: f for f in (counted, listed, number, numbers, percent, unit)}
+_TEMPLATES.filters |= {f.__name__: f for f in (counted, listed, number, numbers, percent, place, unit)}
 
 
 class Prose:

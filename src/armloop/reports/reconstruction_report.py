@@ -13,7 +13,6 @@ from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters, sort_samples
 from armloop.data.signals import as_torque, preprocess
 from armloop.identification.reconstruction import Reconstruction
-from armloop.identification.scoring import Score
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots import (
@@ -25,23 +24,19 @@ from armloop.reports.plots import (
     torque_figure,
 )
 from armloop.reports.prose import Prose
+from armloop.reports.residuals import longest_run
 from armloop.reports.tables import (
     Table,
     compared,
     formulas,
     libraries_table,
     make_table,
+    mean_nrmse,
     parts_table,
     score_table,
     steps_table,
 )
 from armloop.reports.words import percent
-
-
-def mean_nrmse(score: Score) -> float:
-    """Mean over the joints of the nRMSE of moving samples; NaN if no joint moves."""
-    values = [x for x in score.moving["nrmse"] if x is not None]
-    return float(np.mean(values)) if values else float("nan")
 
 
 def conditions_section(clusters: Clusters) -> Section:
@@ -58,7 +53,8 @@ def reconstruction_report(reconstruction: Reconstruction, logs: Sequence[MotionL
     """One HTML page on a reconstruction from these logs."""
     model = reconstruction.model
     samples = preprocess(logs, model.conditioning)
-    sections = reconstruction_sections(reconstruction, _longest_run(samples))
+    run = longest_run(samples.motion)
+    sections = reconstruction_sections(reconstruction, stretch(samples, run.start, run.stop))
     if reconstruction.reports[0].orders is not None:
         sections.insert(0, conditions_section(sort_samples(as_torque(samples).motion)))
     error = percent(mean_nrmse(reconstruction.held_out))
@@ -77,11 +73,6 @@ def _parts_card(reconstruction: Reconstruction) -> list[Card]:
     text = f"of the energy of the torque of joint {worst.joint}, the joint with most of it"
     tone = "bad" if reconstruction.warnings else "good"
     return [Card(percent(worst.predictable_left), "Predictable, not explained", text, tone)]
-
-
-def _longest_run(samples: Samples) -> Samples:
-    run = max(samples.motion.runs(), key=lambda run: run.stop - run.start)
-    return stretch(samples, run.start, run.stop)
 
 
 def reconstruction_sections(
@@ -131,7 +122,8 @@ def reconstruction_sections(
     if reference is not None:
         tables.append(comparison(reconstruction, reference))
     folded = [("The model as formulas, one per joint", formulas(model))]
-    tables += [table for table in (stribeck_table(model),) if table is not None]
+    if (stribeck := stribeck_table(model)) is not None:
+        tables.append(stribeck)
     if (coefficients := coefficients_table(model, None)) is not None:
         folded.append(("Coefficients with standard errors", f"{coefficients}\n\n{textwrap.fill(NOTE, 110)}"))
     if legend := model.legend():

@@ -62,6 +62,13 @@ def joint_load(diagnosis: Diagnosis) -> Array:
     return load
 
 
+def longest_run(motion: Motion, seconds: float = np.inf) -> slice:
+    """The samples of a motion's longest run; at most the first seconds of it."""
+    run = max(motion.runs(), key=lambda part: part.stop - part.start)
+    elapsed = motion.time[run] - motion.time[run.start]
+    return slice(run.start, run.start + int(np.searchsorted(elapsed, seconds)))
+
+
 def time_axis(motion: Motion) -> tuple[Array, str]:
     """(N,) s to draw a run against, and what it is.
 

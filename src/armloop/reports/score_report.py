@@ -8,8 +8,7 @@ from armloop.identification.scoring import Score
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots.style import BLUE, annotate, figure, panels, polish
 from armloop.reports.prose import Prose
-from armloop.reports.reconstruction_report import mean_nrmse
-from armloop.reports.tables import score_table
+from armloop.reports.tables import mean_nrmse, score_table
 from armloop.reports.words import percent
 from armloop.robot.arm import Arm
 

@@ -241,6 +241,12 @@ def score_table(score: Score, arm: Arm, title: str | None = "Prediction error") 
     return make_table(headers, rows, title, left=(0, 1))
 
 
+def mean_nrmse(score: Score) -> float:
+    """Mean over the joints of the nRMSE of moving samples; NaN if no joint moves."""
+    values = [x for x in score.moving["nrmse"] if x is not None]
+    return float(np.mean(values)) if values else float("nan")
+
+
 def parts_table(parts: Sequence[Parts], arm: Arm) -> Table:
     """What the model explains of each joint's torque on held-out data, what could be predicted besides, and noise."""
     rows = [

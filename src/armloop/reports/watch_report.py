@@ -15,8 +15,6 @@ from armloop.reports.watch_tables import (
     alarm_words,
     alarms_table,
     aside_table,
-    course_words,
-    delay_words,
     moment,
     named,
 )
@@ -165,8 +163,6 @@ def _alarm(alarm: dict[str, Any], new: bool) -> Section:
         new=new,
         since=moment(alarm["since"]),
         found=moment(alarm["when"]),
-        delay=delay_words(alarm),
-        course=course_words(alarm),
     )
     paragraphs = [*say.paragraphs("alarm"), *alarm_words(alarm)]
     return Section(f"{alarm['arm']}: {named(alarm)} ({moment(alarm['when'])})", paragraphs, [], tables)

@@ -6,6 +6,7 @@ import textwrap
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table
 from armloop.reports.words import counted, place
 
@@ -16,25 +17,6 @@ if TYPE_CHECKING:
 def moment(when: float) -> str:
     """A time, UTC, to the minute."""
     return datetime.fromtimestamp(when, UTC).strftime("%Y-%m-%d %H:%M")
-
-
-def course_words(alarm: dict[str, Any]) -> str:
-    """Step or drift, with its size."""
-    how = alarm["course"]
-    words = {"step": "a step", "drift": "a drift", "cannot_tell": "step or drift: cannot tell yet"}[
-        how["form"]
-    ]
-    if how["per_day"] is None:
-        return words
-    parameters = list(alarm["effects"][0]["parameters"].values()) if alarm["effects"] else []
-    unit = f" {parameters[0]['unit']}" if len(parameters) == 1 else ""
-    return f"{words} of {how['per_day']:.3g}{unit} per day"
-
-
-def delay_words(alarm: dict[str, Any]) -> str:
-    """How long it took."""
-    delay = alarm["delay"]
-    return f"{counted(delay['units'], 'log')}, {60 * delay['operation_hours']:.3g} min of operation"
 
 
 def named(alarm: dict[str, Any]) -> str:
@@ -52,7 +34,7 @@ def alarms_table(alarms: list[dict[str, Any]], title: str | None = None) -> Tabl
             moment(alarm["since"]),
             moment(alarm["when"]),
             named(alarm),
-            course_words(alarm),
+            Prose("watch", alarm=alarm)["course"],
             f"{alarm['delay']['units']} ({60 * alarm['delay']['operation_hours']:.3g} min)",
         ]
         for alarm in alarms
@@ -69,30 +51,7 @@ def aside_table(aside: list[dict[str, Any]], title: str | None = None) -> Table:
 
 def alarm_words(alarm: dict[str, Any]) -> list[str]:
     """What one alarm means, in sentences."""
-    lines = [effect["words"] for effect in alarm["effects"]] or [
-        "no single listed effect accounts for it; "
-        + f"{place(alarm['shown_by'])} {alarm['shown_by']['direction']}"
-    ]
-    lines += [
-        f"or {item['effect'].replace('_', ' ')} (joint {item['joint']}): {item['why']}"
-        for item in alarm["alternatives"]
-    ]
-    others = [place(item) for effect in alarm["effects"] for item in effect["alternatives"]]
-    if others:
-        lines.append("as good from these sums: " + "; ".join(others[:4]))
-    if alarm["continues"]:
-        lines.append("the same effect as in this arm's alarm before: it goes on")
-    lines += alarm["notes"]
-    verdict = alarm.get("diagnosis")
-    if verdict is not None:
-        if "verdict" in verdict:
-            found = "; ".join(item.get("words", place(item)) for item in verdict["effects"])
-            words = verdict["verdict"].replace("_", " ") + (f": {found}" if found else "")
-            logs = ", ".join(verdict["logs"])
-            lines.append(f"diagnosis of {logs} by themselves, without the arm's history: {words}")
-        else:
-            lines.append(f"diagnosis: {verdict['reason']}")
-    return lines
+    return Prose("watch", alarm=alarm).paragraphs("meaning")
 
 
 def watch_words(outcome: Outcome) -> str:

@@ -123,8 +123,5 @@ def listed(items: Sequence[str]) -> str:
 
 def parameters(values: Mapping[str, object]) -> str:
     """Plain parameters as ``mass 0.45, com (0.03, 0, 0.02)``."""
-    parts = []
-    for key, value in values.items():
-        array = np.asarray(value, dtype=float)
-        parts.append(f"{key.replace('_', ' ')} {vector(array.tolist())}")
-    return ", ".join(parts)
+    plain = {key.replace("_", " "): np.asarray(value, dtype=float).tolist() for key, value in values.items()}
+    return ", ".join(f"{name} {vector(value)}" for name, value in plain.items())

@@ -16,7 +16,7 @@ from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import Units, unit_edges
 from armloop.util.errors import InputError
-from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix
+from armloop.watch.store import PER_BLOCK, PER_JOINT, digests, matrix, read_table
 
 
 @dataclass(frozen=True, order=True)
@@ -57,17 +57,13 @@ class History:
     @staticmethod
     def read(heads: Sequence[Head], columns: tuple[Column, ...]) -> History:
         """Read what the tests need of these logs (at least one), which must be in order."""
-        import pyarrow.parquet
-
         names = [*PER_BLOCK, *PER_JOINT, "moment", "size"]
         rows: dict[str, list[Any]] = {}
         pieces: list[tuple[int, int, int]] = []
-        number = _numbers(heads)
+        number = programme_numbers(heads)
         for index, head in enumerate(heads):
             with _readable(head.path):
-                table = pyarrow.parquet.read_table(
-                    head.path, columns=names, use_threads=False, partitioning=None
-                )
+                table = read_table(head.path, names)
             seconds, start = table["seconds"].to_numpy(), table["start"].to_numpy()
             values = {name: matrix(table[name]) for name in (*PER_JOINT, "moment", "size")}
             since = table["since_start"].to_numpy()
@@ -109,8 +105,6 @@ class History:
 
     def normal(self, index: Sequence[int]) -> Normal:
         """The normal equations of some units, read from their files."""
-        import pyarrow.parquet
-
         p = len(self.units.columns)
         upper = np.triu_indices(p)
         gram = np.zeros((len(index), p, p))
@@ -118,9 +112,7 @@ class History:
             path = self.logs[self.units.log[unit]].path
             _, first, last = self.pieces[unit].tolist()
             with _readable(path):
-                table = pyarrow.parquet.read_table(
-                    path, columns=["gram"], use_threads=False, partitioning=None
-                )
+                table = read_table(path, ["gram"])
             packed = matrix(table["gram"])[first:last].sum(axis=0)
             gram[k][upper] = packed
             gram[k].T[upper] = packed
@@ -142,7 +134,8 @@ def _readable(path: Path) -> Iterator[None]:
         ) from error
 
 
-def _numbers(heads: Sequence[Head]) -> dict[str, int]:
+def programme_numbers(heads: Sequence[Head]) -> dict[str, int]:
+    """The programmes of logs, numbered by name."""
     return {name: k for k, name in enumerate(sorted({head.programme for head in heads}))}
 
 
@@ -150,6 +143,6 @@ def _tidy(logs: tuple[Head, ...], units: Units, pieces: NDArray[np.intp]) -> His
     """A history without logs that no unit is of, its programmes numbered anew."""
     used, log = np.unique(units.log, return_inverse=True)
     kept = tuple(logs[k] for k in used.tolist())
-    number = _numbers(kept)
+    number = programme_numbers(kept)
     programme = np.array([number[kept[k].programme] for k in log.tolist()], dtype=np.intp)
     return History(kept, replace(units, log=log.astype(np.intp), programme=programme), pieces)

@@ -73,7 +73,7 @@ def ingest(
         try:
             arm, programme = _whose(file, models)
         except InputError as error:
-            counts += _put_aside(store, aside, digest, _NO_MODEL, file, "", str(error))
+            counts += _put_aside(store, aside, digest, file, "", str(error))
             continue
         path = model_for(models, arm) if arm else None
         if path is None:
@@ -82,7 +82,7 @@ def ingest(
                 if arm
                 else f"{file.path}: which arm it is of is not known; put it into a folder named after the arm"
             )
-            counts += _put_aside(store, aside, digest, _NO_MODEL, file, arm, reason)
+            counts += _put_aside(store, aside, digest, file, arm, reason)
             continue
         model = model_and_digest(path)[1]
         if (digest, model) in known:
@@ -101,16 +101,10 @@ def ingest(
 
 
 def _put_aside(
-    store: Store,
-    aside: set[tuple[str, str]],
-    digest: str,
-    model: str,
-    file: LogFile,
-    arm: str,
-    reason: str,
+    store: Store, aside: set[tuple[str, str]], digest: str, file: LogFile, arm: str, reason: str
 ) -> Counts:
-    if (digest, model) not in aside:
-        store.set_aside(digest, model, {"arm": arm, "log": str(file.path), "reason": reason})
+    if (digest, _NO_MODEL) not in aside:
+        store.set_aside(digest, _NO_MODEL, {"arm": arm, "log": str(file.path), "reason": reason})
     return Counts(aside=1)
 
 

@@ -16,28 +16,9 @@ from armloop.watch.ingest import Counts, ingest
 from armloop.watch.running import stored
 from armloop.watch.sources import LogFile
 from armloop.watch.store import Store
-from armloop.watch.verdicts import Task, test_arm
+from armloop.watch.verdicts import Options, Task, test_arm
 
 SCHEMA = "armloop/watch/1"
-
-
-@dataclass(frozen=True)
-class Options:
-    """How arms are watched.
-
-    Attributes:
-        hours: mean time between false alarms of one whole arm that is promised, h of its operation.
-        healthy: first logs of an arm in which it is known to be healthy.
-        full: whether an alarm's window is diagnosed from its logs, too, where they are still there.
-        scheduler: address of a Dask scheduler, or None.
-        jobs: processes of this machine; 1 does all in this one.
-    """
-
-    hours: float = 1000.0
-    healthy: int = 20
-    full: bool = True
-    scheduler: str | None = None
-    jobs: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +83,7 @@ def watch(
     known = find_models(models)
     with contextlib.ExitStack() as held:
         # what is wrong with them is said before a store is made
-        workers = held.enter_context(_workers(options))
+        workers = held.enter_context(contextlib.closing(_workers(options)))
         folder = Store(store)
         held.enter_context(_leaving_nothing(folder))
         held.enter_context(folder.locked(options.scheduler is not None))
@@ -118,9 +99,7 @@ def watch(
             own = stored(folder, arm, digest)
             if own:
                 mine = {log: place for log, place in places.items() if log in own}
-                tasks.append(
-                    Task(folder.folder, arm, path, options.hours, options.healthy, mine, options.full)
-                )
+                tasks.append(Task(folder.folder, arm, path, mine, options))
         tell, arms = paced(progress), []
         for answer in workers.map(test_arm, tasks) if tasks else ():
             arms.append(answer)
@@ -140,16 +119,7 @@ def _leaving_nothing(store: Store) -> Iterator[None]:
         raise
 
 
-@contextlib.contextmanager
-def _workers(options: Options) -> Iterator[Workers]:
-    workers: Workers
+def _workers(options: Options) -> Workers:
     if options.scheduler is not None:
-        workers = Cluster(options.scheduler)
-    elif options.jobs != 1:
-        workers = Processes(options.jobs)
-    else:
-        workers = Serial()
-    try:
-        yield workers
-    finally:
-        workers.close()
+        return Cluster(options.scheduler)
+    return Serial() if options.jobs == 1 else Processes(options.jobs)

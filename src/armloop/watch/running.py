@@ -21,8 +21,8 @@ from armloop.monitoring.catalogue import Column
 from armloop.monitoring.units import Units
 from armloop.util.arrays import Array
 from armloop.util.finite import finite
-from armloop.watch.history import Head, History
-from armloop.watch.store import Store, lists, matrix, placing
+from armloop.watch.history import Head, History, programme_numbers
+from armloop.watch.store import Store, matrix, read_table, write_table
 
 _VECTORS = ("when", "seconds", "since_start")
 _MATRICES = ("moment", "size", "rows", "energy", "torque", "temperature")
@@ -78,15 +78,10 @@ class Running:
 
     def save(self, store: Store, arm: str) -> None:
         """Write the state into its store (atomic write)."""
-        import pyarrow
-        import pyarrow.parquet
-
         assert self.history is not None and self.most is not None
         units = self.history.units
-        table: dict[str, Any] = {name: pyarrow.array(getattr(units, name)) for name in _VECTORS}
-        table |= {name: lists(getattr(units, name)) for name in _MATRICES}
-        table["number"], table["log"] = pyarrow.array(self.numbers), pyarrow.array(units.log)
-        table["piece"] = lists(self.history.pieces.astype(float))
+        table = {name: getattr(units, name) for name in (*_VECTORS, *_MATRICES)}
+        table |= {"number": self.numbers, "log": units.log, "piece": self.history.pieces}
         about = {
             "asked": self.asked,
             "seen": sorted(self.seen),
@@ -105,22 +100,18 @@ class Running:
             "known": self.known,
             "notes": self.notes,
         }
-        written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
-        with placing(store.running(arm)) as draft:
-            pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
+        write_table(store.running(arm), table, about)
 
     @staticmethod
     def load(store: Store, arm: str, model: str) -> Running | None:
         """Read the state of an arm; None where there is none that can be used."""
         import pyarrow
-        import pyarrow.parquet
 
         path = store.running(arm)
         if not path.exists():
             return None
         try:
-            table = pyarrow.parquet.read_table(path, use_threads=False, partitioning=None)
-            return _state(table, store, arm, model)
+            return _state(read_table(path), store, arm, model)
         except (OSError, pyarrow.ArrowException, KeyError, TypeError, ValueError):
             # cut off, or of another version: it holds nothing that the sums do not
             return None
@@ -140,7 +131,7 @@ def _state(table: Any, store: Store, arm: str, model: str) -> Running:
         history=_history(table, heads, about["columns"]),
         numbers=table["number"].to_numpy().astype(np.intp),
         reached=Reached(**about["reached"]),
-        most=np.array(_numbers(about["most"])),
+        most=_evidence(about["most"]),
         alarms=tuple(about["alarms"]),
         last=None if about["last"] is None else _read(about["last"]),
         limit=about["limit"],
@@ -150,9 +141,9 @@ def _state(table: Any, store: Store, arm: str, model: str) -> Running:
 
 
 def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> History:
-    names = sorted({head.programme for head in heads})
+    number = programme_numbers(heads)
     log = table["log"].to_numpy().astype(np.intp)
-    programme = np.array([names.index(head.programme) for head in heads], dtype=np.intp)
+    programme = np.array([number[head.programme] for head in heads], dtype=np.intp)
     units = Units(
         columns=tuple(Column.of(key) for key in columns),
         log=log,
@@ -163,8 +154,8 @@ def _history(table: Any, heads: Sequence[Head], columns: Sequence[str]) -> Histo
     return History(tuple(heads), units, matrix(table["piece"]).astype(np.intp))
 
 
-def _numbers(values: Sequence[float | None]) -> list[float]:
-    return [-np.inf if value is None else value for value in values]
+def _evidence(values: Sequence[float | None]) -> Array:
+    return np.array([-np.inf if value is None else value for value in values])
 
 
 def _told(last: Last) -> dict[str, Any]:
@@ -172,7 +163,7 @@ def _told(last: Last) -> dict[str, Any]:
 
 
 def _read(last: dict[str, Any]) -> Last:
-    told = {"alarm": Alarm(**last["alarm"]), "evidence": tuple(_numbers(last["evidence"]))}
+    told = {"alarm": Alarm(**last["alarm"]), "evidence": tuple(_evidence(last["evidence"]).tolist())}
     return Last(**{**last, **told})
 
 

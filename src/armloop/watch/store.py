@@ -26,6 +26,7 @@ from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armloop.monitoring.sums import LogSums
 from armloop.util.arrays import Array
@@ -64,7 +65,7 @@ class Store:
                 f"{self.folder}: is neither empty nor a store of armloop watch; name another folder"
             )
         else:
-            _write(mark, json.dumps({"schema": SCHEMA}) + "\n")
+            _write(mark, {"schema": SCHEMA})
             self._new = True
 
     def give_up(self) -> None:
@@ -112,27 +113,18 @@ class Store:
             log, model: digests.
             about: ``name`` of the log, ``programme``, and ``when`` it began, s since 1970.
         """
-        import pyarrow
-        import pyarrow.parquet
-
-        p = len(sums.columns)
-        upper = np.triu_indices(p)
-        table: dict[str, Any] = {name: pyarrow.array(getattr(sums, name)) for name in PER_BLOCK}
-        for name in PER_JOINT:
-            table[name] = lists(getattr(sums, name))
-        table["moment"] = lists(sums.moment)
-        table["size"] = lists(np.einsum("bpp->bp", sums.gram))
-        table["gram"] = lists(sums.gram[:, upper[0], upper[1]])
+        upper = np.triu_indices(len(sums.columns))
+        table = {name: getattr(sums, name) for name in (*PER_BLOCK, *PER_JOINT, "moment")}
+        table["size"] = np.einsum("bpp->bp", sums.gram)
+        table["gram"] = sums.gram[:, upper[0], upper[1]]
         about = {**about, "columns": [column.key for column in sums.columns]}
-        written = pyarrow.table(table).replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
-        with placing(self.file(arm, day, log, model)) as draft:
-            pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
+        write_table(self.file(arm, day, log, model), table, about)
         for aside in self.folder.glob(f"aside/{log}-*.json"):
             aside.unlink(missing_ok=True)
 
     def set_aside(self, log: str, model: str, about: dict[str, Any]) -> None:
         """Remember why a log was not used."""
-        _write(self.folder / "aside" / f"{log}-{model}.json", json.dumps(about, sort_keys=True) + "\n")
+        _write(self.folder / "aside" / f"{log}-{model}.json", about)
 
     def aside(self) -> list[dict[str, Any]]:
         """What was set aside, in the order of the names."""
@@ -164,8 +156,7 @@ class Store:
 
     def set_tested(self, arm: str, answer: dict[str, Any]) -> None:
         """Keep what the tests of an arm came to."""
-        path = self.folder / "tested" / f"{_partition(arm)}.json"
-        _write(path, json.dumps(answer, sort_keys=True) + "\n")
+        _write(self.folder / "tested" / f"{_partition(arm)}.json", answer)
 
     def alarm(self, arm: str, name: str) -> dict[str, Any] | None:
         """An alarm by its identifier."""
@@ -174,8 +165,7 @@ class Store:
 
     def add_alarm(self, arm: str, name: str, alarm: dict[str, Any]) -> None:
         """Keep an alarm."""
-        path = self.folder / "alarms" / _partition(arm) / f"{name}.json"
-        _write(path, json.dumps(alarm, sort_keys=True) + "\n")
+        _write(self.folder / "alarms" / _partition(arm) / f"{name}.json", alarm)
 
     def alarms(self) -> list[dict[str, Any]]:
         """All alarms, by time and arm."""
@@ -192,8 +182,7 @@ class Store:
 
     def announce(self, names: Sequence[str]) -> None:
         """Remember that alarms were told, after they were: a call killed before tells them again."""
-        every = sorted(self.announced() | set(names))
-        _write(self.folder / "announced.json", json.dumps({"alarms": every}) + "\n")
+        _write(self.folder / "announced.json", {"alarms": sorted(self.announced() | set(names))})
 
 
 @contextmanager
@@ -212,9 +201,9 @@ def placing(path: Path) -> Iterator[Path]:
         draft.unlink(missing_ok=True)
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, value: dict[str, Any]) -> None:
     with placing(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+        draft.write_text(json.dumps(value, sort_keys=True) + "\n", encoding="utf-8")
 
 
 def _partition(arm: str) -> str:
@@ -227,12 +216,28 @@ def digests(path: Path) -> tuple[str, str]:
     return log, model
 
 
-def lists(values: Array) -> Any:
-    """(N, k) as a column of lists of k."""
+def write_table(path: Path, columns: dict[str, NDArray[Any]], about: dict[str, Any]) -> None:
+    """Write columns, (N,) or (N, k) as lists of k, with what is to be known of them, as a Parquet file of a store."""
     import pyarrow
+    import pyarrow.parquet
 
-    flat = pyarrow.array(np.ascontiguousarray(values, dtype=float).ravel())
-    return pyarrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
+    def column(values: NDArray[Any]) -> Any:
+        if values.ndim == 1:
+            return pyarrow.array(values)
+        flat = pyarrow.array(np.ascontiguousarray(values, dtype=float).ravel())
+        return pyarrow.FixedSizeListArray.from_arrays(flat, values.shape[1])
+
+    table = pyarrow.table({name: column(values) for name, values in columns.items()})
+    written = table.replace_schema_metadata({"armloop": json.dumps(about, sort_keys=True)})
+    with placing(path) as draft:
+        pyarrow.parquet.write_table(written, draft, compression="zstd", use_dictionary=False)
+
+
+def read_table(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """Read columns of a Parquet file of a store; its folder's name is no column."""
+    import pyarrow.parquet
+
+    return pyarrow.parquet.read_table(path, columns=columns, use_threads=False, partitioning=None)
 
 
 def matrix(column: Any) -> Array:

@@ -40,23 +40,33 @@ _WARM_UP = "friction falls by up to a fifth as a joint warms up; columns tempera
 
 
 @dataclass(frozen=True)
-class Task:
-    """One arm to be tested.
+class Options:
+    """How arms are watched.
 
     Attributes:
-        hours: mean time between false alarms of the whole arm that is promised, h of operation.
-        healthy: first units of an arm that it is known to have been healthy in, for learning how warmth matters.
-        places: where the arm's logs lie, by digest, as far as they are still there.
-        full: whether the window of an alarm is diagnosed from its logs, too.
+        hours: mean time between false alarms of one whole arm that is promised, h of its operation.
+        healthy: first logs of an arm in which it is known to be healthy.
+        full: whether an alarm's window is diagnosed from its logs, too, where they are still there.
+        scheduler: address of a Dask scheduler, or None.
+        jobs: processes of this machine; 1 does all in this one.
     """
+
+    hours: float = 1000.0
+    healthy: int = 20
+    full: bool = True
+    scheduler: str | None = None
+    jobs: int = 1
+
+
+@dataclass(frozen=True)
+class Task:
+    """One arm to be tested; ``places`` says where its logs lie, by digest, as far as they are still there."""
 
     store: Path
     arm: str
     model: Path
-    hours: float
-    healthy: int
     places: Mapping[str, Path]
-    full: bool = True
+    options: Options
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +150,7 @@ def test_arm(task: Task) -> dict[str, Any]:
     """Test an arm's new logs, name what each new alarm is, and keep both; what was tested before is not again."""
     store = Store(task.store)
     model, digest = model_and_digest(task.model)
-    asked = json.dumps([digest, task.hours, task.healthy, task.full])
+    asked = json.dumps([digest, task.options.hours, task.options.healthy, task.options.full])
     files = stored(store, task.arm, digest)
     mark = hashlib.sha256(json.dumps([asked, sorted(files)]).encode()).hexdigest()[:16]
     answer = store.tested(task.arm)
@@ -194,7 +204,7 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
     """Take in further logs: test them, explain the alarms, and let go of what no test will ask for again."""
     history = new if past.history is None else past.history.then(new)
     count = past.count + new.units.count
-    tested = examine(history, task.hours, task.healthy, past)
+    tested = examine(history, task.options.hours, task.options.healthy, past)
     watched = tested.watched
     names, last = list(past.alarms), past.last
     for found in watched.alarms:
@@ -215,7 +225,7 @@ def _advance(task: Task, store: Store, model: ReconstructedModel, past: Running,
         kept = min(kept, last.alarm.unit)
     kept = max(0, kept - 2 * HORIZON)
     numbers = np.concatenate([past.numbers, np.arange(past.count, count)])
-    stay = np.flatnonzero((numbers < task.healthy) | (numbers >= kept))
+    stay = np.flatnonzero((numbers < task.options.healthy) | (numbers >= kept))
     seconds = float(np.cumsum(np.concatenate([[past.seconds], new.units.seconds]))[-1])
     most = watched.evidence.max(axis=0)
     return Running(
@@ -260,10 +270,7 @@ def _judge(
             earlier = store.alarm(task.arm, names[-2]) if len(names) > 1 else None
             judged |= _as_named(tested, named, earlier)
             last = replace(last, stream=_main_column(tested, named, alarm, last.evidence))
-    span = slice(tested.at(first), tested.at(until) + 1)
-    units = tested.history.units
-    how = course(units.when[span], tested.adjusted.values[span, last.stream], units.programme[span])
-    judged["course"] = {**how.to_dict(), "of": _label(tested.listed[last.stream])}
+    judged["course"] = _course(tested, first, until, last.stream)
     if judged != known:
         store.add_alarm(task.arm, last.name, judged)
     return last
@@ -276,8 +283,8 @@ def _name(task: Task, model: ReconstructedModel, tested: Tested, alarm: Alarm, u
     return name_change(
         model.arm,
         tested.history.units.columns,
-        _equations(tested, before, task.healthy) if before else None,
-        _equations(tested, window, task.healthy),
+        _equations(tested, before, task.options.healthy) if before else None,
+        _equations(tested, window, task.options.healthy),
     )
 
 
@@ -323,8 +330,6 @@ def _explain(
     logs = sorted({int(units.log[u]) for u in window})
     at, since = tested.at(alarm.unit), tested.at(alarm.since)
     delay = float(units.seconds[since : at + 1].sum()) / 3600.0
-    span = slice(tested.at(max(alarm.from_unit, alarm.since - HORIZON)), at + 1)
-    how = course(units.when[span], tested.adjusted.values[span, column], units.programme[span])
     answer: dict[str, Any] = {
         "id": name,
         "arm": task.arm,
@@ -335,7 +340,7 @@ def _explain(
         "delay": {"units": alarm.unit - alarm.since + 1, "operation_hours": delay},
         "log_evidence": alarm.log_evidence,
         "limit": float(tested.watched.limits[alarm.unit - tested.before]),
-        "false_alarm_hours": task.hours,
+        "false_alarm_hours": task.options.hours,
         "shown_by": {
             "effect": stream.name,
             "joint": stream.joint,
@@ -343,10 +348,10 @@ def _explain(
             "direction": "rose" if alarm.direction > 0 else "fell",
         },
         **_as_named(tested, named, earlier),
-        "course": {**how.to_dict(), "of": _label(tested.listed[column])},
+        "course": _course(tested, max(alarm.from_unit, alarm.since - HORIZON), alarm.unit, column),
         "notes": list(tested.notes),
     }
-    if task.full and new:
+    if task.options.full and new:
         answer["diagnosis"] = _diagnosis(task, model, [history.logs[log].log for log in logs])
     return answer, column
 
@@ -363,10 +368,14 @@ def _equations(tested: Tested, index: Sequence[int], healthy: int) -> Normal:
     )
 
 
-def _label(stream: Stream) -> str:
+def _course(tested: Tested, first: int, last: int, column: int) -> dict[str, Any]:
+    """How a stream went from one unit to another: step or drift."""
+    span, units = slice(tested.at(first), tested.at(last) + 1), tested.history.units
+    how = course(units.when[span], tested.adjusted.values[span, column], units.programme[span])
+    stream = tested.listed[column]
     places = [str(j) for j in (stream.joint, stream.other_joint) if j is not None]
     name = stream.name.replace("_", " ")
-    return f"{name} at joint {' and '.join(places)}" if places else name
+    return {**how.to_dict(), "of": f"{name} at joint {' and '.join(places)}" if places else name}
 
 
 def _main_column(tested: Tested, named: Sequence[Named], alarm: Alarm, evidence: Sequence[float]) -> int:

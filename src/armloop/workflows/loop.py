@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from armloop.data.log import MotionLog, read_log, write_log
-from armloop.data.regimes import Clusters, sort_samples
+from armloop.data.regimes import sort_samples
 from armloop.data.signals import as_torque, preprocess
 from armloop.diagnosis import Diagnosis, diagnose
 from armloop.drake.experiments.collection import collect, measure_run
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan, load_tracking
-from armloop.drake.experiments.tracking import TrackingResult, track
+from armloop.drake.experiments.tracking import track
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.replay import write_replay
 from armloop.experiment.sampling import CONDITIONS
 from armloop.identification.reconstruction import Reconstruction, reconstruct
-from armloop.laws.effects import EFFECTS
 from armloop.model import ReconstructedModel, load_model
+from armloop.reports.loop_result import LoopResult
 from armloop.robot.arm import Arm
 from armloop.util.files import write_figure, write_json, write_text
 from armloop.util.progress import Progress, paced, silent
@@ -49,38 +50,6 @@ LOOP_FILES = (
 )
 
 
-@dataclass(eq=False)
-class LoopResult:
-    """Everything the loop found, for the report.
-
-    Attributes:
-        logs: what was collected, per condition.
-        reconstruction, reference: the stepwise model, and one-shot SINDy on the same logs.
-        tracking: PID, PID + Step I, PID + Step III on the arm as it was collected.
-        diagnosis: of the second measured run.
-        undeclared: the effect that was put into the plant, as revealed after the verdict.
-        right: the verdict names exactly that effect at its joint, and no event beside it.
-        tracking_before, tracking_after: PID + Step III on the arm with the effect, with the model as
-            collected and with the augmented one.
-        seconds: wall time per stage.
-    """
-
-    seed: int
-    arm: Arm
-    logs: dict[str, MotionLog]
-    clusters: Clusters
-    reconstruction: Reconstruction
-    reference: Reconstruction | None
-    tracking: dict[str, TrackingResult]
-    diagnosis: Diagnosis
-    undeclared: dict[str, Any]
-    right: bool
-    tracking_before: TrackingResult
-    tracking_after: TrackingResult
-    seconds: dict[str, float]
-    notes: list[str] = field(default_factory=list)
-
-
 def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     """Run the loop on the three-axis arm, print its tables and write its files into ``folder``; likewise on measured
     logs of a UR5 (:mod:`armloop.workflows.measured`), in a process of its own while this one diagnoses and draws.
@@ -97,7 +66,8 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant
     seconds: dict[str, float] = {}
-    with _Clock(seconds, "collect", progress, "1/7 measure: collecting three logs on the simulated arm"):
+    clock = partial(_clock, seconds, progress)
+    with clock("collect", "1/7 measure: collecting three logs on the simulated arm"):
         tell = paced(progress)
         logs = collect(
             plant.arm,
@@ -110,9 +80,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         for name, log in logs.items():
             write_log(folder / "logs" / f"{name}.csv", log)
     with Pool(2) as workers:  # two cores, no more
-        with _Clock(
-            seconds, "reconstruct", progress, "2/7 reconstruct: three steps, each inheriting the last"
-        ):
+        with clock("reconstruct", "2/7 reconstruct: three steps, each inheriting the last"):
             sealed = workers.submit(_measure_with_effect, scenario, seed, folder / "logs" / "second_run.csv")
             one_shot = workers.submit(_reconstruct, list(logs.values()), plant.arm, "sindy")
             reconstruction = _reconstruct(list(logs.values()), plant.arm, "stepwise", progress)
@@ -122,7 +90,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             clusters = sort_samples(as_torque(samples).motion)
         print(steps_table(reconstruction.reports), end="\n\n")
         print(score_table(reconstruction.held_out, plant.arm), end="\n\n", flush=True)
-        with _Clock(seconds, "track", progress, "3/7 control: tracking with three controllers"):
+        with clock("track", "3/7 control: tracking with three controllers"):
             undeclared = sealed.result()
             runs = [workers.submit(track, scenario, name, {"model": model}) for name in scenario.controllers]
             before_run = workers.submit(track, scenario, "pid_step3", {"model": model}, [undeclared])
@@ -131,21 +99,17 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             pushed = workers.submit(_measured, folder / MEASURED)
             reference = one_shot.result()
         print(eta_table(tracking, paper=True), end="\n\n", flush=True)
-        with _Clock(
-            seconds, "diagnose", progress, "4/7 measured again: tracing the residual of the second run"
-        ):
+        with clock("diagnose", "4/7 measured again: tracing the residual of the second run"):
             diagnosis = _diagnose(folder, progress)
         print(diagnosis_table(diagnosis), end="\n\n", flush=True)
-        with _Clock(
-            seconds, "track_again", progress, "5/7 control better: tracking with the augmented model"
-        ):
+        with clock("track_again", "5/7 control better: tracking with the augmented model"):
             after_run = workers.submit(
                 track, scenario, "pid_augmented", {"augmented": diagnosis.model}, [undeclared]
             )
             labels = {name: controller(name) for name in tracking}
             write_replay(folder / "replay.html", plant.arm, tracking, labels=labels)
             before, after = before_run.result(), after_run.result()
-        with _Clock(seconds, "measured", progress, "6/7 the same on measured data: a UR5 that was pushed"):
+        with clock("measured", "6/7 the same on measured data: a UR5 that was pushed"):
             measured_words, measured_section = pushed.result()
     right = _is_right(diagnosis, undeclared)
     result = LoopResult(
@@ -171,7 +135,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         flush=True,
     )
     print(f"\nOn measured data (a UR5, currents as logged)\n\n{measured_words}\n", flush=True)
-    with _Clock(seconds, "report", progress, "7/7 writing the report"):
+    with clock("report", "7/7 writing the report"):
         write_json(folder / "loop.json", loop_answer(result, scenario))
         sections = [Section.from_dict(measured_section)]
         links = [("The pushed UR5", f"{MEASURED}/report.html")]
@@ -241,22 +205,14 @@ def _revealed(undeclared: UndeclaredEffect) -> dict[str, Any]:
 
 
 def _in_words(undeclared: UndeclaredEffect) -> str:
-    joint = undeclared.joint if EFFECTS[undeclared.name].joint_wise else None
     numbers = ", ".join(f"{key} {np.round(value, 4)}" for key, value in undeclared.parameters.items())
-    return EFFECTS[undeclared.name](joint).label() + f" ({numbers})"
+    return f"{undeclared.build().label()} ({numbers})"
 
 
-class _Clock:
+@contextmanager
+def _clock(seconds: dict[str, float], progress: Progress, stage: str, words: str) -> Iterator[None]:
     """Announce a stage and keep its wall time."""
-
-    def __init__(
-        self, seconds: dict[str, float], stage: str, progress: Callable[[str], None], words: str
-    ) -> None:
-        self._seconds, self._stage, self._start = seconds, stage, 0.0
-        progress(words)
-
-    def __enter__(self) -> None:
-        self._start = time.perf_counter()
-
-    def __exit__(self, *_: object) -> None:
-        self._seconds[self._stage] = time.perf_counter() - self._start
+    progress(words)
+    start = time.perf_counter()
+    yield
+    seconds[stage] = time.perf_counter() - start

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,9 @@ from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, close, diagnose
 from armloop.identification.reconstruction import reconstruct
-from armloop.identification.scoring import Score, residual, score
+from armloop.identification.scoring import residual, score
 from armloop.model import ReconstructedModel
+from armloop.reports.loop_result import MeasuredResult
 from armloop.robot.arm import load_arm
 from armloop.util.files import write_json, write_text
 from armloop.util.progress import Progress
@@ -29,35 +29,6 @@ _FREE, _PUSHED = "no9_singularity_free_nodist", "no9_singularity_free_wdist"
 #: is not published with these logs. Smallest and largest, s and N.
 FORCE_RECORD = {"seconds": (0.4, 1.4), "force": (18.0, 51.0)}
 SCHEMA = "armloop/measured/1"
-
-
-@dataclass(eq=False)
-class MeasuredResult:
-    """What the measured loop found.
-
-    Attributes:
-        model: of free motion.
-        free: its score on a free run of the motion that was pushed later, which it was not made of.
-        diagnosis: of the pushed run.
-        during: (n,) RMSE in the intervals found, before and after, N·m; NaN where nothing was found.
-        record: what a force sensor showed in another run of that motion.
-    """
-
-    model: ReconstructedModel
-    free: Score
-    diagnosis: Diagnosis
-    during: dict[str, list[float]]
-    record: dict[str, tuple[float, float]] = field(default_factory=lambda: dict(FORCE_RECORD))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of ``measured.json``."""
-        return {
-            "schema": SCHEMA,
-            "data": "UR5, Kufieta 2014, Apache-2.0",
-            "free_run": self.free.to_dict(),
-            "diagnosis": self.diagnosis.to_dict(),
-            "rmse_while_pushed": self.during,
-        }
 
 
 def run_measured(folder: Path, progress: Progress) -> MeasuredResult:
@@ -81,13 +52,20 @@ def run_measured(folder: Path, progress: Progress) -> MeasuredResult:
     progress("3/3 the same motion, in which something happened that nobody declared")
     pushed = log(_PUSHED)
     diagnosis = diagnose(model, [pushed], progress)
-    result = MeasuredResult(model, free, diagnosis, _during(model, diagnosis))
+    result = MeasuredResult(model, free, diagnosis, _during(model, diagnosis), FORCE_RECORD)
     from armloop.reports.diagnosis_report import diagnosis_report
 
     model.save(folder / "model.json")
     compensation = close(model, diagnosis.model, diagnosis.samples)
     write_text(folder / "report.html", diagnosis_report(diagnosis, model, [pushed.name], compensation))
-    write_json(folder / "measured.json", result.to_dict())
+    answer = {
+        "schema": SCHEMA,
+        "data": "UR5, Kufieta 2014, Apache-2.0",
+        "free_run": free.to_dict(),
+        "diagnosis": diagnosis.to_dict(),
+        "rmse_while_pushed": result.during,
+    }
+    write_json(folder / "measured.json", answer)
     return result
 
 

@@ -43,8 +43,16 @@ def run_pickup_scenario(
             f"--model: {scenario.name} needs a model named step3 or model; given: {', '.join(chosen)}"
         )
     progress(f"tracking {scenario.reference.duration:g} s; a load is grasped on the way")
-    result, diagnosis = track_pickup(scenario, model, progress, view)
-    phases = result.phases
+    found: list[Diagnosis] = []
+
+    def learn(log: MotionLog) -> ReconstructedModel:
+        """Diagnose from the model and the log since the grasp, nothing else."""
+        progress(f"diagnosing {log.time[-1] - log.time[0]:.3g} s of log since the grasp")
+        found.append(diagnose(model, [log], progress))
+        return found[0].model
+
+    result = run_pickup(scenario, model, learn, view)
+    phases, diagnosis = result.phases, found[0]
     answer = tracking_answer(
         scenario, {"pid_step3": phases["loaded"], "pid_augmented": phases["augmented"]}
     ) | {
@@ -66,21 +74,3 @@ def run_pickup_scenario(
         # every phase holds the whole run
         write_replay(folder / "replay.html", scenario.plant.arm, {"augmented model": phases["augmented"]})
     return answer, result
-
-
-def track_pickup(
-    scenario: TrackingScenario,
-    model: ReconstructedModel,
-    progress: Progress,
-    view: LiveView | None = None,
-) -> tuple[PickupResult, Diagnosis]:
-    """Run a scenario with a pickup; the diagnosis sees the model and the log since the grasp, nothing else."""
-    found: list[Diagnosis] = []
-
-    def learn(log: MotionLog) -> ReconstructedModel:
-        progress(f"diagnosing {log.time[-1] - log.time[0]:.3g} s of log since the grasp")
-        found.append(diagnose(model, [log], progress))
-        return found[0].model
-
-    result = run_pickup(scenario, model, learn, view)
-    return result, found[0]

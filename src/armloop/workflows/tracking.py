@@ -84,18 +84,13 @@ def save_made(
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
-    first = next(iter(results.values()))
     plant = scenario.plant
     q0 = scenario.reference.evaluate([0.0])[0][0]
     margins = loop_margins(
         plant.arm, plant.config.friction, scenario.gains, q0, period=plant.config.time_step
     )
     return {
-        "schema": SCHEMA,
-        "scenario": scenario.name,
-        "arm": plant.arm.name,
-        "scored_s": list(scenario.score),
-        "unit": list(first.unit),
+        **heading(scenario, next(iter(results.values())).unit),
         "settling_band": BAND,
         "controllers": {name: result_answer(result) for name, result in results.items()},
         "loop": [
@@ -106,6 +101,17 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
             }
             for m in margins
         ],
+    }
+
+
+def heading(scenario: TrackingScenario, unit: tuple[str, ...]) -> dict[str, Any]:
+    """What every ``tracking.json`` begins with."""
+    return {
+        "schema": SCHEMA,
+        "scenario": scenario.name,
+        "arm": scenario.plant.arm.name,
+        "scored_s": list(scenario.score),
+        "unit": list(unit),
     }
 
 

@@ -14,7 +14,7 @@ from armloop.model import ReconstructedModel
 from armloop.util.checkpoints import Kept, digest
 from armloop.util.files import write_figure, write_json
 from armloop.util.progress import Progress
-from armloop.workflows.tracking import SCHEMA, models_for, save_made
+from armloop.workflows.tracking import heading, models_for, save_made
 
 
 def run_wear_scenario(
@@ -35,11 +35,7 @@ def run_wear_scenario(
     with kept.unless_at_fault():
         result = run_wear(scenario, chosen, kept=kept)
     answer = {
-        "schema": SCHEMA,
-        "scenario": scenario.name,
-        "arm": scenario.plant.arm.name,
-        "scored_s": list(scenario.score),
-        "unit": list(result.unit),
+        **heading(scenario, result.unit),
         "wear": {"samples": scenario.wear.samples, "spread": scenario.wear.spread, "seed": scenario.seed},
         "controllers": {name: _spread(eta) for name, eta in result.eta.items()},
     }
@@ -55,7 +51,7 @@ def run_wear_scenario(
 
 def _depends(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> list[Any]:
     """All that a run with drawn friction depends on."""
-    plant = scenario.plant
+    plant, gains = scenario.plant, (scenario.gains.kp, scenario.gains.ki, scenario.gains.kd)
     motion = scenario.reference.evaluate(np.linspace(0.0, scenario.reference.duration, 2001))
     return [
         repr(
@@ -64,13 +60,9 @@ def _depends(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel
         repr((plant.config.friction, plant.config.instruments, plant.config.time_step)),
         repr([(joint.kind, joint.effort) for joint in plant.arm.joints]),
         {key: value for key, value in plant.arm.to_dict().items() if key != "fingerprint"},
-        digest(*motion, scenario.gains.kp, scenario.gains.ki, scenario.gains.kd, *_given(scenario.rate)),
+        digest(*motion, *gains, *([] if scenario.rate is None else [scenario.rate])),
         {name: model.to_dict() for name, model in models.items()},
     ]
-
-
-def _given(array: np.ndarray | None) -> list[np.ndarray]:
-    return [] if array is None else [array]
 
 
 def _spread(eta: np.ndarray) -> dict[str, Any]:

@@ -162,3 +162,19 @@ def test_by_default_half_of_the_effort_and_times_above_zero() -> None:
     for wrong in ({"ramp": 0.0}, {"trial": 0.05}, {"bound": [1.0, 0.0, 1.0]}):
         with pytest.raises(ValueError, match="above 0"):
             AdaptiveFeedforward(model, **wrong)  # type: ignore[arg-type]
+
+
+def test_what_is_given_back_while_a_later_name_settles_fades_by_the_whole_ramp() -> None:
+    loop = Loop(trial=1.5)
+    loop.to(0.2)
+    loop.known = Known(1, (torque(2.0),), since=0.1)
+    loop.to(0.25)
+    loop.error = 1.0  # named at 0.25 s, judged at 2.75 s
+    # supplied from 2.25 s on, it would settle at 3.25 s
+    loop.known = Known(2, (torque(2.0), torque(1.0, "more")), since=0.1)
+    loop.to(2.75)
+    assert loop.given_back == 1
+    full = np.array([3.0, 4.0, 0.0])
+    assert_allclose(loop.to(3.2), 0.55 * full)
+    assert_allclose(loop.to(3.5), 0.25 * full)
+    assert_allclose(loop.to(3.75), 0.0, atol=1e-12)

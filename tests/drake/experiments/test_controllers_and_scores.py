@@ -237,5 +237,3 @@ def test_the_parts_of_a_collection() -> None:
     assert_allclose(np.abs(static.references[0].evaluate([0.2])[1]), np.deg2rad(0.1))
     dwelling = collection._parts(ARM, config, replace(plan, dwell=True), 7)[0].references[0]
     assert not dwelling.evaluate([0.2])[1].any()
-    crew = collection._Crew(ARM, config, 500.0, [static, constant, varying])
-    assert crew.duration((2, 1)) == 20.0 and crew.duration((0, 0)) == static.references[0].duration

@@ -124,30 +124,16 @@ class AdaptiveFeedforward(LeafSystem):
             taken = replace(taken, integrals=(*taken.integrals, (time, held))[-_REMEMBERED:])
         known = self._named.Eval(context)
         if time >= taken.judge_at:
-            after, effects = float(np.mean(taken.errors)), taken.now
             taken = replace(taken, judge_at=np.inf)
-            if after > _WORSE * taken.without:
-                refused = taken.refused | {added.effect.place for added in effects}
-                taken = replace(
-                    taken,
-                    now=(),
-                    before=effects,
-                    offset=None,
-                    offset_before=taken.offset,
-                    since=time,
-                    refused=refused,
-                    given_back=taken.given_back + 1,
-                )
+            if float(np.mean(taken.errors)) > _WORSE * taken.without:
+                refused = taken.refused | {added.effect.place for added in taken.now}
+                taken = _blended(taken, time, (), None)
+                # nothing is left to settle, not even of a later name
+                taken = replace(taken, refused=refused, given_back=taken.given_back + 1, settle_at=np.inf)
         elif time >= taken.settle_at:
             # the integrator went on learning during the ramp
-            taken = replace(
-                taken,
-                before=taken.now,
-                offset=_learned(taken, known.since, held),
-                offset_before=taken.offset,
-                since=time,
-                settle_at=np.inf,
-            )
+            taken = _blended(taken, time, taken.now, _learned(taken, known.since, held))
+            taken = replace(taken, settle_at=np.inf)
         elif known.revision > taken.revision and time >= taken.since + self._ramp:
             effects = tuple(
                 added
@@ -155,13 +141,9 @@ class AdaptiveFeedforward(LeafSystem):
                 if not added.effect.sensor and added.effect.place not in taken.refused
             )
             first = not taken.now and bool(effects)
+            learned = _learned(taken, known.since, held) if effects else None
             taken = replace(
-                taken,
-                now=effects,
-                before=taken.now,
-                offset=_learned(taken, known.since, held) if effects else None,
-                offset_before=taken.offset,
-                since=time,
+                _blended(taken, time, effects, learned),
                 revision=known.revision,
                 without=float(np.mean(taken.errors)) if first else taken.without,
                 judge_at=time + self._ramp + self._trial if first else taken.judge_at,
@@ -198,6 +180,13 @@ class AdaptiveFeedforward(LeafSystem):
 
     def _calc_given_back(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector([float(self._taken(context).given_back)])
+
+
+def _blended(taken: _Taken, time: float, effects: Effects, offset: Array | None) -> _Taken:
+    """From now on these effects and this offset, blended in from what there is."""
+    return replace(
+        taken, now=effects, before=taken.now, offset=offset, offset_before=taken.offset, since=time
+    )
 
 
 def _learned(taken: _Taken, since: float, held: Array | None) -> Array | None:

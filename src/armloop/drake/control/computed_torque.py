@@ -12,7 +12,7 @@ from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 from armloop.drake.control.pid import check_gains
 from armloop.drake.given import require_joints, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.model.pointwise import InverseDynamics
@@ -113,8 +113,6 @@ def ComputedTorque_(T: type) -> Any:
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = model, gains
-            self._options: dict[str, Any] = {"friction_at": friction_at, "period": period}
             n = self._n = len(gains.kp)
             self._drive, self._friction_at = _drive(model), friction_at
             if T is not float:
@@ -123,7 +121,7 @@ def ComputedTorque_(T: type) -> Any:
             assert gains.ki is not None
             self._gains = [gain.tolist() for gain in (gains.kp, gains.kd, gains.ki)]
             self._integrates = bool(gains.ki.any())
-            self._discrete = period is not None
+            self._period = period
             self._references = [
                 self.DeclareVectorInputPort(name, n) for name in ("q_ref", "v_ref", "vdot_ref")
             ]
@@ -142,10 +140,7 @@ def ComputedTorque_(T: type) -> Any:
             require_predicts(model)
             require_joints(model, self._n, "this controller is for")
             self._drive = _drive(model)
-            self._arguments = model, self._arguments[1]
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, **other._options, converter=converter)
+            self._given["model"] = model
 
         def _calc_tau(self, context: Any, output: Any) -> None:
             n = self._n
@@ -176,7 +171,7 @@ def ComputedTorque_(T: type) -> Any:
             return vector(T, [x + y for x, y in zip(equations.rigid(q, v, vdot), friction, strict=True)])
 
         def _integral(self, context: Any) -> np.ndarray:
-            if self._discrete:
+            if self._period is not None:
                 return context.get_discrete_state_vector().CopyToVector()
             return context.get_continuous_state_vector().CopyToVector()
 
@@ -186,17 +181,18 @@ def ComputedTorque_(T: type) -> Any:
 
         def _update(self, context: Any, discrete: Any) -> None:
             integral, error = self._integral(context).tolist(), self._error(context)
-            period = self._options["period"]
-            discrete.set_value(vector(T, [z + period * e for z, e in zip(integral, error, strict=True)]))
+            discrete.set_value(
+                vector(T, [z + self._period * e for z, e in zip(integral, error, strict=True)])
+            )
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-            if self._integrates and not self._discrete:
+            if self._integrates and self._period is None:
                 derivatives.get_mutable_vector().SetFromVector(vector(T, self._error(context)))
 
     return Impl
 
 
-ComputedTorque = with_signature(ComputedTorque_[None])
+ComputedTorque = ComputedTorque_[None]
 
 
 def _drive(model: InverseDynamicsModel) -> InverseDynamics:

@@ -9,18 +9,18 @@ One of your own is a class with a control law that is a system (see `Controller`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 from pydrake.systems.framework import LeafSystem
 
 from armloop.drake.control.computed_torque import BANDWIDTH, AccelerationGains, ComputedTorque
-from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.feedforward import FeedforwardModel, Models
 from armloop.drake.control.pid import PidController
 from armloop.drake.control.scenario_types import TrackingScenario
 from armloop.drake.plant.exact import exact_model
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.dynamics import Dynamics, with_mass_matrix
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
@@ -52,12 +52,7 @@ class Controller:
         """
         raise NotImplementedError
 
-    def model(
-        self,
-        scenario: TrackingScenario,
-        models: Mapping[str, FeedforwardModel],
-        effects: Sequence[UndeclaredEffect],
-    ) -> FeedforwardModel | None:
+    def model(self, scenario: TrackingScenario, models: Models, effects: Effects) -> FeedforwardModel | None:
         """Return its model of those given by name; `effects` are what the plant has and a model may not know.
 
         Raises `ValueError` when there is none for it.
@@ -115,12 +110,7 @@ class ComputedTorqueControl(Controller):
 
     name = "computed_torque"
 
-    def model(
-        self,
-        scenario: TrackingScenario,
-        models: Mapping[str, FeedforwardModel],
-        effects: Sequence[UndeclaredEffect],
-    ) -> FeedforwardModel | None:
+    def model(self, scenario: TrackingScenario, models: Models, effects: Effects) -> FeedforwardModel | None:
         found = super().model(scenario, models, effects)
         return with_mass_matrix(found) if isinstance(found, ReconstructedModel) else found
 
@@ -148,12 +138,7 @@ class Exact(Pid):
 
     name = "exact"
 
-    def model(
-        self,
-        scenario: TrackingScenario,
-        models: Mapping[str, FeedforwardModel],
-        effects: Sequence[UndeclaredEffect],
-    ) -> FeedforwardModel | None:
+    def model(self, scenario: TrackingScenario, models: Models, effects: Effects) -> FeedforwardModel | None:
         return exact_model(scenario.plant.arm, scenario.plant.config.friction, effects)
 
 

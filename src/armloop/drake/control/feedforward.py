@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, Protocol
 
@@ -11,7 +11,7 @@ from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
 from armloop.drake.given import require_joints, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -24,6 +24,10 @@ class FeedforwardModel(Protocol):
 
     def feedforward(self, q: Array, v: Array, vdot: Array, step: int) -> Array:
         """Return (n,) torques at q, v, vdot (n,) by the terms of the first `step` steps (1, 2 or 3)."""
+
+
+Models = Mapping[str, FeedforwardModel]
+"""Models by the names that controllers know them by."""
 
 
 @scalar_template("Feedforward_", __name__)
@@ -69,38 +73,31 @@ def Feedforward_(T: type) -> Any:
                 # Numbers alone can be neither differentiated nor written out.
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments, self._n, self._stacked = (model, step), n, stacked
+            self._n, self._step = n, step
             if T is float:
-                self._drive = (_stacked_drive if stacked else _drive)(model, step)
+                self._drive = _drive(model, step)
             else:
                 assert isinstance(model, ReconstructedModel)
                 self._equations = ModelEquations(model, functions_of(T), step=step)
             names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
             self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
-            calc = self._calc_symbolic_tau_ff
-            if T is float:
-                calc = self._calc_stacked_tau_ff if stacked else self._calc_tau_ff
             # Named, or Drake would find out by writing all the formulas out.
-            self.DeclareVectorOutputPort("tau_ff", n, calc, {self.all_input_ports_ticket()})
+            self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, {self.all_input_ports_ticket()})
 
         def set_model(self, model: FeedforwardModel) -> None:
             """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
             require_predicts(model)
             require_joints(model, self._n, "this feedforward is for")
-            self._arguments = model, *self._arguments[1:]
-            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[1])
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, n=other._n, stacked=other._stacked, converter=converter)
+            self._given["model"] = model
+            self._drive = _drive(model, self._step)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
-            q, v, vdot = self._inputs
-            self._give(context, output, self._drive(q.Eval(context), v.Eval(context), vdot.Eval(context)))
-
-        def _calc_stacked_tau_ff(self, context: Any, output: Any) -> None:
-            self._give(context, output, self._drive(self._inputs[0].Eval(context)))
-
-        def _give(self, context: Any, output: Any, tau: Sequence[float]) -> None:
+            x = np.concatenate([port.Eval(context) for port in self._inputs])
+            if T is not float:
+                q, v, vdot = (part.tolist() for part in np.split(x, 3))
+                output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
+                return
+            tau = self._drive(x)
             # A NaN or an infinity shows in the sum; several times faster than numpy's test.
             if not isfinite(sum(tau)):
                 raise RuntimeError(
@@ -108,15 +105,10 @@ def Feedforward_(T: type) -> Any:
                 )
             output.SetFromVector(tau)
 
-        def _calc_symbolic_tau_ff(self, context: Any, output: Any) -> None:
-            x = [y for port in self._inputs for y in port.Eval(context).tolist()]
-            q, v, vdot = (x[k * self._n : (k + 1) * self._n] for k in range(3))
-            output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
-
     return Impl
 
 
-Feedforward = with_signature(Feedforward_[None])
+Feedforward = Feedforward_[None]
 
 
 def _joints(model: FeedforwardModel, n: int | None) -> int:
@@ -132,19 +124,13 @@ def _joints(model: FeedforwardModel, n: int | None) -> int:
     return int(known)
 
 
-def _drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
-    if isinstance(model, ReconstructedModel):
-        drive = model.drive(step)
-        return lambda q, v, vdot: drive(q, v, vdot).tolist()
-    return lambda q, v, vdot: np.asarray(model.feedforward(q, v, vdot, step)).tolist()
-
-
-def _stacked_drive(model: FeedforwardModel, step: int) -> Callable[..., Sequence[float]]:
+def _drive(model: FeedforwardModel, step: int) -> Callable[[Array], Sequence[float]]:
+    """A model's torque at q, v and vdot behind each other, (3n,)."""
     if isinstance(model, ReconstructedModel):
         return model.stacked_drive(step)
 
     def drive(x: Array) -> Sequence[float]:
-        n = len(x) // 3
-        return np.asarray(model.feedforward(x[:n], x[n : 2 * n], x[2 * n :], step)).tolist()
+        q, v, vdot = np.split(x, 3)
+        return np.asarray(model.feedforward(q, v, vdot, step)).tolist()
 
     return drive

@@ -98,7 +98,6 @@ def _law(T: type) -> Any:
             n = len(gains.kp)
             counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = gains, resolution
             self._joints = list(
                 zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), counts, strict=True)
             )
@@ -109,9 +108,6 @@ def _law(T: type) -> Any:
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             sources = {self.all_input_ports_ticket()}
             self.DeclareVectorOutputPort("tau_and_e", 2 * n, self._calc, sources)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
 
         def _calc(self, context: Any, output: Any) -> None:
             # Called every step: for a handful of joints plain floats are several times faster than arrays.

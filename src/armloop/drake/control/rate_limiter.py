@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pydrake.math as drake_math
 from numpy.typing import ArrayLike
 from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.util.errors import InputError
 from armloop.util.given import require
 
@@ -46,7 +45,6 @@ def RateLimiter_(T: type) -> Any:
             if not (np.all(limits > 0) and np.all(rates > 0)):
                 raise InputError("effort and rate must be above 0")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = effort, rate, period
             self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))
             self._u = self.DeclareVectorInputPort("u", limits.size)
             self.DeclareDiscreteState(limits.size)
@@ -54,20 +52,17 @@ def RateLimiter_(T: type) -> Any:
             sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
             self.DeclareVectorOutputPort("tau", limits.size, self._calc_tau, sources)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
-
         def set_torque(self, context: Any, tau: Any) -> None:
             """Let the drive have had the torques tau (n,) before, in this system's own context."""
             context.SetDiscreteState(vector(T, list(tau)))
 
         def _limited(self, context: Any) -> np.ndarray:
             last = context.get_discrete_state_vector().CopyToVector().tolist()
-            low, high = (min, max) if T is float else (drake_math.min, drake_math.max)
-            values = []
-            for u, y, (limit, step) in zip(self._u.Eval(context).tolist(), last, self._limits, strict=True):
-                wanted = low(high(u, -limit), limit)
-                values.append(low(high(wanted, y - step), y + step))
+            clip, asked = functions_of(T).clip, self._u.Eval(context).tolist()
+            values = [
+                clip(clip(u, -limit, limit), y - step, y + step)
+                for u, y, (limit, step) in zip(asked, last, self._limits, strict=True)
+            ]
             return vector(T, values)
 
         def _calc_tau(self, context: Any, output: Any) -> None:
@@ -79,4 +74,4 @@ def RateLimiter_(T: type) -> Any:
     return Impl
 
 
-RateLimiter = with_signature(RateLimiter_[None])
+RateLimiter = RateLimiter_[None]

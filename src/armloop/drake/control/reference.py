@@ -112,14 +112,14 @@ def _ReferenceTable_(T: type) -> Any:
         ) -> None:
             LeafSystem_[T].__init__(self, converter=converter)
             n = self._n = tables[0].shape[1]
-            self._arguments, self._period = (tables, period), period
+            self._period = period
             self._rows = np.hstack([*tables, np.zeros_like(tables[0])])
             # what is constant has no derivatives: only the time is looked at
             self.DeclareVectorOutputPort("row", 4 * n, self._calc_row, {self.time_ticket()})
             self.set_model(None, 3)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
+            Impl._construct(self, **other._given, converter=converter)
             self._model, self._step, self._equations = other._model, other._step, other._equations
             self._rows, self._filled = other._rows.copy(), list(other._filled)
 

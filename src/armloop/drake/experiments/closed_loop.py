@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceSource
 from armloop.drake.experiments.scenarios import Plant, plant_for, plant_names
 from armloop.drake.given import require_of, require_predicts, require_reference, require_step
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
@@ -81,7 +80,7 @@ def add_arm_with_controller(
     step: int = 3,
     *,
     controller: str = "pid",
-    effects: Sequence[UndeclaredEffect] = (),
+    effects: Effects = (),
     torque_rate: ArrayLike | None = None,
 ) -> ControlledArm:
     """Add an arm that follows a reference: a plant with sticking friction under the controller of your choice.
@@ -142,7 +141,7 @@ def add_arm_under(
     step: int = 3,
     *,
     name: str = "controller",
-    effects: Sequence[UndeclaredEffect] = (),
+    effects: Effects = (),
     torque_rate: ArrayLike | None = None,
 ) -> ControlledArm:
     """Add a plant that follows a reference under a control law of the caller's own; else as `add_arm_with_controller`.

@@ -6,16 +6,16 @@ segments the arm is put to the next start instead of being driven there: nothing
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.drake.experiments.speed_mode import Recording, SpeedModeArm
 from armloop.drake.plant.config import Instruments, PlantConfig
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.joint_loads import Law
 from armloop.experiment.excitation import (
     Reference,
@@ -25,7 +25,7 @@ from armloop.experiment.excitation import (
     static_segments,
 )
 from armloop.robot.arm import Arm
-from armloop.util.workers import Pool
+from armloop.util.workers import Processes
 
 Progress = Callable[[str, float], None]
 """Called with the condition's name and the part of the whole collection that is done, 0 to 1."""
@@ -82,38 +82,36 @@ def collect(
     Only the settled part of each segment is logged; as the time before it passes, each segment is a run of
     its own. The same seed gives the same logs, with any number of `processes` (forked, each with its plant).
     """
-    crew = _Crew(arm, config, plan.rate, _parts(arm, config, plan, seed))
+    parts = _parts(arm, config, plan, seed)
+
+    def duration(job: tuple[int, int]) -> float:
+        return parts[job[0]].references[job[1]].duration
+
+    @cache  # each process builds its own: diagrams cannot be sent to another
+    def rig(time_step: float) -> SpeedModeArm:
+        return SpeedModeArm(arm, config.friction, instruments=config.instruments, time_step=time_step)
+
+    def record(job: tuple[int, int]) -> Recording:
+        part = parts[job[0]]
+        return rig(part.time_step).follow(part.references[job[1]], rate=plan.rate, settle=part.settle)
+
     # The longest first: no process is left alone with one at the end.
-    jobs = sorted(
-        (
-            (part, index)
-            for part, content in enumerate(crew.parts)
-            for index in range(len(content.references))
-        ),
-        key=lambda job: (-crew.duration(job), job),
-    )
-    total = sum(map(crew.duration, jobs))
-    recordings: dict[_Job, Recording] = {}
-    done = 0.0
-    with ExitStack() as stack:
-        record: Iterator[Recording] = map(crew.record, jobs)
-        if processes > 1:
-            record = stack.enter_context(Pool(processes, _inherit, (crew,))).map(_record_inherited, jobs)
-        for job, recording in zip(jobs, record, strict=True):
-            recordings[job] = recording
-            done += crew.duration(job)
-            progress(crew.parts[job[0]].name, done / total)
+    jobs = [(k, index) for k, part in enumerate(parts) for index in range(len(part.references))]
+    jobs.sort(key=lambda job: (-duration(job), job))
+    total, done = sum(map(duration, jobs)), 0.0
+    recordings: dict[tuple[int, int], Recording] = {}
+    for job, recording in zip(jobs, Processes(max(processes, 1)).map(record, jobs), strict=True):
+        recordings[job] = recording
+        done += duration(job)
+        progress(parts[job[0]].name, done / total)
     noise = np.random.default_rng(seed)
     return {
         part.name: _as_log(
             part.name, [recordings[k, i] for i in range(len(part.references))], config.instruments, noise
         )
-        for k, part in enumerate(crew.parts)
+        for k, part in enumerate(parts)
         if part.references
     }
-
-
-_Job = tuple[int, int]  # a part and one of its references
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,44 +151,6 @@ def _parts(arm: Arm, config: PlantConfig, plan: CollectionPlan, seed: int) -> li
     ]
 
 
-class _Crew:
-    """Simulated arms, one per time step, built when needed: diagrams cannot be sent to another process."""
-
-    def __init__(self, arm: Arm, config: PlantConfig, rate: float, parts: list[_Part]) -> None:
-        self.parts = parts
-        self._arm, self._config, self._rate = arm, config, rate
-        self._rigs: dict[float, SpeedModeArm] = {}
-
-    def duration(self, job: _Job) -> float:
-        return self.parts[job[0]].references[job[1]].duration
-
-    def record(self, job: _Job) -> Recording:
-        part = self.parts[job[0]]
-        rig = self._rigs.get(part.time_step)
-        if rig is None:
-            rig = SpeedModeArm(
-                self._arm,
-                self._config.friction,
-                instruments=self._config.instruments,
-                time_step=part.time_step,
-            )
-            self._rigs[part.time_step] = rig
-        return rig.follow(part.references[job[1]], rate=self._rate, settle=part.settle)
-
-
-_inherited: _Crew
-
-
-def _inherit(crew: _Crew) -> None:
-    # Handed over by the fork itself, so that nothing needs to be picklable on the way in.
-    global _inherited
-    _inherited = crew
-
-
-def _record_inherited(job: _Job) -> Recording:
-    return _inherited.record(job)
-
-
 def measure_run(
     arm: Arm,
     config: PlantConfig,
@@ -198,7 +158,7 @@ def measure_run(
     *,
     duration: float = 50.0,
     rate: float = 500.0,
-    effects: Sequence[UndeclaredEffect] = (),
+    effects: Effects = (),
     reference: Reference | None = None,
     law: Law | None = None,
     progress: Progress = silent,

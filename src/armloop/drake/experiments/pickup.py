@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from armloop.drake.experiments.tracking import (
     refusing_divergence,
     score,
 )
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects, UndeclaredEffect
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 
@@ -48,7 +48,7 @@ def run_pickup(
     model: FeedforwardModel,
     learn: Callable[[MotionLog], FeedforwardModel],
     view: LiveView | None = None,
-    changes: Sequence[UndeclaredEffect] | None = None,
+    changes: Effects | None = None,
 ) -> PickupResult:
     """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
 

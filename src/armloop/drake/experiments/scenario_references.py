@@ -43,6 +43,11 @@ def reference_of(
         raise ScenarioError(
             f"{where}: reference.kind is {data.kind!r}; it must be paper, fourier, places or csv"
         )
+    if data.kind in ("csv", "places") and not reference.duration <= LONGEST:
+        given = "file" if data.kind == "csv" else "places"
+        raise ScenarioError(
+            f"{where}: reference.{given} lasts {reference.duration:g} s; it must be at most {LONGEST:g} s"
+        )
     q, _, _ = reference.evaluate(np.arange(0.0, reference.duration, 0.01))
     for j, joint in enumerate(arm.joints):
         if q[:, j].min() < joint.lower or q[:, j].max() > joint.upper:
@@ -57,25 +62,15 @@ def _table(file: str, arm: Arm, path: Path, where: str) -> Reference:
     if not file:
         raise ScenarioError(f"{where}: reference.file is missing; a csv reference needs the path of its file")
     try:
-        reference = read_reference(beside(path, file, f"{where}: reference.file"), arm.n)
+        return read_reference(beside(path, file, f"{where}: reference.file"), arm.n)
     except LogError as error:
         raise ScenarioError(f"{where}: reference.file: {error}") from error
-    if not reference.duration <= LONGEST:
-        raise ScenarioError(
-            f"{where}: reference.file lasts {reference.duration:g} s; it must be at most {LONGEST:g} s"
-        )
-    return reference
 
 
 def _places(data: ReferenceData, n: int, ranges: MotionRanges, where: str) -> Reference:
     if len(data.places) < 2 or any(len(place) != n for place in data.places):
         raise ScenarioError(f"{where}: reference.places must be two or more places of {n} numbers each")
     try:
-        reference = places_reference(data.places, ranges, dwell=data.dwell, pace=data.pace)
+        return places_reference(data.places, ranges, dwell=data.dwell, pace=data.pace)
     except ValueError as error:
         raise ScenarioError(f"{where}: reference.places: {error}") from error
-    if not reference.duration <= LONGEST:
-        raise ScenarioError(
-            f"{where}: reference.places last {reference.duration:g} s; they may take {LONGEST:g} s at most"
-        )
-    return reference

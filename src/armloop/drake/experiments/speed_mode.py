@@ -15,7 +15,7 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.drake.control.reference import TableSource
 from armloop.drake.plant.config import Instruments
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import Law, ServoGains
 from armloop.drake.plant.plant import ArmPlant
@@ -45,7 +45,7 @@ class SpeedModeArm:
         arm: Arm,
         friction: Sequence[JointFriction],
         *,
-        effects: Sequence[UndeclaredEffect] = (),
+        effects: Effects = (),
         instruments: Instruments | None = None,
         time_step: float = 1e-3,
         servo: ServoGains = STIFF,

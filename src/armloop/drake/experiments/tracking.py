@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -14,15 +13,15 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from armloop.drake.control.bounded_feedforward import BoundedReference
 from armloop.drake.control.controllers import MAIN_MODEL, Exact, controller_named, controller_of
-from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.feedforward import Models
 from armloop.drake.experiments.closed_loop import ControlledArm, add_arm_under
 from armloop.drake.experiments.metrics import Metrics, measure
 from armloop.drake.experiments.scenarios import TrackingScenario
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
-from armloop.util.workers import Pool
+from armloop.util.workers import Processes
 
 _RUNAWAY = 1e3
 """A joint faster than this has run away, rad/s (m/s): no log with such a speed would be read."""
@@ -56,7 +55,7 @@ def needs_model(controller: str) -> bool:
     return bool(controller_named(controller).models)
 
 
-def controllers_for(scenario: TrackingScenario, models: Mapping[str, FeedforwardModel]) -> list[str]:
+def controllers_for(scenario: TrackingScenario, models: Models) -> list[str]:
     """Return the controllers that `run_tracking` runs: the scenario's that have a model, then the models' own."""
     names = [name for name in scenario.controllers if controller_named(name).served_by(models)]
     own = [controller_of(name) for name in models if name not in (MAIN_MODEL, Exact.name)]
@@ -64,11 +63,7 @@ def controllers_for(scenario: TrackingScenario, models: Mapping[str, Feedforward
 
 
 def run_tracking(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
-    *,
-    processes: int = 2,
+    scenario: TrackingScenario, models: Models, effects: Effects = (), *, processes: int = 2
 ) -> dict[str, TrackingResult]:
     """Track the scenario's reference once per controller.
 
@@ -80,36 +75,12 @@ def run_tracking(
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
     names = controllers_for(scenario, models)
-    if processes <= 1 or len(names) == 1:
-        return {name: track(scenario, name, models, effects) for name in names}
-    # Arguments of the initializer are inherited by the fork: nothing needs to be picklable on the way in.
-    with Pool(min(processes, len(names)), _inherit, (scenario, models, effects)) as pool:
-        return dict(zip(names, pool.map(_track_inherited, names), strict=True))
-
-
-_inherited: tuple[TrackingScenario, Mapping[str, FeedforwardModel], Sequence[UndeclaredEffect]]
-
-
-def _inherit(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect],
-) -> None:
-    global _inherited
-    gc.freeze()  # what was inherited will not become garbage: do not walk it during the simulation
-    _inherited = (scenario, models, effects)
-
-
-def _track_inherited(controller: str) -> TrackingResult:
-    scenario, models, effects = _inherited
-    return track(scenario, controller, models, effects)
+    results = Processes(max(processes, 1)).map(lambda name: track(scenario, name, models, effects), names)
+    return dict(zip(names, results, strict=True))
 
 
 def track(
-    scenario: TrackingScenario,
-    controller: str,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
+    scenario: TrackingScenario, controller: str, models: Models, effects: Effects = ()
 ) -> TrackingResult:
     """Run one controller over the scenario's reference, starting on it.
 
@@ -117,19 +88,10 @@ def track(
     for the controller, `InputError` when the loop diverges.
     """
     run = RecordedArm(scenario, controller, models, effects)
-    simulator = Simulator(run.diagram)
-    run.systems.start_on_reference(simulator.get_mutable_context())
-    with refusing_divergence({controller: run}, simulator.get_context()):
-        simulator.Initialize()
-        simulator.AdvanceTo(scenario.reference.duration)
-    return run.result(simulator.get_context())
+    return _simulated({controller: run}, Simulator(run.diagram), scenario.reference.duration)[controller]
 
 
-def track_in_view(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    view: LiveView,
-) -> dict[str, TrackingResult]:
+def track_in_view(scenario: TrackingScenario, models: Models, view: LiveView) -> dict[str, TrackingResult]:
     """Do as `run_tracking`, all controllers at once in one simulation that a live view shows and holds to its rate."""
     builder = DiagramBuilder()
     runs = {name: RecordedArm(scenario, name, models) for name in controllers_for(scenario, models)}
@@ -137,13 +99,20 @@ def track_in_view(
         builder.AddNamedSystem(name, run.diagram)
     view.add_to(builder, {name: run.diagram for name, run in runs.items()})
     simulator = Simulator(builder.Build())
-    for run in runs.values():
-        run.systems.start_on_reference(simulator.get_mutable_context())
     view.pace(simulator)
-    with refusing_divergence(runs, simulator.get_context()):
+    return _simulated(runs, simulator, scenario.reference.duration)
+
+
+def _simulated(
+    runs: Mapping[str, RecordedArm], simulator: Simulator, duration: float
+) -> dict[str, TrackingResult]:
+    context = simulator.get_mutable_context()
+    for run in runs.values():
+        run.systems.start_on_reference(context)
+    with refusing_divergence(runs, context):
         simulator.Initialize()
-        simulator.AdvanceTo(scenario.reference.duration)
-    return {name: run.result(simulator.get_context()) for name, run in runs.items()}
+        simulator.AdvanceTo(duration)
+    return {name: run.result(context) for name, run in runs.items()}
 
 
 class RecordedArm:
@@ -155,11 +124,7 @@ class RecordedArm:
     """
 
     def __init__(
-        self,
-        scenario: TrackingScenario,
-        controller: str,
-        models: Mapping[str, FeedforwardModel],
-        effects: Sequence[UndeclaredEffect] = (),
+        self, scenario: TrackingScenario, controller: str, models: Models, effects: Effects = ()
     ) -> None:
         """See `track`."""
         self._scenario, self._controller = scenario, controller
@@ -197,17 +162,11 @@ def refusing_divergence(runs: Mapping[str, RecordedArm], root_context: Context) 
     It is looked for afterwards, in what was recorded: a look at every step would cost a tenth of the simulation. What
     ends a simulation whose numbers have ended is any system's error, and none of them says why.
     """
+    cause = None
     try:
         yield
     except Exception as error:
-        _require_no_divergence(runs, root_context, error)
-        raise
-    _require_no_divergence(runs, root_context)
-
-
-def _require_no_divergence(
-    runs: Mapping[str, RecordedArm], root_context: Context, cause: Exception | None = None
-) -> None:
+        cause = error
     for name, run in runs.items():
         time, state, _, _ = run.recorded(root_context)
         speeds = np.abs(state[:, state.shape[1] // 2 :])
@@ -217,14 +176,16 @@ def _require_no_divergence(
                 f"the loop under `{name}` diverges at t = {time[np.argmax(away)]:.3f} s: a joint is faster than "
                 f"{_RUNAWAY:g} rad/s (m/s); give it other gains"
             ) from cause
+    if cause is not None:
+        raise cause
 
 
 def add_controlled_arm(
     builder: DiagramBuilder,
     scenario: TrackingScenario,
     controller: str,
-    models: Mapping[str, FeedforwardModel],
-    effects: Sequence[UndeclaredEffect] = (),
+    models: Models,
+    effects: Effects = (),
 ) -> ControlledArm:
     """Add a scenario's plant, reference and one of its controllers, as `track` runs them.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from armloop.drake.control.reference import ReferenceSource
 from armloop.drake.control.residual_monitor import ResidualMonitor
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import TrackingResult, score
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.plant import ArmPlant
 from armloop.model import ReconstructedModel
 from armloop.monitoring.blockwise import Known
@@ -47,7 +46,7 @@ class WatchedRun:
 def run_watched(
     scenario: TrackingScenario,
     model: ReconstructedModel,
-    changes: Sequence[UndeclaredEffect],
+    changes: Effects,
     at: float,
     *,
     adapt: bool = True,

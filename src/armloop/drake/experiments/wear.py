@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armloop.drake.control.feedforward import FeedforwardModel
+from armloop.drake.control.feedforward import Models
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import controllers_for, track
 from armloop.drake.plant.friction import JointFriction
@@ -50,11 +49,7 @@ def draw_friction(friction: tuple[JointFriction, ...], spread: float, seed: int)
 
 
 def run_wear(
-    scenario: TrackingScenario,
-    models: Mapping[str, FeedforwardModel],
-    *,
-    processes: int | None = None,
-    kept: Kept | None = None,
+    scenario: TrackingScenario, models: Models, *, processes: int | None = None, kept: Kept | None = None
 ) -> WearResult:
     """Track a scenario that has a `wear` once per draw and controller; the answer depends on its seed alone.
 

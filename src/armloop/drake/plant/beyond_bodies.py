@@ -11,7 +11,7 @@ from pydrake.systems.framework import LeafSystem_
 from armloop.drake.given import require_model
 from armloop.drake.plant.friction_system import PreslidingFriction, Stop, presliding_of
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
 from armloop.laws.effects.base import number
 from armloop.laws.friction import KINDS, FrictionLaw
@@ -57,7 +57,6 @@ def BeyondBodies_(T: type) -> Any:
             widths = per_joint(smoothing, n)
             LeafSystem_[T].__init__(self, converter=converter)
             self.arm = model.arm
-            self._arguments = model, tuple(widths)
             functions = functions_of(T)
             sliding = explicit_part(model, widths)
             self._whole = ModelEquations(sliding, functions, smoothing=widths)
@@ -68,9 +67,6 @@ def BeyondBodies_(T: type) -> Any:
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             sources = {self.all_input_ports_ticket(), self.time_ticket()}
             self.DeclareVectorOutputPort("force", n, self._calc_force, sources)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
 
         def _calc_force(self, context: Any, output: Any) -> None:
             n, whole = self._n, self._whole
@@ -86,7 +82,7 @@ def BeyondBodies_(T: type) -> Any:
     return Impl
 
 
-BeyondBodies = with_signature(BeyondBodies_[None])
+BeyondBodies = BeyondBodies_[None]
 
 
 def presliding_elements(model: ReconstructedModel) -> list[Stop]:

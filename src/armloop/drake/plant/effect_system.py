@@ -12,7 +12,7 @@ from pydrake.systems.primitives import Adder
 
 from armloop.drake.given import require_of, require_order, require_plant
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature, within
+from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
 from armloop.laws.effects import Value, effect_kind
 from armloop.laws.effects.base import number
@@ -68,8 +68,8 @@ def EffectTorque_(T: type) -> Any:
             require_of(Mapping, parameters=parameters)
             LeafSystem_[T].__init__(self, converter=converter)
             self.arm = arm
-            self._arguments = arm, name, joint, dict(parameters)
-            self._options = {"other_joint": other_joint, "inertial": inertial, "smoothing": smoothing}
+            self._given["parameters"] = dict(parameters)
+            self._smoothing = smoothing
             self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
             if not effect_kind(name).simulated:
                 raise ModelError(f"effect {name} is found in logs alone; no system can have it")
@@ -85,9 +85,6 @@ def EffectTorque_(T: type) -> Any:
             for port, factor in (("tau", 1.0), ("force", -1.0)):
                 self.DeclareVectorOutputPort(port, n, partial(self._calc, factor), sources)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, **other._options, converter=converter)
-
         def _calc(self, factor: float, context: Any, output: Any) -> None:
             n, law = self._n, self._law
             state = self._state.Eval(context).tolist()
@@ -101,7 +98,7 @@ def EffectTorque_(T: type) -> Any:
             if law.friction is not None:
                 along, terms = law.friction
                 w, functions = along.of(v), functions_of(T)
-                sign = functions.tanh(w / self._options["smoothing"])
+                sign = functions.tanh(w / self._smoothing)
                 load = 0.0 if self._load is None else self._load.Eval(context).tolist()[along.joint]
                 x = Sliding(along.of(q), w, sign, context.get_time())
                 along.add(tau, torque_along(terms, x, load, functions, sharp=False))
@@ -112,7 +109,7 @@ def EffectTorque_(T: type) -> Any:
     return Impl
 
 
-EffectTorque = with_signature(EffectTorque_[None])
+EffectTorque = EffectTorque_[None]
 
 
 def add_joint_forces(

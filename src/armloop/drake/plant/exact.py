@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.friction import JointFriction
 from armloop.laws.effects import Estimate
 from armloop.laws.friction import FrictionLaw, FrictionTerm
@@ -16,9 +16,7 @@ from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
 
 
-def exact_model(
-    arm: Arm, friction: Sequence[JointFriction], effects: Sequence[UndeclaredEffect] = ()
-) -> ReconstructedModel:
+def exact_model(arm: Arm, friction: Sequence[JointFriction], effects: Effects = ()) -> ReconstructedModel:
     """Return inverse dynamics with the links' own inertias, Eq. (34) and the plant's undeclared effects.
 
     No reconstruction can do better: a reference for what is left to gain, not a controller one could have. Of a

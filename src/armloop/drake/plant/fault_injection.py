@@ -8,7 +8,7 @@ again.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -70,6 +70,10 @@ class UndeclaredEffect:
         return effect(self.name, self.joint, self.other_joint)
 
 
+Effects = Sequence[UndeclaredEffect]
+"""What a plant has and nobody declared."""
+
+
 def _fault(kind: type[Effect], given: UndeclaredEffect) -> str:
     """Return what is wrong with an effect for a plant; empty if nothing is."""
     if (given.joint is None) == kind.joint_wise:
@@ -103,7 +107,7 @@ def _wrong_parameters(kind: type[Effect], parameters: Mapping[str, Any]) -> str:
     return kind.fault(parameters)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Realisation:
     """The effects as quantities of the plant, n joints.
 
@@ -118,46 +122,41 @@ class Realisation:
 
     viscous: Array
     rotor_inertia: Array
-    laws: tuple[Placed, ...]
-    faults: tuple[Fault, ...]
-    contacts: tuple[tuple[float, float, Array], ...]
-    payloads: tuple[tuple[float, Array, float | None], ...]
-    R_WB: Array
-    own: tuple[Law, ...]
+    laws: list[Placed] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    contacts: list[tuple[float, float, Array]] = field(default_factory=list)
+    payloads: list[tuple[float, Array, float | None]] = field(default_factory=list)
+    R_WB: Array = field(default_factory=lambda: np.eye(3))
+    own: list[Law] = field(default_factory=list)
 
 
-def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
+def realise(arm: Arm, effects: Effects) -> Realisation:
     """Turn effects into what the plant of `arm` must be given; equal effects add up.
 
     Raises `ScenarioError` when a joint number is not one of the arm's.
     """
-    viscous, rotor_inertia, R_WB = np.zeros(arm.n), np.zeros(arm.n), np.eye(3)
-    laws: list[Placed] = []
-    faults: list[tuple[int, Fault]] = []
-    contacts: list[tuple[float, float, Array]] = []
-    payloads: list[tuple[float, Array, float | None]] = []
-    own: list[Law] = []
-    for given in effects:
+    made = Realisation(np.zeros(arm.n), np.zeros(arm.n))
+    for given in sorted(effects, key=lambda each: effect_kind(each.name).fault_order):
         for joint in (given.joint, given.other_joint):
             if joint is not None and not 1 <= joint <= arm.n:
                 raise ScenarioError(f"effect {given.name}: joint {joint}; {arm.name} has joints 1 to {arm.n}")
         kind, p = given.build(), given.parameters
         law = None if kind.sensor else kind.placed(p)
         if kind.sensor:
-            faults.append((kind.fault_order, partial(_falsified, kind, p)))
+            made.faults.append(partial(_falsified, kind, p))
         elif isinstance(kind, Payload):
             com = arm.X_tool[:3, :3] @ np.asarray(p["com"], dtype=float) + arm.X_tool[:3, 3]
             ball = p.get("own_inertia")
-            payloads.append((float(p["mass"]), com, None if ball is None else float(ball)))
+            made.payloads.append((float(p["mass"]), com, None if ball is None else float(ball)))
         elif isinstance(kind, GravityTilt):
-            R_WB = R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
+            made.R_WB = made.R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
         elif isinstance(kind, ExternalContact):
-            contacts.append((float(p["start"]), float(p["end"]), np.asarray(p["force"], dtype=float)))
+            made.contacts.append((float(p["start"]), float(p["end"]), np.asarray(p["force"], dtype=float)))
         elif law is None:
-            own.append(own_law(arm, kind, p))
+            made.own.append(own_law(arm, kind, p))
         else:
             # what the joints of Drake's plant have by themselves is left to them
-            simple = {"inertia": rotor_inertia, "viscous": viscous} if not law.along.ratio else {}
+            simple = {"inertia": made.rotor_inertia, "viscous": made.viscous} if not law.along.ratio else {}
             rest = []
             for term in law.terms:
                 name = "viscous" if term.element is KINDS["viscous"] else term.element.part
@@ -166,18 +165,8 @@ def realise(arm: Arm, effects: Sequence[UndeclaredEffect]) -> Realisation:
                 else:
                     rest.append(term)
             if rest:
-                laws.append(Placed(law.along, tuple(rest)))
-    in_order = tuple(fault for _, fault in sorted(faults, key=lambda item: item[0]))
-    return Realisation(
-        viscous,
-        rotor_inertia,
-        tuple(laws),
-        in_order,
-        tuple(contacts),
-        tuple(payloads),
-        R_WB,
-        tuple(own),
-    )
+                made.laws.append(Placed(law.along, tuple(rest)))
+    return made
 
 
 def _falsified(

@@ -8,7 +8,7 @@ from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.given import require_model
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.model import ReconstructedModel
 from armloop.util.given import require
@@ -64,20 +64,12 @@ def ForwardDynamics_(T: type) -> Any:
             if check:
                 require_mass_matrix(model)
             LeafSystem_[T].__init__(self, converter=converter)
-            self._model = model
-            self._options = {"smoothing": smoothing, "symmetric": symmetric}
+            # What is converted has been checked: M does not change with the scalar type.
+            self._given["check"] = False
             self._equations = equations
             n = self._n = equations.n
             self._tau = self.DeclareVectorInputPort("tau", n)
-            self.DeclareContinuousState(n, n, 0)
-            self.DeclareVectorOutputPort("state", 2 * n, self._calc_state, {self.all_state_ticket()})
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            # What is converted has been checked: M does not change with the scalar type.
-            Impl._construct(self, other._model, **other._options, check=False, converter=converter)
-
-        def _calc_state(self, context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_continuous_state_vector().CopyToVector())
+            self.DeclareStateOutputPort("state", self.DeclareContinuousState(n, n, 0))
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             state = context.get_continuous_state_vector().CopyToVector().tolist()
@@ -89,4 +81,4 @@ def ForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-ForwardDynamics = with_signature(ForwardDynamics_[None])
+ForwardDynamics = ForwardDynamics_[None]

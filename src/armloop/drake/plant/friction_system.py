@@ -7,21 +7,13 @@ from typing import Any, NamedTuple
 
 from pydrake.systems.framework import LeafSystem_
 
-from armloop.drake.given import require_of
+from armloop.drake.given import require_each, require_of
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.laws.hysteresis import stop_step
 from armloop.util.errors import InputError
 from armloop.util.given import require
-
-
-def _each_of(given: Any, kind: type, name: str) -> tuple[Any, ...]:
-    """The list that was given; raises `InputError` where it is none of things of a class."""
-    require_of(Sequence, **{name: given})
-    for k, each in enumerate(given):
-        require_of(kind, **{f"{name} {k + 1}": each})
-    return tuple(given)
 
 
 @scalar_template("JointFrictionSystem_", __name__)
@@ -46,29 +38,25 @@ def JointFrictionSystem_(T: type) -> Any:
         ) -> None:
             """friction : n joints; smoothing : rad/s (m/s)."""
             require("a number above 0", smoothing=smoothing)
-            friction = _each_of(friction, JointFriction, "friction")
+            require_of(Sequence, friction=friction)
+            require_each(JointFriction, friction, "friction")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = friction, smoothing
-            self._n = len(self._arguments[0])
+            self._friction, self._smoothing, self._n = tuple(friction), smoothing, len(friction)
             self._state = self.DeclareVectorInputPort("state", 2 * self._n)
             self.DeclareVectorOutputPort("force", self._n, self._calc_force, {self.all_input_ports_ticket()})
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
-
         def _calc_force(self, context: Any, output: Any) -> None:
-            friction, smoothing = self._arguments
             functions = functions_of(T)
             force = [
-                -(f.level(v, functions) * functions.tanh(v / smoothing) + f.viscous * v)
-                for f, v in zip(friction, self._state.Eval(context).tolist()[self._n :], strict=True)
+                -(f.level(v, functions) * functions.tanh(v / self._smoothing) + f.viscous * v)
+                for f, v in zip(self._friction, self._state.Eval(context).tolist()[self._n :], strict=True)
             ]
             output.SetFromVector(vector(T, force))
 
     return Impl
 
 
-JointFrictionSystem = with_signature(JointFrictionSystem_[None])
+JointFrictionSystem = JointFrictionSystem_[None]
 
 
 class Stop(NamedTuple):
@@ -106,7 +94,8 @@ def PreslidingFriction_(T: type) -> Any:
             """n : joints; elements : any number of `Stop`; period : s."""
             require("a whole number above 0", n=n)
             require("a number above 0", period=period)
-            elements = _each_of(elements, Stop, "elements")
+            require_of(Sequence, elements=elements)
+            require_each(Stop, elements, "elements")
             for e in elements:
                 require("a whole number", joint=e.joint)
                 require("a number above 0", width=e.width)
@@ -114,24 +103,21 @@ def PreslidingFriction_(T: type) -> Any:
                 if not 1 <= e.joint <= n or e.level < 0:
                     raise InputError(f"{e}: joint must be from 1 to {n}, level at least 0 and width above 0")
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = n, elements, period
+            self._n, self._elements = n, tuple(elements)
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self.DeclareDiscreteState(n + len(elements))
             self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
             sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
             self.DeclareVectorOutputPort("force", n, self._calc_force, sources)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, *other._arguments, converter=converter)
-
         def set_relaxed(self, context: Any, q: Any) -> None:
             """Relax all elements at the positions q (n,), in this system's own context."""
-            memory = [*q, *(0.0 for _ in self._arguments[1])]
+            memory = [*q, *(0.0 for _ in self._elements)]
             context.SetDiscreteState(vector(T, memory))
 
         def _stretched(self, context: Any) -> tuple[list[Any], list[Any]]:
             """Return the positions now, and z of each element."""
-            n, elements, _ = self._arguments
+            n, elements = self._n, self._elements
             q = self._state.Eval(context).tolist()[:n]
             memory = context.get_discrete_state_vector().CopyToVector().tolist()
             z = [
@@ -145,16 +131,15 @@ def PreslidingFriction_(T: type) -> Any:
             discrete.set_value(vector(T, [*q, *z]))
 
         def _calc_force(self, context: Any, output: Any) -> None:
-            n, elements, _ = self._arguments
-            force: list[Any] = [0.0] * n
-            for e, z in zip(elements, self._stretched(context)[1], strict=True):
+            force: list[Any] = [0.0] * self._n
+            for e, z in zip(self._elements, self._stretched(context)[1], strict=True):
                 force[e.joint - 1] = force[e.joint - 1] - e.level / e.width * z
             output.SetFromVector(vector(T, force))
 
     return Impl
 
 
-PreslidingFriction = with_signature(PreslidingFriction_[None])
+PreslidingFriction = PreslidingFriction_[None]
 
 
 def presliding_of(terms: Sequence[Sequence[Any]]) -> list[Stop]:

@@ -7,6 +7,7 @@ of joints they are several times faster than arrays.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -36,9 +37,14 @@ class ClampedLaw(NamedTuple):
     ratio: float = 0.0
 
     @staticmethod
-    def dry(along: Direction, level: float) -> ClampedLaw:
+    def along(direction: Direction, command: float, slope: float, limit: float = math.inf) -> ClampedLaw:
+        """Return a law along a direction."""
+        return ClampedLaw(direction.joint, command, slope, limit, direction.other, direction.ratio)
+
+    @staticmethod
+    def dry(direction: Direction, level: float) -> ClampedLaw:
         """Return dry friction of a level along a direction: a joint that sticks creeps at its load / `STICKING_GAIN`."""
-        return ClampedLaw(along.joint, 0.0, STICKING_GAIN, level, along.other, along.ratio)
+        return ClampedLaw(direction.joint, 0.0, STICKING_GAIN, level, direction.other, direction.ratio)
 
     def speed(self, v: Sequence[float]) -> float:
         """Return w of the joints' velocities (n,)."""

@@ -81,8 +81,6 @@ def JointLoads_(T: type) -> Any:
             LeafSystem_[T].__init__(self, converter=converter)
             n = len(friction)
             self._n = n
-            self._arguments = plant, friction
-            self._options = {"effects": effects, "servo": servo, "X_tool": X_tool, "law": law}
             # a clone predicts with the same plant, a conversion with one of its own scalar type
             plant = plant if isinstance(plant, MultibodyPlant_[T]) else plant.ToScalarType[T]()
             self._plant = plant
@@ -93,23 +91,10 @@ def JointLoads_(T: type) -> Any:
             self._damping = [self._step * drive.joint().default_damping() for drive in drives]
             # Python's own floats throughout: numpy's scalars take three times as long.
             self._rubbing = _rubbing(friction, effects.laws)
-            self._explicit_laws = [
-                Placed(along, soft)
-                for along, terms in effects.laws
-                if (soft := tuple(t for t in terms if t.element.part == "position"))
-            ]
-            self._memories = [
-                (along, term)
-                for along, terms in effects.laws
-                for term in terms
-                if term.element.way == "memory"
-            ]
-            self._rotors = [
-                (along, t.coefficient)
-                for along, terms in effects.laws
-                for t in terms
-                if t.element.part == "inertia"
-            ]
+            acting = [(along, term) for along, terms in effects.laws for term in terms]
+            self._soft = [(along, term) for along, term in acting if term.element.part == "position"]
+            self._memories = [(along, term) for along, term in acting if term.element.way == "memory"]
+            self._rotors = [(along, t.coefficient) for along, t in acting if t.element.part == "inertia"]
             self._contacts = effects.contacts
             self._tool = np.asarray(X_tool)[:3, 3]
             self._laws = [*effects.own, *([] if law is None else [law])]
@@ -124,10 +109,6 @@ def JointLoads_(T: type) -> Any:
                 # Not a number until the first step: an element is relaxed where the motion starts.
                 self.DeclareDiscreteState(np.full(2 * len(self._memories), np.nan))
                 self.DeclarePeriodicDiscreteUpdateEvent(self._step, 0.0, self._stretch_on)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            plant, friction = other._arguments
-            Impl._construct(self, plant, friction, **other._options, converter=converter)
 
         def relax(self, context: Any) -> None:
             """Let elasto-plastic elements forget what they went through."""
@@ -155,9 +136,9 @@ def JointLoads_(T: type) -> Any:
         def _explicit(self, context: Any, q: list[float], v: list[float]) -> list[float]:
             """What the effects do that is soft enough to be taken at the step's start."""
             load, functions = [0.0] * self._n, functions_of(T)
-            for along, terms in self._explicit_laws:
+            for along, term in self._soft:
                 x = Sliding(along.of(q), 0.0, 0.0)
-                along.add(load, -torque_along(terms, x, 0.0, functions))
+                along.add(load, -torque_along([term], x, 0.0, functions))
             if self._memories:
                 for (along, term), z in zip(self._memories, self._stretches(context, q), strict=True):
                     x = Sliding(along.of(q), along.of(v), z / term.parameter, context.get_time())
@@ -166,19 +147,13 @@ def JointLoads_(T: type) -> Any:
                 load = [x - y for x, y in zip(load, law(q, v), strict=True)]
             for start, end, force in self._contacts:
                 if start <= context.get_time() < end:
-                    push = self._jacobian().T @ force
-                    load = [x + y for x, y in zip(load, push.tolist(), strict=True)]
+                    plant, world = self._plant, self._plant.world_frame()
+                    last = plant.GetFrameByName(f"link_{self._n}")
+                    J = plant.CalcJacobianTranslationalVelocity(
+                        self._scratch, JacobianWrtVariable.kV, last, self._tool, world, world
+                    )
+                    load = [x + y for x, y in zip(load, (J.T @ force).tolist(), strict=True)]
             return load
-
-        def _jacobian(self) -> Array:
-            """(3, n) of the tool's origin in the base frame, at the scratch context's posture."""
-            plant, world = self._plant, self._plant.world_frame()
-            last = plant.GetFrameByName(f"link_{self._n}")
-            return np.asarray(
-                plant.CalcJacobianTranslationalVelocity(
-                    self._scratch, JacobianWrtVariable.kV, last, self._tool, world, world
-                )
-            )
 
         def predict_with(self, inertia: Any, damping: Sequence[float]) -> None:
             """Let the last link have another spatial inertia, and the joints another damping (n,); float only."""
@@ -200,15 +175,10 @@ def JointLoads_(T: type) -> Any:
             bias = plant.CalcBiasTerm(scratch) - plant.CalcGravityGeneralizedForces(scratch)
             momentum = (inertia.dot(known[n:]) - h * bias).tolist()
             A = inertia.tolist()
-            laws: list[ClampedLaw] = []
-            pieces: list[int] = []
-            for along, rotor in self._rotors:
-                speed = along.of(v)
-                laws.append(
-                    ClampedLaw(along.joint, rotor * speed / h, rotor / h, math.inf, along.other, along.ratio)
-                )
-                pieces.append(0)
-            by_load = []
+            laws = [
+                ClampedLaw.along(along, rotor * along.of(v) / h, rotor / h) for along, rotor in self._rotors
+            ]
+            pieces, by_load = [0] * len(laws), []
             for rubbing in self._rubbing:
                 along, w = rubbing.along, rubbing.along.of(v)
                 if rubbing.alone is not None:
@@ -219,9 +189,7 @@ def JointLoads_(T: type) -> Any:
                 level, more = rubbing.level(x, functions), rubbing.more
                 if rubbing.smooth:
                     torque, slope = rubbing.smoothly(x, functions)
-                    laws.append(
-                        ClampedLaw(along.joint, slope * w - torque, slope, math.inf, along.other, along.ratio)
-                    )
+                    laws.append(ClampedLaw.along(along, slope * w - torque, slope))
                     pieces.append(0)
                 if more:
                     by_load.append((len(laws), along, level, torque_along(more, x, 1.0, functions)))

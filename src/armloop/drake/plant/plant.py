@@ -18,14 +18,13 @@ from pydrake.multibody.tree import (
     FixedOffsetFrame,
     PrismaticJoint,
     RevoluteJoint,
-    RotationalInertia,
     SpatialInertia,
     UnitInertia,
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from armloop.drake.given import require_of
-from armloop.drake.plant.fault_injection import Realisation, UndeclaredEffect, realise
+from armloop.drake.given import require_each, require_of
+from armloop.drake.plant.fault_injection import Effects, Realisation, UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.joint_loads import JointLoads, Law, ServoGains
 from armloop.robot.arm import Arm
@@ -63,7 +62,7 @@ class ArmPlant(Diagram):
         arm: Arm,
         friction: Sequence[JointFriction],
         *,
-        effects: Sequence[UndeclaredEffect] = (),
+        effects: Effects = (),
         time_step: float = 1e-3,
         servo: ServoGains | None = None,
         law: Law | None = None,
@@ -80,10 +79,8 @@ class ArmPlant(Diagram):
         """
         require_of(Arm, arm=arm)
         require_of(Sequence, friction=friction, effects=effects)
-        for j, each in enumerate(friction):
-            require_of(JointFriction, **{f"friction of joint {j + 1}": each})
-        for k, effect in enumerate(effects):
-            require_of(UndeclaredEffect, **{f"effect {k + 1}": effect})
+        require_each(JointFriction, friction, "friction of joint")
+        require_each(UndeclaredEffect, effects, "effect")
         require("a number above 0", time_step=time_step)
         super().__init__()
         if len(friction) != arm.n:
@@ -116,17 +113,10 @@ class ArmPlant(Diagram):
 
     def _connect(self, builder: DiagramBuilder) -> None:
         plant, effects = self.plant, self.effects
-        loads = self._loads = builder.AddNamedSystem(
-            "loads",
-            JointLoads(
-                plant,
-                self.friction,
-                servo=self._servo,
-                effects=effects,
-                X_tool=self.arm.X_tool,
-                law=self._law,
-            ),
+        loads = JointLoads(
+            plant, self.friction, effects=effects, servo=self._servo, X_tool=self.arm.X_tool, law=self._law
         )
+        self._loads = builder.AddNamedSystem("loads", loads)
         builder.Connect(plant.get_state_output_port(), loads.GetInputPort("state"))
         builder.Connect(loads.get_output_port(), plant.get_applied_generalized_force_input_port())
         if self._servo is None:
@@ -159,7 +149,7 @@ class ArmPlant(Diagram):
         self.plant.SetPositionsAndVelocities(context, np.concatenate([q, v]))
         self._loads.relax(self._loads.GetMyMutableContextFromRoot(root_context))
 
-    def begin(self, root_context: Context, effects: Sequence[UndeclaredEffect]) -> None:
+    def begin(self, root_context: Context, effects: Effects) -> None:
         """Let effects begin in a running simulation: payloads, viscous friction; in addition to those there are.
 
         They stay with this plant: a simulation from the start needs a new one.
@@ -224,12 +214,8 @@ def _spatial_inertia(mass: float, com: Array, inertia: Array) -> SpatialInertia:
     """Return a link's spatial inertia; `inertia` is about the link frame's origin."""
     if mass <= 0:
         return SpatialInertia.Zero()
-    rotational = RotationalInertia(
-        inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]
-    )
-    unit = UnitInertia()
-    unit.SetFromRotationalInertia(rotational, mass)
-    return SpatialInertia(mass, com, unit)
+    G = inertia / mass
+    return SpatialInertia(mass, com, UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2]))
 
 
 def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
@@ -237,9 +223,6 @@ def _payload(mass: float, com: Array, own: float | None) -> SpatialInertia:
     if mass <= 0:
         return SpatialInertia.Zero()
     if own is None:
-        return SpatialInertia.SolidSphereWithDensity(PAYLOAD_DENSITY, _radius(mass)).Shift(-com)
+        radius = np.cbrt(3.0 * mass / (4.0 * np.pi * PAYLOAD_DENSITY))
+        return SpatialInertia.SolidSphereWithMass(mass, radius).Shift(-com)
     return SpatialInertia(mass, np.zeros(3), UnitInertia(*[own / mass] * 3)).Shift(-com)
-
-
-def _radius(mass: float) -> float:
-    return float((3.0 * mass / (4.0 * np.pi * PAYLOAD_DENSITY)) ** (1.0 / 3.0))

@@ -10,7 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 from armloop.drake.given import require_model
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
 from armloop.drake.scalar_types import scalar_template
-from armloop.drake.scalars import functions_of, vector, with_signature
+from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations, require_mass_matrix
 from armloop.dynamics.model import solve
 from armloop.model import ReconstructedModel
@@ -56,7 +56,8 @@ def StickingForwardDynamics_(T: type) -> Any:
             if check:
                 require_mass_matrix(model)
             LeafSystem_[T].__init__(self, converter=converter)
-            self._arguments = model, time_step
+            # What is converted has been checked: M does not change with the scalar type.
+            self._given["check"] = False
             self._equations = ModelEquations(model, functions_of(T), sharp=True, symmetric=True)
             self._step = float(time_step)
             n = self._n = model.arm.n
@@ -64,10 +65,6 @@ def StickingForwardDynamics_(T: type) -> Any:
             index = self.DeclareDiscreteState(2 * n)
             self.DeclarePeriodicDiscreteUpdateEvent(time_step, 0.0, self._update)
             self.DeclareStateOutputPort("state", index)
-
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            # What is converted has been checked: M does not change with the scalar type.
-            Impl._construct(self, *other._arguments, check=False, converter=converter)
 
         def _update(self, context: Any, discrete: Any) -> None:
             n, h, equations = self._n, self._step, self._equations
@@ -91,4 +88,4 @@ def StickingForwardDynamics_(T: type) -> Any:
     return Impl
 
 
-StickingForwardDynamics = with_signature(StickingForwardDynamics_[None])
+StickingForwardDynamics = StickingForwardDynamics_[None]

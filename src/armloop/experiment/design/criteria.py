@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.special import logsumexp, softmax
 
 from armloop.util.arrays import TINY, Array
 
@@ -48,7 +49,7 @@ def smooth_condition(F: Array) -> tuple[float, Array]:
     """
     values, vectors = _eigen(F)
     log = np.log(values)
-    high, low = _softmax(_SHARPNESS * log), _softmax(-_SHARPNESS * log)
+    high, low = softmax(_SHARPNESS * log), softmax(-_SHARPNESS * log)
     most = float(high @ log) - float(low @ log)
     spread = (
         high * (1 + _SHARPNESS * (log - high @ log)) - low * (1 - _SHARPNESS * (log - low @ log))
@@ -101,10 +102,9 @@ def unexplained(confounded: Sequence[tuple[int, Sequence[int]]], enough: float) 
             slope[column, column] -= 1 / whole
             values.append(np.log(left / whole))
             slopes.append(slope)
-        weights = _softmax(-_WORST * np.array(values))
         # the soft minimum, whose slope has just these weights
-        least = -(np.log(np.exp(-_WORST * (np.array(values) - min(values))).sum()) / _WORST) + min(values)
-        return float(least), np.asarray(np.tensordot(weights, np.array(slopes), axes=1))
+        worse = -_WORST * np.array(values)
+        return -float(logsumexp(worse)) / _WORST, np.tensordot(softmax(worse), np.array(slopes), axes=1)
 
     return measure
 
@@ -136,8 +136,3 @@ def _eigen(F: Array) -> tuple[Array, Array]:
 
 def _with(vectors: Array, weights: Array) -> Array:
     return np.asarray((vectors * weights) @ vectors.T)
-
-
-def _softmax(x: Array) -> Array:
-    e = np.exp(x - x.max())
-    return np.asarray(e / e.sum())

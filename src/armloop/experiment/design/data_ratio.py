@@ -40,15 +40,20 @@ class DataRatio:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values; a ratio beyond the largest amount of data that was tried is null."""
-        low, middle, high = np.quantile(self.ratios, [0.1, 0.5, 0.9], method="nearest")
         return {
-            **finite({"median": middle, "low": low, "high": high}),
+            **spread(self.ratios),
             "most": int(self.trajectories[-1]),
             "error": {
                 "optimised": finite(_rms(self.optimised)),
                 "random": finite(np.median(_rms(self.random), axis=0)),
             },
         }
+
+
+def spread(values: Array | list[float]) -> dict[str, float | None]:
+    """The median, and what a tenth lies below (low) and above (high); null where that is infinite."""
+    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="nearest")
+    return finite({"median": median, "low": low, "high": high})
 
 
 def data_ratio(

@@ -10,7 +10,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.experiment.design.columns import double_feature_columns, rigid_body_columns
 from armloop.experiment.design.criteria import CRITERIA, ROUND_OFF, condition_number
-from armloop.experiment.design.data_ratio import DataRatio, data_ratio
+from armloop.experiment.design.data_ratio import DataRatio, data_ratio, spread
 from armloop.experiment.design.information import Regression
 from armloop.experiment.design.limits import LIMITED, Limits, TorqueLaw, check_rest, nominal_torque
 from armloop.experiment.design.optimise import Problem
@@ -100,7 +100,7 @@ class Excitation:
             "harmonics": self.timing.harmonics,
             # a measure is infinite where some coefficients are not determined at all
             **{key: finite(getattr(self.measure, key)) for key in table},
-            "random": {key: _spread(values) for key, values in table.items()},
+            "random": {key: {**spread(values), "count": len(values)} for key, values in table.items()},
             "use": dict(zip(LIMITED, self.use.tolist(), strict=True)),
             "notes": self.notes,
         }
@@ -213,8 +213,3 @@ def _effort_notes(arm: Arm, torque: TorqueLaw) -> list[str]:
     if len(unlimited) < arm.n and not arm.mass.any() and not arm.inertia.any():
         notes.append("the URDF states no inertias: the predicted torque is zero and its limits say nothing")
     return notes
-
-
-def _spread(values: list[float]) -> dict[str, float | None]:
-    low, median, high = np.quantile(values, [0.1, 0.5, 0.9], method="nearest")
-    return finite({"median": median, "low": low, "high": high, "count": len(values)})

@@ -88,14 +88,8 @@ class Limits:
         """(n,) shift of the centre and factor of the amplitude that make each joint keep its range."""
         motion = _motion(reference, step)
         low, high = (motion.q - reference.offset).min(axis=0), (motion.q - reference.offset).max(axis=0)
-        need = np.maximum.reduce(
-            [
-                (high - low) / (self.ranges.upper - self.ranges.lower),
-                np.abs(motion.v).max(axis=0) / self.ranges.velocity,
-                np.abs(motion.vdot).max(axis=0) / self.ranges.acceleration,
-            ]
-        )
-        size = (1 - _MARGIN) / np.maximum(need, 1 - _MARGIN)
+        used = self.ranges.used(motion.q, motion.v, motion.vdot)
+        size = (1 - _MARGIN) / np.maximum(used, 1 - _MARGIN)
         inside = 0.4 * _MARGIN * (self.ranges.upper - self.ranges.lower)
         lowest, highest = self.ranges.lower + inside - size * low, self.ranges.upper - inside - size * high
         return np.clip(reference.offset, lowest, highest) - reference.offset, size

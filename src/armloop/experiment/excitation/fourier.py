@@ -73,11 +73,7 @@ def fourier_reference(
     )
     t = np.arange(0.0, duration + 0.005, 0.005)
     q, v, vdot = draft.evaluate(t)
-    travel = np.ptp(q, axis=0) / (ranges.upper - ranges.lower)
-    tightest = np.maximum.reduce(
-        [travel, np.abs(v).max(axis=0) / ranges.velocity, np.abs(vdot).max(axis=0) / ranges.acceleration]
-    )
-    scale = fill / tightest
+    scale = fill / ranges.used(q, v, vdot)
     low = ranges.lower - scale * q.min(axis=0)
     high = ranges.upper - scale * q.max(axis=0)
     offset = low + (high - low) * rng.uniform(0.1, 0.9, n)

@@ -42,6 +42,12 @@ class MotionRanges:
         """Number of joints."""
         return len(self.lower)
 
+    def used(self, q: Array, v: Array, vdot: Array) -> Array:
+        """Return (n,) the largest part of a joint's travel, velocity and acceleration that a motion (N, n) takes."""
+        parts = np.ptp(q, axis=0), np.abs(v).max(axis=0), np.abs(vdot).max(axis=0)
+        limits = self.upper - self.lower, self.velocity, self.acceleration
+        return np.maximum.reduce([part / limit for part, limit in zip(parts, limits, strict=True)])
+
     @staticmethod
     def of(arm: Arm) -> MotionRanges:
         """Return ranges for an arm without stated ones: nine tenths of its travel, half its speed.

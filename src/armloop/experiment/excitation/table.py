@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,32 +56,28 @@ class TableReference:
     def evaluate(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return q, v, vdot, each (N, n), at the times `t` (N,)."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
-        row = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, len(self.time) - 2)
-        step = (self.time[row + 1] - self.time[row])[:, None]
-        u = np.clip((t - self.time[row])[:, None] / step, 0.0, 1.0)
-        c = self._quintics[:, row]
-        q = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
-        v = (c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))) / step
-        vdot = (2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))) / step**2
+        q, v, vdot = (self._quintics(np.clip(t, self.time[0], self.time[-1]), order) for order in range(3))
         outside = ((t < self.time[0]) | (t > self.time[-1]))[:, None]
         return q, np.where(outside, 0.0, v), np.where(outside, 0.0, vdot)
 
     @cached_property
-    def _quintics(self) -> Array:
-        """(6, N - 1, n) coefficients in the part of the step that has passed, 0 to 1."""
+    def _quintics(self) -> Any:
+        from scipy.interpolate import PPoly  # most of what imports this room reads no table
+
         h = np.diff(self.time)[:, None]
         q0, v0, a0 = self.q[:-1], h * self.v[:-1], h**2 * self.vdot[:-1]
         v1, a1 = h * self.v[1:], h**2 * self.vdot[1:]
         d = self.q[1:] - q0
-        return np.stack(
-            [
-                q0,
-                v0,
-                0.5 * a0,
-                10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
-                -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
-                6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1),
-            ]
+        c = [  # in the part of the step that has passed, 0 to 1
+            6 * d - 3 * (v0 + v1) - 0.5 * (a0 - a1),
+            -15 * d + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
+            10 * d - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
+            0.5 * a0,
+            v0,
+            q0,
+        ]
+        return PPoly(
+            np.stack([x / h**power for x, power in zip(c, range(5, -1, -1), strict=True)]), self.time
         )
 
 

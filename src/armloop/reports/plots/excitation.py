@@ -47,15 +47,7 @@ def data_figure(ratio: DataRatio, result: Excitation) -> Figure:
     axes = panels(made, 1, 1)[0, 0]
     seconds = result.timing.period * ratio.trajectories
     each = np.sqrt(np.mean(ratio.random**2, axis=1))
-    for k, errors in enumerate(each):
-        axes.plot(
-            seconds,
-            errors,
-            color=GREY,
-            linewidth=0.9,
-            alpha=0.45,
-            label="random, each order" if k == 0 else None,
-        )
+    axes.plot(seconds, each.T, color=GREY, linewidth=0.9, alpha=0.45, label="random, each order")
     axes.plot(seconds, np.median(each, axis=0), color=INK, linewidth=2, label="random, median")
     ours = np.sqrt(np.mean(ratio.optimised**2, axis=0))
     axes.plot(seconds, ours, color=BLUE, linewidth=2, label="optimised, repeated")

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from armloop.diagnosis import Closing, Diagnosis
-from armloop.reports.plots.style import BLUE, GREY, figure, legend, panels, polish, thin, with_gaps
+from armloop.reports.plots.style import BLUE, GREY, figure, legend, panels, polish, trace
 from armloop.reports.residuals import time_axis
 from armloop.reports.words import number, unit
 
@@ -21,21 +21,10 @@ def feedforward_figure(diagnosis: Diagnosis, compensation: Closing) -> Figure:
     column = panels(made, len(changed), 1, sharex=True)[:, 0]
     for axes, j in zip(column, changed, strict=True):
         u = unit(diagnosis.model.arm.joints[j].torque_unit)
-        axes.plot(
-            *thin(*with_gaps(time, samples.tau[:, j])),
-            color=GREY,
-            linewidth=2.4,
-            alpha=0.7,
-            label="measured",
-            rasterized=True,
-        )
-        axes.plot(
-            *with_gaps(time[change.rows], change.torque[:, j]),
-            color=BLUE,
-            linewidth=1.1,
-            label="what the controller now adds",
-            rasterized=True,
-        )
+        pale = {"color": GREY, "linewidth": 2.4, "alpha": 0.7}
+        trace(axes, time, samples.tau[:, j], label="measured", rasterized=True, **pale)
+        added, label = change.torque[:, j], "what the controller now adds"
+        trace(axes, time[change.rows], added, color=BLUE, linewidth=1.1, label=label, rasterized=True)
         axes.margins(x=0.01)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         title = f"Joint {j + 1}: {number(change.rms[j])} {u} RMS"

@@ -21,10 +21,9 @@ from armloop.reports.plots.style import (
     panels,
     percent_tick,
     polish,
+    room_for,
 )
 from armloop.reports.words import percent
-
-_INCHES_PER_LETTER = 0.085
 
 
 def ladder_figure(comparisons: Sequence[Mapping[str, Any]]) -> Figure:
@@ -34,7 +33,7 @@ def ladder_figure(comparisons: Sequence[Mapping[str, Any]]) -> Figure:
     """
     names = [str(one["rung"]) for one in comparisons]
     made = figure(9.5, 1.25 + 0.36 * len(comparisons))
-    axes = panels(made, left=0.4 + _INCHES_PER_LETTER * max(map(len, names), default=0))[0, 0]
+    axes = panels(made, left=room_for(names))[0, 0]
     for k, one in enumerate(comparisons):
         taken = one["refused"] is None and bool(one["joints"])
         led = one["after"] if one["refused"] is None else one["refused"]

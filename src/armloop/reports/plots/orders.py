@@ -13,7 +13,6 @@ from armloop.reports.words import percent
 
 # Labels that stand level below a panel; more of them stand upright.
 _MOST_LEVEL = 5
-_ROMAN = {1: "I", 2: "II", 3: "III"}
 
 
 def has_trials(reports: Sequence[StepReport]) -> bool:
@@ -30,12 +29,8 @@ def orders_figure(reports: Sequence[StepReport], reference: Sequence[StepReport]
     for report in reports:
         if report.trials:
             key = str(report.trials)
-            name = (
-                f"{searches[key][0]} + {_ROMAN[report.step]}"
-                if key in searches
-                else f"Step {_ROMAN[report.step]}"
-            )
-            searches[key] = (name, report)
+            before = f"{searches[key][0]} +" if key in searches else "Step"
+            searches[key] = (f"{before} {'I' * report.step}", report)
     shown = [*searches.values(), *(("One-shot SINDy", report) for report in reference[:1] if report.trials)]
     upright = any(len(report.trials) > _MOST_LEVEL for _, report in shown)
     made = figure(max(4.6, 3.3 * len(shown)), 3.7 if upright else 3.3)

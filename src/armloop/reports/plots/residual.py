@@ -22,10 +22,9 @@ from armloop.reports.plots.style import (
     legend,
     panels,
     polish,
-    thin,
-    with_gaps,
+    trace,
 )
-from armloop.reports.residuals import held_out_residuals, joint_load, moving_joints, time_axis
+from armloop.reports.residuals import held_out_residuals, joint_load, longest_run, moving_joints, time_axis
 from armloop.reports.words import unit
 from armloop.util.arrays import Array
 
@@ -50,15 +49,14 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
         _band(axes, float(scale[j]))
         if diagnosis.contacts:
             # Contacts happen at rest, too: there the residual is no measure of the model, but it shows the push.
-            line = thin(*with_gaps(time, whole[:, j]))
-            axes.plot(*line, color=GREY, linewidth=0.9, label="all samples, at rest too", rasterized=True)
+            label = "all samples, at rest too"
+            trace(axes, time, whole[:, j], color=GREY, linewidth=0.9, label=label, rasterized=True)
         for contact in diagnosis.contacts:
             start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
             inside = time[contact.rows & (samples.motion.time >= start) & (samples.motion.time <= end)]
             axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="event")
         for values, color, label in series:
-            line = thin(*with_gaps(time[rows], values[:, j]))
-            axes.plot(*line, color=color, linewidth=0.9, label=label, rasterized=True)
+            trace(axes, time[rows], values[:, j], color=color, linewidth=0.9, label=label, rasterized=True)
         axes.margins(x=0.01)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         u = unit(joint.torque_unit)
@@ -150,7 +148,7 @@ def _cloud(axes: Axes, x: Array, y: Array, color: str, label: str) -> None:
 def _spectra(axes: Axes, diagnosis: Diagnosis, rows: NDArray[np.intp], series: Series, j: int) -> None:
     """Amplitude density of the longest run; the samples at standstill count as zero."""
     samples, scale = diagnosis.samples, float(diagnosis.evidence.scale[j])
-    run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
+    run = longest_run(samples.motion)
     inside = (rows >= run.start) & (rows < run.stop)
     period = samples.period * float(np.median(np.diff(rows[inside]))) if inside.sum() > 1 else samples.period
     length = min(int(inside.sum()), max(64, round(_SPECTRUM_SECONDS / period)))

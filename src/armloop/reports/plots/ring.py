@@ -122,26 +122,24 @@ def _track(page: Axes, places: Sequence[tuple[float, float]]) -> None:
             linewidth=15,
         )
     )
-    for k, (x, y) in enumerate(places):
-        to_x, to_y = places[(k + 1) % len(places)]
-        if abs(to_y - y) > 0.1:  # down on the right, up on the left
-            at = x + 0.5 * _CARD_WIDTH
-            start, end = sorted((y, to_y))
-            tail, tip = (start + _CARD_HEIGHT + 0.22, end - 0.22)
-            ends = ((at, tip), (at, tail)) if to_y < y else ((at, tail), (at, tip))
-        else:
-            step = np.sign(to_x - x)
-            gap = x + _CARD_WIDTH if step > 0 else x
-            other = to_x if step > 0 else to_x + _CARD_WIDTH
-            level = y + 0.5 * _CARD_HEIGHT
-            ends = ((gap + 0.06 * step, level), (other - 0.04 * step, level))
-        _arrow(page, *ends)
+    half, apart = 0.5 * np.array([_CARD_WIDTH, _CARD_HEIGHT]), np.array([0.05, 0.22])
+    centres = np.array(places) + half
+    for here, there in zip(centres, np.roll(centres, -1, axis=0), strict=True):
+        to_edge = np.sign(np.round(there - here, 6)) * (half + apart)
+        _arrow(page, here + to_edge, there - to_edge)
 
 
-def _arrow(page: Axes, tail: tuple[float, float], tip: tuple[float, float]) -> None:
+def _arrow(page: Axes, tail: Sequence[float] | Array, tip: Sequence[float] | Array) -> None:
     page.add_patch(
         FancyArrowPatch(
-            tail, tip, arrowstyle="-|>", mutation_scale=17, color=INK, linewidth=2, shrinkA=0, shrinkB=0
+            (tail[0], tail[1]),
+            (tip[0], tip[1]),
+            arrowstyle="-|>",
+            mutation_scale=17,
+            color=INK,
+            linewidth=2,
+            shrinkA=0,
+            shrinkB=0,
         )
     )
 

@@ -40,7 +40,6 @@ DASHES, HATCHES = ("-", (0, (5, 2)), (0, (1.5, 1.5))), ("", "////", "....")
 #: More points than this on a line cannot be seen.
 MOST_POINTS = 2000
 _LETTERS = 9.5  # points
-_LEGEND: dict[str, Any] = {"frameon": False, "fontsize": _LETTERS}
 #: Sizes of a figure's legend in inches: of a row, what stands before a label, between columns, and left and right of all.
 _ROW, _HANDLE, _BETWEEN, _SIDES = 0.21, 0.37, 0.27, 0.17
 
@@ -49,16 +48,16 @@ def controller_colors(names: Sequence[str]) -> dict[str, str]:
     """A colour per controller; the paper's three always have the same.
 
     No more than six stay apart for colour-blind eyes and on a dark page: what comes after has them again, see
-    :func:`rounds`.
+    :func:`apart`.
     """
     fixed = {"pid": ORANGE, "pid_step1": GREEN, "pid_step3": BLUE}
     spare = cycle([PINK, VIOLET, BROWN, GREEN, ORANGE, BLUE])
     return {name: fixed.get(name) or next(spare) for name in names}
 
 
-def rounds(colors: Sequence[str]) -> list[int]:
-    """How many before each have its colour: their lines are :data:`DASHES` apart, their bars :data:`HATCHES`."""
-    return [colors[:k].count(color) for k, color in enumerate(colors)]
+def apart(colors: Sequence[str], styles: Sequence[Any]) -> list[Any]:
+    """A style for each colour, another one wherever it comes again."""
+    return [styles[colors[:k].count(color) % len(styles)] for k, color in enumerate(colors)]
 
 
 def figure(width: float = 10.0, height: float = 4.0) -> Figure:
@@ -100,6 +99,11 @@ def panels(
     return np.asarray(axes, dtype=object)
 
 
+def room_for(names: Sequence[str]) -> float:
+    """Inches left of a panel whose rows have names."""
+    return 0.4 + 0.085 * max(map(len, names), default=0)
+
+
 def polish(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "", grid: Grid = "both") -> Axes:
     """Give axes the common look: no box, a light grid, quiet ticks."""
     axes.set_facecolor("none")
@@ -125,10 +129,11 @@ def annotate(axes: Axes, text: str, at: tuple[float, float], offset: tuple[float
 
 def legend_row(made: Figure, artists: Sequence[Artist], labels: Sequence[str], columns: int) -> Legend:
     """Add a frameless legend above a figure's axes, row by row; matplotlib fills it column by column."""
+    how: dict[str, Any] = {"frameon": False, "fontsize": _LETTERS, "labelcolor": INK}
     where: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.02, 1.0)}
     order = _by_columns(len(labels), columns)
     names = [labels[k] for k in order]
-    return made.legend([artists[k] for k in order], names, ncols=columns, labelcolor=INK, **_LEGEND, **where)
+    return made.legend([artists[k] for k in order], names, ncols=columns, **how, **where)
 
 
 def _by_columns(count: int, columns: int) -> list[int]:
@@ -165,20 +170,17 @@ def _add_room(made: Figure, rows: int) -> None:
     made.set_size_inches(width, higher)
 
 
-def legend(target: Axes | Figure, columns: int = 4) -> None:
-    """Add a frameless legend, each label once; on a figure it stands above the axes, which keep their size."""
+def legend(target: Figure, columns: int = 4) -> None:
+    """Add a frameless legend, each label once, above a figure's axes, which keep their size."""
     handles: dict[str, Artist] = {}
-    for axes in target.axes if isinstance(target, Figure) else [target]:
+    for axes in target.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     artists, labels = list(handles.values()), list(handles)
-    if isinstance(target, Figure):
-        columns = _fitting(labels, columns, float(target.get_size_inches()[0]))
-        made = legend_row(target, artists, labels, columns)
-        if len(labels) > columns:
-            _add_room(target, -(-len(labels) // columns) - 1)
-    else:
-        made = target.legend(artists, labels, loc="best", ncols=columns, **_LEGEND)
+    columns = _fitting(labels, columns, float(target.get_size_inches()[0]))
+    made = legend_row(target, artists, labels, columns)
+    if len(labels) > columns:
+        _add_room(target, -(-len(labels) // columns) - 1)
     for shown in made.legend_handles:
         if isinstance(shown, Line2D):
             shown.set_linewidth(2.4)
@@ -186,8 +188,6 @@ def legend(target: Axes | Figure, columns: int = 4) -> None:
             shown.set_sizes([24.0])
         if shown is not None:
             shown.set_alpha(0.9)
-    for text in made.get_texts():
-        text.set_color(INK)
 
 
 def legend_above(made: Figure, width: float) -> float:
@@ -225,6 +225,11 @@ def thin(x: Array, y: Array, points: int = MOST_POINTS) -> tuple[Array, Array]:
     return x[keep], y[keep]
 
 
+def trace(axes: Axes, x: Array, y: Array, **how: Any) -> None:
+    """Draw a line (N,), interrupted where x jumps, with no more points than can be seen."""
+    axes.plot(*thin(*with_gaps(x, y)), **how)
+
+
 def every(count: int, most: int) -> slice:
     """Pick at most about ``most`` of ``count`` points, evenly."""
     return slice(None, None, max(1, int(np.ceil(count / most))))
@@ -247,7 +252,7 @@ def percent_tick(x: float, _: object) -> str:
 def log_percent(low: float, high: float) -> FuncFormatter:
     """Minor labels of a logarithmic axis in percent, the fewer the larger its span: all, 2 and 5, none."""
     labelled = tuple(range(2, 10)) if high < 3 * low else (2, 5) if high < 30 * low else ()
-    return FuncFormatter(partial(_leading_percent, labelled))
+    return FuncFormatter(partial(_leading_percent, labelled))  # pickled with its figure
 
 
 def _leading_percent(labelled: tuple[int, ...], x: float, _: object) -> str:

@@ -2,50 +2,39 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.reports.plots.style import GRID, INK, MUTED, STEPS, figure, legend, panels, polish, thin
+from armloop.reports.plots.style import GRID, INK, MUTED, STEPS, figure, legend, panels, polish, trace
+from armloop.reports.residuals import longest_run
 from armloop.reports.words import unit
-
-_ROMAN = {1: "I", 2: "II", 3: "III"}
 
 
 def torque_figure(model: ReconstructedModel, samples: Samples, seconds: float = 20.0) -> Figure:
     """Two panels per joint over the first ``seconds`` of the longest run: measured, Step I, II and III; the residual."""
-    run = max(samples.motion.runs(), key=lambda part: part.stop - part.start)
-    time = samples.motion.time[run] - samples.motion.time[run.start]
-    shown = slice(run.start, run.start + int(np.searchsorted(time, seconds)))
-    time = time[: shown.stop - shown.start]
+    shown = longest_run(samples.motion, seconds)
+    time = samples.motion.time[shown] - samples.motion.time[shown.start]
     predicted = {step: smooth(samples, model.predict(samples.motion, step)) for step in STEPS}
     n = model.arm.n
     made = figure(10, 2.6 * n + 0.7)
     column = panels(made, 2 * n, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, 1.0] * n})[:, 0]
     for j, (axes, below, joint) in enumerate(zip(column[::2], column[1::2], model.arm.joints, strict=True)):
-        axes.plot(
-            *thin(time, samples.tau[shown, j]),
-            color=MUTED,
-            linewidth=5.0,
-            alpha=0.5,
-            label="measured",
-            zorder=1,
-        )
+        pale = {"color": MUTED, "linewidth": 5.0, "alpha": 0.5}
+        trace(axes, time, samples.tau[shown, j], label="measured", zorder=1, **pale)
         for step, color in STEPS.items():
-            axes.plot(
-                *thin(time, predicted[step][shown, j]),
-                color=color,
-                linewidth=1.4 if step == 3 else 1.1,
-                alpha=1.0 if step == 3 else 0.85,
-                label=f"predicted after Step {_ROMAN[step]}",
-                zorder=1 + step,
-            )
+            line = {
+                "color": color,
+                "linewidth": 1.4 if step == 3 else 1.1,
+                "alpha": 1.0 if step == 3 else 0.85,
+            }
+            label = f"predicted after Step {'I' * step}"
+            trace(axes, time, predicted[step][shown, j], label=label, zorder=1 + step, **line)
         axes.margins(x=0.01)
         left = samples.tau[shown, j] - predicted[3][shown, j]
         below.axhline(0.0, color=GRID, linewidth=1)
-        below.plot(*thin(time, left), color=INK, linewidth=0.8, label="residual of Step III")
+        trace(below, time, left, color=INK, linewidth=0.8, label="residual of Step III")
         below.margins(x=0.01)
         what, of = "torque" if joint.kind == "revolute" else "force", unit(joint.torque_unit)
         polish(axes, "", f"{what} [{of}]", f"Joint {j + 1}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,13 +18,13 @@ from armloop.reports.plots.style import (
     MUTED,
     SURFACE,
     annotate,
+    apart,
     controller_colors,
     figure,
     legend,
     panels,
     polish,
-    rounds,
-    thin,
+    trace,
 )
 from armloop.reports.words import controller, number
 
@@ -59,21 +59,15 @@ def tracking_figure(
         scale = np.rad2deg(1.0) if unit == "deg" else 1e3
         follow, error = grid[0, j], grid[1, j]
         rows = first.scored
-        follow.plot(
-            *thin(first.time[rows], scale * first.q_ref[rows, j]),
-            color=MUTED,
-            linewidth=3.2,
-            alpha=0.45,
-            label="reference",
-        )
-        turns = rounds([colors[name] for name in results])
-        for turn, (name, result) in zip(turns, results.items(), strict=True):
+        pale = {"color": MUTED, "linewidth": 3.2, "alpha": 0.45}
+        trace(follow, first.time[rows], scale * first.q_ref[rows, j], label="reference", **pale)
+        dashes = apart([colors[name] for name in results], DASHES)
+        for dash, (name, result) in zip(dashes, results.items(), strict=True):
             rows = result.scored
             label = (names or {}).get(name) or controller(name)
-            line = {"color": colors[name], "linewidth": 1.3, "label": label, "linestyle": _of(DASHES, turn)}
-            follow.plot(*thin(result.time[rows], scale * result.q[rows, j]), **line)
-            deviation = scale * (result.q_ref[rows, j] - result.q[rows, j])
-            error.plot(*thin(result.time[rows], deviation), **line)
+            line = {"color": colors[name], "linewidth": 1.3, "label": label, "linestyle": dash}
+            trace(follow, result.time[rows], scale * result.q[rows, j], **line)
+            trace(error, result.time[rows], scale * (result.q_ref[rows, j] - result.q[rows, j]), **line)
         polish(follow, "", f"position [{unit}]", f"Joint {j + 1}")
         polish(error, "time [s]" if n < _MANY_JOINTS or j == n - 1 else "", f"error [{unit}]")
         if n >= _MANY_JOINTS and j == n - 1:
@@ -81,10 +75,6 @@ def tracking_figure(
         error.axhline(0, color=GRID, linewidth=1)
     legend(made, 5)
     return made
-
-
-def _of(styles: Sequence[Any], turn: int) -> Any:
-    return styles[turn % len(styles)]
 
 
 def eta_figure(
@@ -121,22 +111,13 @@ def _bars(
     paper: bool,
 ) -> None:
     width = 0.8 / len(results)
-    turns = rounds([colors[name] for name in results])
+    hatches = apart([colors[name] for name in results], HATCHES)
     for k, (name, result) in enumerate(results.items()):
         x = np.arange(len(joints)) + (k - 0.5 * (len(results) - 1)) * width
         values = [float(result.eta[j]) for j in joints]
         label = names.get(name) or controller(name)
-        hatch = _of(HATCHES, turns[k])
-        axes.bar(
-            x,
-            values,
-            0.88 * width,
-            color=colors[name],
-            label=label,
-            hatch=hatch,
-            edgecolor=SURFACE,
-            linewidth=0,
-        )
+        edges = {"hatch": hatches[k], "edgecolor": SURFACE, "linewidth": 0}
+        axes.bar(x, values, 0.88 * width, color=colors[name], label=label, **edges)
         theirs = published.ETA_DEG.get(name, ()) if paper else ()
         tops = list(values)
         if len(theirs) == len(result.eta):

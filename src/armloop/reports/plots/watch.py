@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,23 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 
-from armloop.reports.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, figure, legend, panels, polish
+from armloop.reports.plots.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    MUTED,
+    ORANGE,
+    figure,
+    legend,
+    panels,
+    polish,
+    room_for,
+)
 from armloop.util.arrays import Array
 
 #: More arms than this are not legible on one page: those with the most evidence are shown.
 MOST_ARMS = 60
-_INCHES_PER_LETTER = 0.085
 #: Inches of a cell, of the longest scale of colours, and of a figure on a page and on one as narrow as a phone's.
 _CELL, _BAR, WIDE, NARROW = 0.26, 4.0, 9.6, 4.0
 #: None lets the page through, light or dark.
@@ -40,7 +50,7 @@ def heat_figure(
         limit: (A,) threshold of each arm; alarmed: (A, E) true where an alarm was traced to the effect.
         width: inches; the effects are parted into blocks one below the other, as many as that takes.
     """
-    left = 0.4 + _INCHES_PER_LETTER * max([len(name) for name in arms], default=0)
+    left = room_for(arms)
     most = max(1, int((width - left - 0.2) / _CELL))
     each = -(-len(places) // (-(-len(places) // most) or 1)) or 1
     blocks = [slice(k, k + each) for k in range(0, max(len(places), 1), each)]
@@ -79,6 +89,11 @@ def _inches(made: Figure, *box: float) -> tuple[float, float, float, float]:
     return left / width, bottom / height, across / width, high / height
 
 
+def _instant(seconds: Any) -> Any:
+    """Instants on an axis of dates, UTC, of s since 1970."""
+    return (1e6 * np.asarray(seconds)).astype("datetime64[us]")
+
+
 def trend_figure(
     when: Array,
     shown: Sequence[tuple[str, Array, Array]],
@@ -94,7 +109,7 @@ def trend_figure(
     """
     made = figure(10.0, 0.9 + 2.7 * len(shown))
     axes = panels(made, 2 * len(shown), 1, left=1.0, sharex=True, height_ratios=[2, 1] * len(shown))[:, 0]
-    days = [datetime.fromtimestamp(t, UTC) for t in when]
+    days = _instant(when)
     first = min((alarm["since"] for alarm in alarms), default=np.inf)
     healthy = when < first
     for k, (name, values, evidence) in enumerate(shown):
@@ -110,21 +125,14 @@ def trend_figure(
         under.axhline(limit, color=ORANGE, lw=1.2, label="threshold")
         for alarm in alarms:
             for panel in (top, under):
-                panel.axvline(
-                    datetime.fromtimestamp(alarm["since"], UTC),
-                    color=GREEN,
-                    lw=1.2,
-                    ls="--",
-                    label="change began",
-                )
-                panel.axvline(datetime.fromtimestamp(alarm["when"], UTC), color=ORANGE, lw=1.4, label="alarm")
+                panel.axvline(_instant(alarm["since"]), color=GREEN, lw=1.2, ls="--", label="change began")
+                panel.axvline(_instant(alarm["when"]), color=ORANGE, lw=1.4, label="alarm")
         polish(top, "", "score", name)
         polish(under, "", "log evidence", "")
         under.set_ylim(0, 1.25 * limit)
     if when.max() - when.min() < _LEAST_SPAN:  # logs of one moment would have an axis of years
         middle = 0.5 * (when.max() + when.min())
-        ends = [datetime.fromtimestamp(middle + side * _LEAST_SPAN, UTC) for side in (-0.5, 0.5)]
-        axes[-1].set_xlim(*ends)
+        axes[-1].set_xlim(_instant(middle + _LEAST_SPAN * np.array([-0.5, 0.5])))
     locator = AutoDateLocator()
     axes[-1].xaxis.set_major_locator(locator)
     axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
