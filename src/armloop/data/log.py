@@ -10,18 +10,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from html import escape
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armloop.data.header import check_header, joints_of
+from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
-from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
+from armloop.data.tables import place, read_columns, said_of, write_columns
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 from armloop.util.given import path_of
@@ -72,17 +72,11 @@ class MotionLog:
         return columns
 
     def __post_init__(self) -> None:
-        if self.tau_unit not in TAU_UNITS:
-            raise LogError(
-                f"{self.name}: tau unit {self.tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}"
-            )
+        _check_unit(self.tau_unit, self.name)
         for key in ("time", "q", "v", "tau", "vdot"):
             if key != "vdot" or self.vdot is not None:
                 object.__setattr__(self, key, _numbers(getattr(self, key), key, self.name))
-        if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
-            raise LogError(
-                f"{self.name}: time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}"
-            )
+        _check_shapes(self.time, self.q, self.name)
         if 0 in self.q.shape:
             raise LogError(f"{self.name}: q is {self.q.shape}; a log has samples and joints")
         for label, values in (("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
@@ -140,29 +134,16 @@ class MotionLog:
                 f"{name}: {type(frame).__name__} has no columns by name; give a data frame or a dict of columns "
                 "time,q1..,v1..,tau1.., or arrays to MotionLog.from_arrays"
             )
-        header = [str(column) for column in names]
-        n, _ = joints_of(Path(name), header)
-        if joints is not None and n != joints:
-            raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
-        kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
+        kinds = columns_of(Path(name), [str(column) for column in names], joints)
         seconds = _numbers(frame["time"], "time", name)
         columns: dict[str, NDArray[np.float64]] = {}
-        for key in (f"{kind}{j}" for kind in kinds for j in range(1, n + 1)):
+        for key in chain(*kinds.values()):
             columns[key] = _numbers(frame[key], key, name)
             if columns[key].shape != seconds.shape or seconds.ndim != 1:
                 raise LogError(
                     f"{name}: {key} has the shape {columns[key].shape}, time {seconds.shape}; each column must be (N,)"
                 )
-        cells = {kind: np.stack([columns[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in kinds}
-        return cls.from_arrays(
-            seconds,
-            cells["q"],
-            cells["tau"],
-            v=cells.get("v"),
-            vdot=cells.get("vdot"),
-            name=name,
-            tau_unit=tau_unit,
-        )
+        return cls.from_arrays(seconds, **_side_by_side(columns, kinds), name=name, tau_unit=tau_unit)
 
     def __repr__(self) -> str:
         runs, seconds = len(self.runs()), float(self.time[-1] - self.time[0])
@@ -253,9 +234,8 @@ def read_log(
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
     """
     path = path_of(path, "the path of a log", LogError)
-    if not isinstance(tau_unit, str) or tau_unit not in TAU_UNITS:
-        raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
-    n, _ = check_header(path, joints)
+    _check_unit(tau_unit, path)
+    kinds = check_header(path, joints)
     told = said_of(path, _UNIT)
     if told not in (None, *TAU_UNITS):
         raise LogError(
@@ -266,16 +246,12 @@ def read_log(
             f"{path}: tau holds motor currents (A), as the file itself says; give --tau-unit A, and --drive-gains to make "
             "torques of them"
         )
-    gains = None if drive_gains is None else _check_gains(path, drive_gains, n)
+    gains = None if drive_gains is None else _check_gains(path, drive_gains, len(kinds["q"]))
 
-    header = read_header(path)
-    kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
-    names = ["time", *(f"{kind}{j}" for kind in kinds for j in range(1, n + 1))]
     # The row before some is checked with them: what does not follow from it is a fault there, as in the whole.
     first, before = (max(0, rows[0] - 1), min(1, rows[0])) if rows else (0, 0)
-    table = read_columns(path, names, (first, rows[1]) if rows else None)
-    stacked = {kind: np.stack([table.pop(f"{kind}{j}") for j in range(1, n + 1)], axis=1) for kind in kinds}
-    time = table["time"]
+    table = read_columns(path, ["time", *chain(*kinds.values())], (first, rows[1]) if rows else None)
+    time, stacked = table.pop("time"), _side_by_side(table, kinds)
     if len(time) - before < FEWEST_SAMPLES:
         raise LogError(f"{path}: {len(time) - before} rows; a motion log has at least {FEWEST_SAMPLES}")
     derived = "v" not in kinds
@@ -334,14 +310,30 @@ def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str)
 
     Raises `LogError` when time and q do not fit together or time does not rise.
     """
-    if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
-        raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
+    _check_shapes(time, q, name)
     _check_time(time, name, lambda row: f"row {row + 1}")
     v = np.zeros_like(q)
     for run in _runs(time):
         if run.stop - run.start > 1:
             v[run] = np.gradient(q[run], time[run], axis=0)
     return v
+
+
+def _side_by_side(
+    columns: dict[str, NDArray[np.float64]], kinds: Mapping[str, list[str]]
+) -> dict[str, NDArray[np.float64]]:
+    """(N, n) of each kind of signal, by its columns' names; they are taken out, for all of them may fill the memory."""
+    return {kind: np.stack([columns.pop(key) for key in keys], axis=1) for kind, keys in kinds.items()}
+
+
+def _check_unit(unit: Any, label: Any) -> None:
+    if not isinstance(unit, str) or unit not in TAU_UNITS:
+        raise LogError(f"{label}: tau unit {unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
+
+
+def _check_shapes(time: NDArray[np.float64], q: NDArray[np.float64], name: str) -> None:
+    if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
+        raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
 
 
 def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:

@@ -87,15 +87,12 @@ class Motion:
         usual = np.abs(steps - median) <= 1e-2 * median
         return float(steps[usual].mean()) if usual.any() else float(median)
 
+    @cached_property
     def elapsed(self) -> NDArray[np.float64]:
         """(N,) seconds since the record of each sample's log began.
 
         Runs whose clock goes on belong to one log; a clock that goes back is another's.
         """
-        return self._elapsed
-
-    @cached_property
-    def _elapsed(self) -> NDArray[np.float64]:
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
         first = np.concatenate([[True], steps <= 0])
         lengths = np.diff(np.append(self.starts[first], self.samples))

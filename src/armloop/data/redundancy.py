@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Mask, stretches
+from armloop.util.arrays import TINY, Array, stretches
 
 # Window of the comparison of rates, s, and the rate (rms, rad/s or m/s) from which a joint is judged.
 _WINDOW, _MOVES = 0.05, 0.05
@@ -220,8 +220,12 @@ def velocity_lag(log: Recorded) -> float:
 def _inner_windows(log: Recorded) -> Windows | None:
     """Windows that stay within their run at every lag that is tried; None where they are too few."""
     windows = windows_of(log)
-    inside = None if windows is None else _far_from_the_ends(log, windows)
-    if windows is None or inside is None or inside.sum() < 10:
+    if windows is None:
+        return None
+    first, last = log.time[[[run.start, run.stop - 1] for run in log.runs]].T
+    run = np.searchsorted(first, windows.start, side="right") - 1
+    inside = (windows.start + _LAGS[0] >= first[run]) & (windows.end + _LAGS[-1] <= last[run])
+    if inside.sum() < 10:
         return None
     keys = ("start", "end", "change", "integral")
     return replace(windows, **{key: getattr(windows, key)[inside] for key in keys})
@@ -252,14 +256,6 @@ def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     inner = [int(np.clip(np.argmin(e), 1, len(_LAGS) - 2)) for e in told]
     own = np.array([_vertex(_LAGS, e, k) for e, k in zip(told, inner, strict=True)])
     return lag if np.mean(np.abs(own - lag) <= _AGREE * abs(lag)) >= _MOST else 0.0
-
-
-def _far_from_the_ends(log: Recorded, windows: Windows) -> Mask:
-    """(W,) windows that stay within their run at every lag that is tried."""
-    first = np.array([log.time[run.start] for run in log.runs])
-    last = np.array([log.time[run.stop - 1] for run in log.runs])
-    run = np.searchsorted(first, windows.start, side="right") - 1
-    return np.asarray((windows.start + _LAGS[0] >= first[run]) & (windows.end + _LAGS[-1] <= last[run]))
 
 
 def _error(log: Recorded, windows: Windows, j: int, lag: float) -> float:

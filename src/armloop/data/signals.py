@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.data.dropouts import Repaired, repaired
+from armloop.data.dropouts import repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
+from armloop.data.recorded import Recorded
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 
@@ -117,7 +118,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         lag = log.velocity_lag
         fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= _FELT else 0.0)
         for run in log.runs():
-            part = _condition_run(log.select(run), fresh.part(run), how, how.dead_zone * noise)
+            part = _condition_run(fresh, run, how, how.dead_zone * noise)
             if part is not None:
                 parts.append(part)
                 spans.append(log.time[[run.start, run.stop - 1]])
@@ -251,26 +252,25 @@ def _thinned(part: tuple[Any, ...], period: float) -> tuple[Any, ...]:
     return part[0][0] + grid, *values, moving[after] & moving[after - 1], lost[after] | lost[after - 1]
 
 
-def _condition_run(
-    log: MotionLog, fresh: Repaired, how: Conditioning, dead_zone: Array
-) -> tuple[Any, ...] | None:
+def _condition_run(log: Recorded, run: slice, how: Conditioning, dead_zone: Array) -> tuple[Any, ...] | None:
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import binary_dilation
 
-    grid, keep = _grid(log.time, how)
+    time = log.time[run]
+    grid, keep = _grid(time, how)
     if grid is None:
         return None
-    period = uniform_period(log.time)
+    period = uniform_period(time)
     # From the run's start: what stamps far from zero lose to rounding must not grow along the run.
-    elapsed = log.time - log.time[0]
-    resolution = 2 * float(np.spacing(np.abs(log.time[[0, -1]]).max()))
+    elapsed = time - time[0]
+    resolution = 2 * float(np.spacing(np.abs(time[[0, -1]]).max()))
     even = bool(np.abs(grid - elapsed).max() < 1e-3 * period + resolution)
 
     def on_grid(x: Array) -> Array:
-        return x if even else CubicSpline(elapsed, x)(grid)
+        return x[run] if even else CubicSpline(elapsed, x[run])(grid)
 
     low_pass = LowPass(WIDER * how.cutoff_hz, period)
-    q, v, tau = (on_grid(x) for x in (fresh.q, fresh.v, fresh.tau))
+    q, v, tau = (on_grid(x) for x in (log.q, log.v, log.tau))
     slow, tau = np.split(LowPass(how.cutoff_hz, period)(np.hstack([v, tau])), 2, axis=1)
     q, v = np.split(low_pass(np.hstack([q, v])), 2, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
@@ -282,10 +282,10 @@ def _condition_run(
     around = np.ones((2 * reach + 1, 1))
     smeared = binary_dilation(still, around)
     lost = np.zeros_like(still)
-    if fresh.lost is not None:
+    if log.lost is not None:
         nearest = np.clip(np.searchsorted(elapsed, grid - 0.5 * period), 0, len(grid) - 1)
-        lost = binary_dilation(fresh.lost[nearest], around)
-    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
+        lost = binary_dilation(log.lost[run][nearest], around)
+    return time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
 
 
 def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,11 @@ def read_columns(
     Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
     not a finite number, or the first row that has too few or too many cells.
     """
+    import pyarrow
+
     table = (_read_parquet if kind_of(path) == PARQUET else _read_csv)(path, names, rows)
+    if rows is not None:  # every process that reads pieces would keep what one of them took
+        pyarrow.default_memory_pool().release_unused()
     faults = {
         name: int(np.argmin(good))
         for name, cells in table.items()
@@ -135,10 +140,8 @@ def place(path: Path, row: int) -> str:
     """Name the data row with index `row` (from 0) as a user counts it: `row 3 (line 4)`."""
     if kind_of(path) != CSV:
         return f"row {row + 1}"
-    for index, (line, _) in enumerate(_csv_rows(path), start=-1):
-        if index == row:
-            return f"row {row + 1} (line {line})"
-    return f"row {row + 1}"
+    line, _ = next(islice(_csv_rows(path), row + 1, None), (None, []))
+    return f"row {row + 1}" + ("" if line is None else f" (line {line})")
 
 
 def kind_of(path: Path) -> str:
@@ -197,9 +200,6 @@ def _read_parquet(
         if not is_number(kind):
             raise LogError(f"{path}: column {name} holds {kind}; it must hold floating-point numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
-    if rows is not None:  # every process that reads pieces would keep what one of them took
-        del table
-        pyarrow.default_memory_pool().release_unused()
     return columns
 
 
@@ -237,11 +237,7 @@ def _read_csv(
             table = _some_csv_rows(path, len(header), list(wanted.values()), *rows)
     except pyarrow.ArrowInvalid as error:
         raise _csv_fault(path, header, names, error) from error
-    columns = {name: table[key].to_numpy() for name, key in wanted.items()}
-    if rows is not None:
-        del table
-        pyarrow.default_memory_pool().release_unused()
-    return columns
+    return {name: table[key].to_numpy() for name, key in wanted.items()}
 
 
 def _csv_table(source: Any, width: int, wanted: list[str], **how: Any) -> Table:
@@ -309,10 +305,8 @@ def _is_number(cell: str) -> bool:
 def _csv_cell(path: Path, name: str, row: int) -> str:
     rows = _csv_rows(path)
     header = [cell.strip() for cell in next(rows)[1]]
-    for index, (_, cells) in enumerate(rows):
-        if index == row:
-            return cells[header.index(name)]
-    raise IndexError(row)
+    _, cells = next(islice(rows, row, None))
+    return cells[header.index(name)]
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:

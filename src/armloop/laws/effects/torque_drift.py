@@ -45,7 +45,7 @@ class TorqueDrift(Law):
     }
 
     def shapes(self, context: Context) -> Sequence[float]:
-        length = float(np.max(context.motion.elapsed()))
+        length = float(np.max(context.motion.elapsed))
         # shorter than a few blocks it is no drift
         return [] if length < 12.0 else [float(T) for T in np.geomspace(4.0, _STRAIGHT * length, 10)]
 
