@@ -11,6 +11,7 @@ and do not give the paper's own tables; without it |F1| = C(α1 + N1, N1), which
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -53,7 +54,7 @@ class Factors:
     @cached_property
     def names(self) -> list[str]:
         """Readable names, joints counted from 1."""
-        phases = [_phase_name(wave) for wave in self.waves]
+        phases = [phase_name(wave) for wave in self.waves]
         names = ["1"] + [f"{function}({phase})" for function in ("sin", "cos") for phase in phases]
         return names + [f"{symbol}{j + 1}" for symbol in ("q", "v", "vdot") for j in range(self.n)]
 
@@ -69,8 +70,21 @@ class Factors:
         }[kind]
         return list(range(first, first + count))
 
+    def parted(self, row: Iterable[int]) -> tuple[tuple[int, ...], bool, list[int]]:
+        """Of a product of factors its wave, whether that is a sine, and which of q, v, v̇ (from 0) are its other factors.
 
-def _phase_name(wave: tuple[int, ...]) -> str:
+        Without a wave it is the cosine of nothing. Raises ``ValueError`` where there is more than one.
+        """
+        w, entries = len(self.waves), [int(e) for e in row if e]
+        waves = [e for e in entries if e <= 2 * w]
+        if len(waves) > 1:
+            raise ValueError(f"candidate {entries} has {len(waves)} waves; angle sums have at most one")
+        wave = self.waves[(waves[0] - 1) % w] if waves else (0,) * self.n
+        return wave, bool(waves) and waves[0] <= w, [e - 1 - 2 * w for e in entries if e > 2 * w]
+
+
+def phase_name(wave: Iterable[int]) -> str:
+    """A sum of multiples of angles, such as ``2*q1-q3``."""
     parts = ""
     for j, k in enumerate(wave):
         if k:

@@ -36,6 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.features.double_feature_set import phase_name
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Index
 
@@ -145,15 +146,11 @@ class EnergyTerms:
                 out[:, m, t] += rate[:, t] * v[:, other[t]] + f[:, t] * vdot[:, other[t]]
 
     def _name(self, t: int) -> str:
-        parts, phase = [], ""
-        for m, degree in enumerate(self.degrees[t]):
-            if degree and self.revolute[m]:
-                size = "" if abs(degree) == 1 else f"{abs(degree)}*"
-                phase += (" - " if degree < 0 else " + ") + f"{size}q{m + 1}"
-            elif degree:
-                parts.append(f"q{m + 1}" + (f"^{degree}" if degree > 1 else ""))
-        if phase:
-            parts.insert(0, f"{'sin' if self.sine[t] else 'cos'}({phase.removeprefix(' + ')})")
+        degrees = self.degrees[t]
+        phase = phase_name(degrees * self.revolute).replace("+", " + ").replace("-", " - ")
+        parts = [f"{'sin' if self.sine[t] else 'cos'}({phase})"] if phase else []
+        for m in np.flatnonzero(degrees * ~self.revolute):
+            parts.append(f"q{m + 1}" + (f"^{degrees[m]}" if degrees[m] > 1 else ""))
         i, j = self.speeds[t]
         if i >= 0:
             parts.append(f"v{i + 1}^2" if i == j else f"v{i + 1}*v{j + 1}")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.regression.determined import combination
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
 from armloop.util.arrays import Array
@@ -70,11 +71,10 @@ class BaseParameters:
         v, vdot = rng.normal(size=(2, _EXCITATION, arm.n))
         random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot)
         columns = full_columns(arm, random, rotors)
-        return cls._keeping(columns, _independent(_rows(columns), _usual_order(arm.n, rotors)), rotors)
-
-    @classmethod
-    def _keeping(cls, columns: Array, kept: NDArray[np.intp], rotors: bool) -> BaseParameters:
-        rows = _rows(columns)
+        rows = columns.reshape(-1, columns.shape[2])
+        within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
+        order = [10 * link + index for link in range(arm.n) for index in within]
+        kept = _independent(rows, [*order, *range(10 * arm.n, rows.shape[1])])
         grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
         grouping[np.abs(grouping) < _TOLERANCE] = 0.0
         grouping[:, kept] = np.eye(len(kept))
@@ -97,7 +97,9 @@ class BaseParameters:
     def names(self) -> list[str]:
         """Every sum in readable form, such as ``"Izz1 + Iyy2 + 0.376 m3"`` (SI units)."""
         labels = parameter_names(self.grouping.shape[1] // (11 if self.rotors else 10), self.rotors)
-        return [_sum(row, labels, int(lead)) for row, lead in zip(self.grouping, self.kept, strict=True)]
+        return [
+            combination(row, labels, int(lead)) for row, lead in zip(self.grouping, self.kept, strict=True)
+        ]
 
     def columns(self, arm: Arm, motion: Motion) -> Array:
         """(N, n, r) torques per unit of every base parameter."""
@@ -117,16 +119,6 @@ class BaseParameters:
         return np.asarray(start + change)
 
 
-def _rows(columns: Array) -> Array:
-    return columns.reshape(-1, columns.shape[2])
-
-
-def _usual_order(n: int, rotors: bool) -> list[int]:
-    within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
-    links = [10 * link + index for link in range(n) for index in within]
-    return links + [10 * n + joint for joint in range(n) if rotors]
-
-
 def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
     """Indices, rising, of the columns that are not sums of those before them in ``order``."""
     basis, kept = np.empty((len(rows), 0)), []
@@ -142,12 +134,3 @@ def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
             basis = np.column_stack([basis, own / np.linalg.norm(own)])
             kept.append(index)
     return np.sort(np.array(kept, dtype=np.intp))
-
-
-def _sum(row: Array, labels: list[str], lead: int) -> str:
-    text = labels[lead]
-    for index in np.flatnonzero(row):
-        if index != lead:
-            size = f"{abs(row[index]):.3g}"
-            text += (" + " if row[index] > 0 else " - ") + (size + " " if size != "1" else "") + labels[index]
-    return text
