@@ -57,11 +57,14 @@ class Moments:
         sub = self if columns is None else self.take(columns)
         if len(sub.b) == 0:
             return np.zeros(0)
-        scale = unit_length(np.diag(sub.G))
-        G = sub.G * np.outer(scale, scale)
-        ridge = 1e-13 * len(G)
-        factor = cho_factor(G + ridge * np.eye(len(G)), check_finite=False)
-        return scale * cho_solve(factor, scale * sub.b, check_finite=False)
+        scale, G = equilibrated(sub.G, 1e-13 * len(sub.b))
+        return scale * cho_solve(cho_factor(G, check_finite=False), scale * sub.b, check_finite=False)
+
+    def refitted(self, support: NDArray[np.intp]) -> Array:
+        """(p,) least-squares coefficients on a support, zero elsewhere."""
+        beta = np.zeros(len(self.b))
+        beta[support] = self.solve(support)
+        return beta
 
     def gains(self, support: NDArray[np.intp], others: NDArray[np.intp] | None = None) -> tuple[float, Array]:
         """Squared error of a support, and by how much each further column alone would lower it.
@@ -74,11 +77,9 @@ class Moments:
         size, b = np.diag(self.G)[others], self.b[others]
         if len(support) == 0:
             return self.yy, b**2 / np.maximum(size, TINY)
-        scale = unit_length(np.diag(self.G)[support])
-        S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
-        L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
+        scale, S = equilibrated(self.G[np.ix_(support, support)], 1e-12)
         # One small inverse and a product: a search asks thousands of times, and solving takes several times longer.
-        inverse = dtrtri(L, lower=1)[0] * scale
+        inverse = dtrtri(np.linalg.cholesky(S), lower=1)[0] * scale
         H = inverse @ (self.G[support] if whole else self.G[np.ix_(support, others)])
         h = inverse @ self.b[support]
         own = size - np.einsum("kp,kp->p", H, H)
@@ -87,8 +88,7 @@ class Moments:
 
     def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
         """Squared error of a support, and by how much dropping each of its columns alone would raise it."""
-        scale = unit_length(np.diag(self.G)[support])
-        S = self.G[np.ix_(support, support)] * np.outer(scale, scale) + 1e-12 * np.eye(len(support))
+        scale, S = equilibrated(self.G[np.ix_(support, support)], 1e-12)
         inverse = np.linalg.inv(S)
         beta = inverse @ (scale * self.b[support])
         return max(self.yy - float(beta @ (scale * self.b[support])), 0.0), beta**2 / np.diag(inverse)
@@ -102,6 +102,12 @@ class Moments:
 def unit_length(squares: Array) -> Array:
     """(p,) factors that make columns of these squared lengths (p,) one long; finite for a column of nothing."""
     return np.asarray(1 / np.sqrt(np.maximum(squares, TINY)))
+
+
+def equilibrated(G: Array, ridge: float) -> tuple[Array, Array]:
+    """(p,) factors that make the columns of a Gram matrix (p, p) one long, and that of these columns, with a ridge."""
+    scale = unit_length(np.diag(G))
+    return scale, G * np.outer(scale, scale) + ridge * np.eye(len(G))
 
 
 def total(parts: Iterable[Moments]) -> Moments:

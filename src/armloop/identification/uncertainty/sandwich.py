@@ -3,10 +3,8 @@
 The coefficients solve estimating equations: for each step the sum over its samples of column times residual,
 where the residual contains what the steps before it found. Stacked, their Jacobian is block-triangular, and so
 the uncertainty of inherited steps reaches the later ones (Newey, "A method of moments interpretation of
-sequential estimators", Economics Letters 14, 1984). Blocks of samples are the independent units. The covariance
-is the delete-one-block jackknife, which is the sandwich of Liang and Zeger (1986) corrected for the leverage of
-every block (CV3 of MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
-cluster-robust inference", J. Applied Econometrics 38, 2023).
+sequential estimators", Economics Letters 14, 1984). Blocks of samples are the independent units of a delete-one
+jackknife (:mod:`armloop.regression.clustered`).
 """
 
 from __future__ import annotations
@@ -17,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.regression.clustered import delete_one
 from armloop.util.arrays import TINY, Array
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
@@ -67,15 +66,9 @@ class Equations:
 
     def covariance(self) -> Array:
         """(p, p) covariance, blocks being independent and the errors within them anything."""
-        # Scores of least squares sum to zero; where a constraint or a correction for noise in the columns moved
-        # the solution they do not, and what all samples have in common is no error.
         share = self.count / np.maximum(self.count.sum(axis=0), TINY)
-        score = (self.score - share * self.score.sum(axis=0)) * self.scale
-        without = self._ridged(self._scaled.sum(axis=0) - self._scaled)
-        moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
-        moved = moved - moved.mean(axis=0)
-        inner = moved.T @ moved * (self.blocks - 1) / self.blocks
-        return np.asarray(inner * np.multiply.outer(self.scale, self.scale))
+        inner = delete_one(self._scaled, self.score * self.scale, share, _RIDGE)
+        return inner * np.multiply.outer(self.scale, self.scale)
 
     def independent_covariance(self) -> Array:
         """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""
