@@ -42,6 +42,14 @@ def full_columns(arm: Arm, motion: Motion, rotors: bool = False) -> Array:
     return np.concatenate([columns, motion.vdot[:, :, None] * np.eye(arm.n)], axis=2)
 
 
+def random_motion(n: int, samples: int, seed: int = 0) -> Motion:
+    """A motion that excites every parameter: positions within half a turn, speeds of a few rad/s, accelerations likewise."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (samples, n))
+    v, vdot = rng.normal(size=(2, samples, n))
+    return Motion(np.arange(float(samples)), q, v, 3 * vdot)
+
+
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
     """r sums of the P full parameters that determine the torques: ``base = grouping @ full``.
@@ -66,11 +74,7 @@ class BaseParameters:
         Sums are led by parameters near the base: a link's mass is shared out over the links before it,
         as is usual. Which parameters can be seen depends on ``arm.gravity`` too.
         """
-        rng = np.random.default_rng(seed)
-        q = rng.uniform(-np.pi, np.pi, (_EXCITATION, arm.n))
-        v, vdot = rng.normal(size=(2, _EXCITATION, arm.n))
-        random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot)
-        columns = full_columns(arm, random, rotors)
+        columns = full_columns(arm, random_motion(arm.n, _EXCITATION, seed), rotors)
         rows = columns.reshape(-1, columns.shape[2])
         within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
         order = [10 * link + index for link in range(arm.n) for index in within]

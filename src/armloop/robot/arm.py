@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -224,11 +223,8 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
 
 def mechanics_only(root: ElementTree.Element) -> str:
     """The URDF without geometry, sensors and vendor tags: meshes need not exist to load the mechanics."""
-    keep = {"link", "joint"}
     slim = ElementTree.Element("robot", root.attrib)
-    for element in root:
-        if element.tag not in keep:
-            continue
+    for element in (element for element in root if element.tag in ("link", "joint")):
         copy = ElementTree.fromstring(ElementTree.tostring(element))
         for child in list(copy):
             if child.tag in {"visual", "collision"}:
@@ -256,14 +252,10 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
             plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
         plant.Finalize()
     except (RuntimeError, ValueError) as error:
-        raise ArmError(f"{path}: unreadable URDF: {_one_line(str(error))}") from error
+        raise ArmError(f"{path}: unreadable URDF: {error}") from error
 
-    moving = []
-    for index in range(plant.num_joints()):
-        joint = plant.get_joint(JointIndex(index))
-        if isinstance(joint, WeldJoint):
-            continue
-        moving.append(joint)
+    every = (plant.get_joint(JointIndex(index)) for index in range(plant.num_joints()))
+    moving = [joint for joint in every if not isinstance(joint, WeldJoint)]
     if not moving:
         raise ArmError(f"{path}: the URDF has no moving joint; an arm needs at least one")
     moving = _ordered_chain(plant, moving, path)
@@ -338,7 +330,3 @@ def _effort_limit(root: ElementTree.Element, name: str) -> float:
             effort = float(limit.get("effort", ""))
             return effort if effort > 0 else np.inf
     return np.inf
-
-
-def _one_line(message: str) -> str:
-    return re.sub(r"\s+", " ", message).strip()
