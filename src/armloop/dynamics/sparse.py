@@ -63,7 +63,7 @@ class SparseEquations(Equations):
                 "reconstruct it stepwise"
             )
         values = self._values(q, [0.0] * self.n)
-        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        M = super().inertia(q)
         for k, plain, weights in self._inertial:
             product = prod([values[e] for e in plain])
             for j, c in weights:

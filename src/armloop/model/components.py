@@ -28,24 +28,19 @@ class Component(Protocol):
 
     def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
         """(N, n) torque of what was found up to ``step``."""
-        ...
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         """(step, coefficient, name) of every term of one joint (0-based)."""
-        ...
 
     def legend(self) -> list[str]:
         """What symbols in the terms stand for, one line each."""
-        ...
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        ...
 
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> Component:
         """Rebuild from :meth:`to_dict`, the content of a file as `armloop.schemas.model` checks it."""
-        ...
 
 
 _LEGEND = (

@@ -28,7 +28,6 @@ class InverseDynamics(Protocol):
 
     def __call__(self, q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
         """(n,) torque at q, v, vdot (n,), with the friction of the velocities ``sliding``, by default v."""
-        ...
 
 
 def pointwise(
