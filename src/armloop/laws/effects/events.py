@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +34,12 @@ def during(motion: Motion, parameters: dict[str, Value]) -> NDArray[np.bool_]:
                 continue
         rows[run] = (time >= start) & (time <= end)
     return rows
+
+
+def ends_before_it_starts(parameters: Mapping[str, Any]) -> str:
+    """The fault of an event's interval; empty if it has none."""
+    late = number(parameters["end"]) <= number(parameters["start"])
+    return "end must come after start" if late else ""
 
 
 def interval(
