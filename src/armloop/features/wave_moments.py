@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Candidates, Factors
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array, Index
 
 Wave = tuple[int, ...]
@@ -30,8 +31,8 @@ _CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class WaveSums:
-    """Sums over samples from which the moments of wave candidates are looked up; they add and subtract.
+class WaveSums(Sums):
+    """Sums over samples from which the moments of wave candidates are looked up; they add over blocks of samples.
 
     Attributes:
         table: (2 waves, monomials) Σ h vᵀ: even rows cosines, odd rows sines.
@@ -44,22 +45,6 @@ class WaveSums:
     cross: Array
     given: Array
     count: int
-
-    def __add__(self, other: WaveSums) -> WaveSums:
-        return WaveSums(
-            self.table + other.table,
-            self.cross + other.cross,
-            self.given + other.given,
-            self.count + other.count,
-        )
-
-    def __sub__(self, other: WaveSums) -> WaveSums:
-        return WaveSums(
-            self.table - other.table,
-            self.cross - other.cross,
-            self.given - other.given,
-            self.count - other.count,
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,25 @@ from armloop.util.arrays import TINY, Array
 DEPENDENT = 1e-9
 
 
+class Sums:
+    """Base of dataclasses of sums over samples: they add over blocks of these, field by field."""
+
+    def __add__(self, other: Self) -> Self:
+        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))  # type: ignore[arg-type]
+        return type(self)(*(added(a, b) for a, b in pairs))
+
+
+def added(one: Any, other: Any) -> Any:
+    """The sum of two things that add; of lists entry by entry, of dicts key by key, what one lacks being nothing."""
+    if isinstance(one, list):
+        return [added(a, b) for a, b in zip(one, other, strict=True)]
+    if isinstance(one, dict):
+        return one | {key: added(one[key], b) if key in one else b for key, b in other.items()}
+    return one + other
+
+
 @dataclass(frozen=True, eq=False)
-class Moments:
+class Moments(Sums):
     """Sums that determine a least-squares problem min ‖y − X β‖².
 
     Attributes:
@@ -41,9 +59,6 @@ class Moments:
     def none(p: int) -> Moments:
         """Moments of no samples of p columns."""
         return Moments(np.zeros((p, p)), np.zeros(p), 0.0, 0.0)
-
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(self.G + other.G, self.b + other.b, self.yy + other.yy, self.count + other.count)
 
     def __sub__(self, other: Moments) -> Moments:
         return Moments(self.G - other.G, self.b - other.b, self.yy - other.yy, self.count - other.count)

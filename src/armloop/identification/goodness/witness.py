@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.goodness.features import Scales, features
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array, Mask
 
 #: Most rows of a joint, and seconds that runs of different logs lie apart.
@@ -51,13 +52,10 @@ class JointRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Witness:
+class Witness(Sums):
     """Rows of all joints; witnesses of different logs add."""
 
-    joints: tuple[JointRows, ...]
-
-    def __add__(self, other: Witness) -> Witness:
-        return Witness(tuple(a + b for a, b in zip(self.joints, other.joints, strict=True)))
+    joints: list[JointRows]
 
 
 def witness(
@@ -96,7 +94,7 @@ def witness(
         found.append(
             JointRows(X, residual[rows, j], samples.tau[rows, j], place[rows], run[rows], judged[rows])
         )
-    return Witness(tuple(found))
+    return Witness(found)
 
 
 def _offsets(runs: list[slice], time: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
-from armloop.regression.moments import Moments
+from armloop.regression.moments import Moments, Sums
 from armloop.util.arrays import Array, Index
 
 
@@ -31,8 +31,8 @@ class Dealt:
 
 
 @dataclass(frozen=True, eq=False)
-class JointSums:
-    """Moments by joint and label; they add over chunks.
+class JointSums(Sums):
+    """Moments by joint and label.
 
     Attributes:
         parts: of all samples.
@@ -41,9 +41,6 @@ class JointSums:
 
     parts: list[list[Moments]]
     judges: list[list[Moments]]
-
-    def __add__(self, other: JointSums) -> JointSums:
-        return JointSums(_added(self.parts, other.parts), _added(self.judges, other.judges))
 
     @staticmethod
     def of(
@@ -86,9 +83,3 @@ class _Running:
 
     def moments(self) -> Moments:
         return Moments(self._G, self._b, self._yy, self._count)
-
-
-def _added(one: list[list[Moments]], other: list[list[Moments]]) -> list[list[Moments]]:
-    return [
-        [a + b for a, b in zip(mine, theirs, strict=True)] for mine, theirs in zip(one, other, strict=True)
-    ]

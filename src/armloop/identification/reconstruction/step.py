@@ -279,7 +279,7 @@ def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> F
 
 
 def _corrected(
-    fits: list[Fit], joints: Sequence[_Joint], gradients: Callable[[list[Fit]], tuple[Array, ...]]
+    fits: list[Fit], joints: Sequence[_Joint], gradients: Callable[[list[Fit]], list[Array]]
 ) -> list[Fit]:
     """The fits, refined on the samples themselves where so little is left that it may be round-off.
 

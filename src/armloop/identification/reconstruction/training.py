@@ -22,6 +22,7 @@ from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Pooled
 from armloop.identification.reconstruction.shared import PLAIN_FRICTION, fast_rows, sliding_rows
 from armloop.laws.friction import FrictionTerm
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array
 
 #: Consecutive samples that tell laws of the catalogue apart as well as more do.
@@ -29,12 +30,12 @@ _WINDOW = 150_000
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """What a first pass finds; it adds over chunks.
+class Survey(Sums):
+    """What a first pass finds.
 
     Attributes:
         sums: of samples that are fitted: of those that slide fast, and of those that creep.
-        lengths: samples of every run in which some joint slides and that are fitted.
+        lengths: samples of every run in which some joint slides and that are fitted, one run after the other.
         fitted, sliding: (n,) samples of each joint that are fitted, and that slide at all.
     """
 
@@ -42,14 +43,6 @@ class Survey:
     lengths: tuple[int, ...]
     fitted: Array
     sliding: Array
-
-    def __add__(self, other: Survey) -> Survey:
-        return Survey(
-            self.sums + other.sums,
-            self.lengths + other.lengths,
-            self.fitted + other.fitted,
-            self.sliding + other.sliding,
-        )
 
     @staticmethod
     def of(chunk: Chunk, design: Design) -> Survey:
