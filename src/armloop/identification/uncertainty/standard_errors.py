@@ -73,7 +73,9 @@ class Errors:
     @property
     def gram(self) -> Array:
         """(p, p) products of the columns that were regressed together, in units of the residual's variance."""
-        return self._products / self.equations.variance[:, None]
+        variance = self.equations.variance
+        # what is met exactly has no errors, which weigh nothing in any unit
+        return self._products / np.where(variance > TINY, variance, 1.0)[:, None]
 
     def undetermined(self) -> list[dict[str, Any]]:
         """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
