@@ -80,11 +80,12 @@ def witness(
     motion = samples.motion
     scales = scales or Scales.of(motion)
     judged = np.ones(motion.samples, dtype=bool) if judged is None else judged
-    run = np.repeat(np.arange(len(motion.starts)), [r.stop - r.start for r in motion.runs()])
-    place = (
-        np.concatenate([motion.time[r] - motion.time[r.start] for r in motion.runs()])
-        + _offsets(motion.runs(), motion.time)[run]
-    )
+    runs = motion.runs()
+    run = np.repeat(np.arange(len(runs)), [r.stop - r.start for r in runs])
+    # all runs laid out one after the other, far apart
+    lengths = [float(motion.time[r.stop - 1] - motion.time[r.start]) + APART for r in runs]
+    begins = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    place = motion.time - motion.time[motion.starts][run] + begins[run]
     apart = independent_rows(samples)
     found = []
     for j in range(motion.joints):
@@ -95,9 +96,3 @@ def witness(
             JointRows(X, residual[rows, j], samples.tau[rows, j], place[rows], run[rows], judged[rows])
         )
     return Witness(found)
-
-
-def _offsets(runs: list[slice], time: Array) -> Array:
-    """(R,) where each run begins when all are laid out one after the other, far apart, s."""
-    lengths = [float(time[r.stop - 1] - time[r.start]) + APART for r in runs]
-    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]])

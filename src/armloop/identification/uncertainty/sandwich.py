@@ -49,20 +49,15 @@ class Equations:
     @cached_property
     def scale(self) -> Array:
         """(p,) factors that make the columns' squares sum to one."""
-        squares = np.diagonal(self.jacobian.sum(axis=0))
-        return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
+        return _scale(self.jacobian.sum(axis=0))
 
     @cached_property
     def _scaled(self) -> Array:
         return self.jacobian * np.multiply.outer(self.scale, self.scale)
 
-    def _ridged(self, products: Array) -> Array:
-        return products + _RIDGE * np.eye(len(self.scale))
-
     def step(self) -> Array:
         """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
-        total = self._ridged(self._scaled.sum(axis=0))
-        return np.asarray(self.scale * np.linalg.solve(total, self.scale * self.score.sum(axis=0)))
+        return gauss_newton_step(self.jacobian.sum(axis=0), self.score.sum(axis=0))
 
     def covariance(self) -> Array:
         """(p, p) covariance, blocks being independent and the errors within them anything."""
@@ -74,7 +69,7 @@ class Equations:
         """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""
         same = self.stage[:, None] == self.stage
         total = np.where(same, self._scaled.sum(axis=0), 0.0)
-        inverse = np.linalg.inv(self._ridged(total))
+        inverse = np.linalg.inv(_ridged(total))
         used = np.array([np.count_nonzero(self.stage == s) for s in self.stage])
         samples = np.maximum(self.count.sum(axis=0) - used, 1.0)
         spread = self.variance * self.count.sum(axis=0) / samples
@@ -87,8 +82,24 @@ class Equations:
         blocks is (Σ w)²/Σ w² (Satterthwaite; Carter, Schnepel and Steigerwald 2017).
         """
         total = self._scaled.sum(axis=0)
-        inverse = np.linalg.inv(self._ridged(total))
+        inverse = np.linalg.inv(_ridged(total))
         noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
         weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
         effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY)
         return np.maximum(effective - 1, 1.0)
+
+
+def gauss_newton_step(jacobian: Array, score: Array) -> Array:
+    """(p,) step towards the root of estimating equations with these sums (p, p), (p,) over all samples."""
+    scale = _scale(jacobian)
+    total = _ridged(jacobian * np.multiply.outer(scale, scale))
+    return np.asarray(scale * np.linalg.solve(total, scale * score))
+
+
+def _scale(jacobian: Array) -> Array:
+    squares = np.diagonal(jacobian)
+    return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
+
+
+def _ridged(products: Array) -> Array:
+    return products + _RIDGE * np.eye(len(products))

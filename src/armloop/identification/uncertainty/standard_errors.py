@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,13 @@ from armloop.identification.uncertainty.blocking import (
     covered_time,
     independent_blocks,
 )
-from armloop.identification.uncertainty.friction_lines import friction_line
+from armloop.identification.uncertainty.friction_lines import entry, friction_line
 from armloop.identification.uncertainty.propagated import leading, to_dict
-from armloop.identification.uncertainty.sandwich import Equations
+from armloop.identification.uncertainty.sandwich import Equations, gauss_newton_step
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, identifiable
+from armloop.regression.moments import added
 from armloop.util.arrays import TINY, Array
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
@@ -138,8 +139,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
             where = place if unknown.joint is None else place[unknown.joint]
             # what the fitted samples do not determine has no error; it must not spoil the model's file
             if np.isfinite(error) and np.isfinite(freedom):
-                where[unknown.name] = _entry(error, freedom)
-    table["undetermined"] = [entry for part in parts for entry in part.undetermined()]
+                where[unknown.name] = entry(error, freedom)
+    table["undetermined"] = [one for part in parts for one in part.undetermined()]
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
     rows = np.logical_or.reduce([one.rows for one in fitted])
     table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
@@ -205,6 +206,7 @@ class Assembled:
     score: list[Array]
     squares: Array
     power: Array
+    _SUMS: ClassVar = ("jacobian", "score", "squares", "power")
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> Assembled:
@@ -224,24 +226,12 @@ class Assembled:
         )
 
     def __add__(self, other: Assembled) -> Assembled:
-        pairs = [
-            [a + b for a, b in zip(mine, theirs, strict=True)]
-            for mine, theirs in ((self.jacobian, other.jacobian), (self.score, other.score))
-        ]
-        return Assembled(
-            self.unknowns, pairs[0], pairs[1], self.squares + other.squares, self.power + other.power
-        )
+        sums = (added(getattr(self, name), getattr(other, name)) for name in self._SUMS)
+        return Assembled(self.unknowns, *sums)
 
     def steps(self) -> list[tuple[list[Unknown], Array]]:
         """Every problem's unknowns with the step (p,) that solves the linearised equations."""
-        found = []
-        for unknowns, jacobian, score in zip(self.unknowns, self.jacobian, self.score, strict=True):
-            p = len(unknowns)
-            whole = Equations(
-                jacobian[None], score[None], np.ones((1, p)), np.zeros(p, dtype=np.intp), np.ones(p)
-            )
-            found.append((unknowns, whole.step()))
-        return found
+        return list(zip(self.unknowns, map(gauss_newton_step, self.jacobian, self.score), strict=True))
 
     def misfit(self) -> float:
         """Sum over the joints of mean squared residual relative to mean squared torque."""
@@ -325,10 +315,6 @@ def _equations(
     return Equations(jacobian[used], score[used], count[used], stages, variance)
 
 
-def _entry(error: float, freedom: float) -> dict[str, float]:
-    return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
-
-
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
     """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
     kinds = {term.kind: term.name(joint + 1) for term in model.friction.terms[joint]}
@@ -349,7 +335,7 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
                 error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
                 freedom = float(part.freedom[chosen > 0].min())
                 if np.isfinite(error) and np.isfinite(freedom):
-                    found[key] = {"value": float(value), **_entry(error, freedom)}
+                    found[key] = {"value": float(value), **entry(error, freedom)}
     return found
 
 

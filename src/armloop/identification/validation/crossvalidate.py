@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
-from armloop.data.motion import Samples
 from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
@@ -169,11 +168,8 @@ def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -
     found = []
     for k, blocks in split.left_out.items():
         samples = preprocess([logs[k]], model.conditioning)
-        rows = judging_rows(_time(logs[k], samples), samples, blocks)
+        # unfiltered samples are numbered; where they lie in the log is its time
+        time = samples.motion.time if samples.cutoff_hz > 0 else logs[k].time
+        rows = judging_rows(time, samples, blocks)
         found.append((k, (residual(model, samples)[rows], samples.tau[rows], samples.moving[rows])))
     return found
-
-
-def _time(log: MotionLog, samples: Samples) -> NDArray[np.float64]:
-    """(N,) instants of the samples in the log's time: unfiltered samples are numbered instead."""
-    return samples.motion.time if samples.cutoff_hz > 0 else log.time
