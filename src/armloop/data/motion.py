@@ -64,6 +64,13 @@ class Motion:
         begins = np.concatenate([m.time[m.starts] if m.begins is None else m.begins for m in motions])
         return cls(time, q, v, vdot, starts, begins)
 
+    @classmethod
+    def accelerated(cls, q: NDArray[np.float64]) -> "Motion":
+        """(P n) samples at rest at postures q (P, n), each joint accelerated by one in turn: they show a mass matrix."""
+        postures = np.repeat(q, q.shape[1], axis=0)
+        unit = np.tile(np.eye(q.shape[1]), (len(q), 1))
+        return cls(np.arange(float(len(postures))), postures, np.zeros_like(postures), unit)
+
     def take(self, rows: Any, starts: NDArray[np.intp] | None = None) -> "Motion":
         """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
         starts = np.array([0]) if starts is None else starts

@@ -105,10 +105,10 @@ def choose_bandwidth(
     aside = [held_out[k] for k, enough in zip(_selected(logs), long, strict=True) if enough]
     chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
-    tables = [table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners]
-    if any(table is None for table in tables):
-        return Bandwidth(highest)
+    tables = (table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners)
     made = [table for table in tables if table is not None]
+    if len(made) < len(corners):
+        return Bandwidth(highest)
     rows = made[0].moving
     counted = rows.sum(axis=0) >= _FEWEST
     if not counted.any():

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import partial, reduce
+from itertools import chain
 from math import gcd
 from operator import add
 from typing import Any, TypeVar
@@ -78,6 +79,10 @@ class Chunk:
             own &= ~_near(~own, self.samples.motion, margin)
         return own
 
+    def chunk(self) -> Chunk:
+        """The chunk itself: in memory it need not be made."""
+        return self
+
     def nested(self) -> Chunk:
         """The same with one more fold held out, which alone chooses the library."""
         choosing = self.blocks % self.folds == _CHOOSING
@@ -132,16 +137,6 @@ class _Conditioned:
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """A chunk in memory."""
-
-    kept: Chunk
-
-    def chunk(self) -> Chunk:
-        return self.kept
-
-
-@dataclass(frozen=True, eq=False)
 class Data:
     """All samples of a reconstruction.
 
@@ -152,7 +147,7 @@ class Data:
         progress: who is told how far a pass over logs that are not in memory is.
     """
 
-    parts: Sequence[_Conditioned | _Kept]
+    parts: Sequence[_Conditioned | Chunk]
     reference: Chunk
     workers: Workers
     progress: Progress = silent
@@ -161,7 +156,7 @@ class Data:
     def of(samples: Samples, options: Options, held_out: Mask | None = None) -> Data:
         """Samples in memory; ``held_out`` (N,) by default is every ``folds``-th block."""
         chunk = Chunk.of(samples, options, held_out=held_out)
-        return Data([_Kept(chunk)], chunk, Serial())
+        return Data([chunk], chunk, Serial())
 
     @staticmethod
     def kept(logs: Sequence[MotionLog], how: Conditioning, options: Options) -> Data:
@@ -179,17 +174,17 @@ class Data:
                 first = int(chunk.blocks[-1]) + 1
         if not chunks:
             preprocess(logs, how, noise)  # says how long a run must be
-        return Data([_Kept(chunk) for chunk in chunks], _joined(chunks), Serial())
+        return Data(chunks, _joined(chunks), Serial())
 
     def nested(self) -> Data:
         """The same, in memory, with one more fold held out, which alone chooses the library."""
-        chunks = [part.chunk().nested() for part in self.parts if isinstance(part, _Kept)]
-        return Data([_Kept(chunk) for chunk in chunks], self.reference.nested(), self.workers)
+        chunks = [part.nested() for part in self.parts if isinstance(part, Chunk)]
+        return Data(chunks, self.reference.nested(), self.workers)
 
     @property
     def in_memory(self) -> bool:
         """Whether the reference is all there is."""
-        return all(isinstance(part, _Kept) for part in self.parts)
+        return all(isinstance(part, Chunk) for part in self.parts)
 
     @staticmethod
     def streamed(
@@ -234,7 +229,7 @@ class Data:
     def sampled(self, count: int) -> Data:
         """At most so many chunks, evenly; all samples in one where they are in memory."""
         if self.in_memory:
-            return replace(self, parts=[_Kept(self.reference)])
+            return replace(self, parts=[self.reference])
         return replace(self, parts=self.parts[:: max(1, -(-len(self.parts) // count))])
 
     def window(self, most: int) -> Chunk:
@@ -244,15 +239,8 @@ class Data:
         some = self.sampled(_STRETCHES).parts
         each = -(-_STRETCHES // len(some))
         length = max(1, most // (each * len(some)))
-        return _joined(
-            [
-                piece
-                for pieces in self.workers.map(
-                    partial(_on_chunk, partial(_stretches, count=each, length=length)), some
-                )
-                for piece in pieces
-            ]
-        )
+        cut = partial(_on_chunk, partial(_stretches, count=each, length=length))
+        return _joined(list(chain.from_iterable(self.workers.map(cut, some))))
 
     def map(self, function: Callable[[Chunk], Answer], what: str = "") -> Iterator[Answer]:
         """The function's answers for all chunks, in order; of a long pass over logs it is told how far it is.
@@ -298,7 +286,7 @@ def _near(rows: Mask, motion: Motion, seconds: float) -> Mask:
     return near
 
 
-def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | _Kept) -> Answer:
+def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | Chunk) -> Answer:
     chunk = part.chunk()
     assert chunk is not None, "a log changed between two passes"
     return function(chunk)

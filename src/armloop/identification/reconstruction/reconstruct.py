@@ -191,9 +191,9 @@ def reconstruct(
         return Attempt(library, how, data, found, blocks.margin)
 
     if len(left) == 1:
-        tried = [Contender(one, refused=refused.get(one, "")) for one in wanted]
         tried = [
-            one if one.refused else replace(one, attempt=attempt(one.library), chosen=True) for one in tried
+            Contender(one, attempt(one), chosen=True) if one in left else Contender(one, refused=refused[one])
+            for one in wanted
         ]
         return _finished(tried, "all", arm, method, logs, settings, progress, recorded, blocks)
     tried = [
@@ -302,15 +302,9 @@ def _finished(
     yardsticks = tried.yardsticks(found.sorter, Options().block_seconds)
     model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
-        history = {**model.history, **found.final.history}
-        last = found.final
-        model = replace(
-            model,
-            components=tuple(last.components),
-            friction=last.law,
-            effects=last.effects,
-            history=history,
-        )
+        last = found.final.model(history={**model.history, **found.final.history})
+        names = ("components", "friction", "effects", "history")
+        model = replace(model, **{name: getattr(last, name) for name in names})
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)
