@@ -170,7 +170,11 @@ def reconstruct(
     refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
     refused = {} if library is not None else {one: why for one, why in refused.items() if why}
     left = [one for one in wanted if one not in refused]
-    few = len(left) > 1 and _are_few(kept, bandwidth.suited(usual[0]), settings)
+    # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
+    few = len(left) > 1 and bool(kept) and settings.folds > 2
+    if few:
+        held_out = held_out_intervals(kept, [bandwidth.suited(usual[0])], settings)
+        few = sum(map(len, held_out)) < 2 * FEWEST_BLOCKS
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(library.conditioning)
@@ -206,12 +210,6 @@ def reconstruct(
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
     return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, blocks)
-
-
-def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> bool:
-    """Whether half of the held-out blocks are too few to judge by; a fold of the others then chooses the library."""
-    count = sum(map(len, held_out_intervals(logs, [how], options)))
-    return bool(logs) and options.folds > 2 and count < 2 * FEWEST_BLOCKS
 
 
 def filter_and_blocks(
