@@ -128,7 +128,12 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
             f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
         )
-    parts = _at_one_rate(parts)
+    # All at the period of the coarsest, on cubic splines: they have passed the filter, and even the coarsest keeps what has.
+    coarsest = max(_period(part[0]) for part in parts)
+    parts = [
+        _thinned(part, coarsest) if _differ(_period(part[0]) or coarsest, coarsest) else part
+        for part in parts
+    ]
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving, lost = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = _period(parts[0][0]) or 1.0
@@ -227,18 +232,6 @@ def _period(time: Array) -> float:
 
 def _differ(a: float, b: float) -> bool:
     return abs(a - b) > _ALIKE * b
-
-
-def _at_one_rate(parts: list[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """Runs of :func:`_condition_run`, on cubic splines at the period of the coarsest where their rates differ.
-
-    They have passed the filter, and even the coarsest keeps what has.
-    """
-    coarsest = max(_period(part[0]) for part in parts)
-    return [
-        _thinned(part, coarsest) if _differ(_period(part[0]) or coarsest, coarsest) else part
-        for part in parts
-    ]
 
 
 def _thinned(part: tuple[Any, ...], period: float) -> tuple[Any, ...]:

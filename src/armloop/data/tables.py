@@ -92,7 +92,10 @@ def read_columns(
     if faults:
         name = min(faults, key=lambda key: faults[key])
         value, row = table[name][faults[name]], faults[name] + (rows[0] if rows else 0)
-        cell = _csv_cell(path, name, row) if kind_of(path) == CSV else str(value)
+        cell = str(value)
+        if kind_of(path) == CSV:
+            _, cells = next(islice(_csv_rows(path), row + 1, None))
+            cell = cells[read_header(path).index(name)]
         wrong = "too large a number" if np.isfinite(value) else "not a finite number"
         raise LogError(
             f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
@@ -300,13 +303,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return cell.isascii() and "_" not in cell  # Python reads 1_000 and ١ as numbers, nobody else does
-
-
-def _csv_cell(path: Path, name: str, row: int) -> str:
-    rows = _csv_rows(path)
-    header = [cell.strip() for cell in next(rows)[1]]
-    _, cells = next(islice(rows, row, None))
-    return cells[header.index(name)]
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:

@@ -103,7 +103,8 @@ def nearest_bodies(R: Array, fixed: Array, wanted: Array, prior: Array, weights:
     size, n = len(prior), len(prior) // 10
     bodies = _bodies(prior.reshape(n, 10))
     drives = np.maximum(wanted[size:], _THICKNESS)
-    x = np.concatenate([_parameters_of(bodies).ravel(), drives])
+    links = np.linalg.lstsq(_UNITS.reshape(10, 16).T, bodies.reshape(-1, 16).T)[0].T
+    x = np.concatenate([links.ravel(), drives])
     for weight in weights:
         x = _nearest(R / np.sqrt(weight), wanted, bodies, drives, x)
     # What it still lacks of what is wanted, put right by the least change if it stays a body.
@@ -127,11 +128,6 @@ def pseudo_inertias(parameters: Array) -> Array:
 
 #: (10, 4, 4) what a unit of each parameter adds to a pseudo-inertia.
 _UNITS = pseudo_inertias(np.eye(10))
-
-
-def _parameters_of(J: Array) -> Array:
-    """(n, 10) parameters of (n, 4, 4) pseudo-inertias."""
-    return np.asarray(np.linalg.lstsq(_UNITS.reshape(10, 16).T, J.reshape(-1, 16).T)[0].T)
 
 
 def _bodies(prior: Array) -> Array:

@@ -242,14 +242,17 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
     from pydrake.multibody.tree import JointIndex, RevoluteJoint, WeldJoint
 
     plant = MultibodyPlant(time_step=0.0)
-    base = _base_link(root, path)
+    bases = list(base_links(root))
+    if len(bases) != 1:
+        found = ", ".join(bases) or "none (a loop)"
+        raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(bases)}: {found}")
     try:
         # What it warns of (links without mass, joints it does not know) is checked here or in `urdf`.
         with quiet("drake"):
             (instance,) = Parser(plant).AddModelsFromString(mechanics_only(root), "urdf")
         # A root link called "world" is Drake's world itself: nothing is left to weld.
-        if base != "world":
-            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
+        if bases != ["world"]:
+            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(bases[0], instance))
         plant.Finalize()
     except (RuntimeError, ValueError) as error:
         raise ArmError(f"{path}: unreadable URDF: {error}") from error
@@ -293,15 +296,6 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
         X_tool = plant.GetBodyByName("tool").body_frame().CalcPose(context, previous).GetAsMatrix4()
     name = root.get("name") or path.stem
     return Arm(name, tuple(joints), X_PF, axis, mass, com, inertia, X_tool, urdf=urdf)
-
-
-def _base_link(root: ElementTree.Element, path: Path) -> str:
-    """Name of the link that is no joint's child."""
-    roots = list(base_links(root))
-    if len(roots) != 1:
-        found = ", ".join(roots) or "none (a loop)"
-        raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(roots)}: {found}")
-    return roots[0]
 
 
 def _ordered_chain(plant: Any, moving: list[Any], path: Path) -> list[Any]:
