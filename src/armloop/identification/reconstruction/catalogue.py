@@ -65,15 +65,6 @@ class Law:
         constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
         return Law(effect, shape, columns.shape[2], constant, gain)
 
-    def to_dict(self) -> dict[str, object]:
-        """JSON-ready values."""
-        names = {
-            "effect": self.effect.name,
-            "joint": self.effect.joint,
-            "other_joint": self.effect.other_joint,
-        }
-        return {**names, "removes": self.gain}
-
 
 @dataclass(frozen=True, eq=False)
 class Laws:
