@@ -22,6 +22,7 @@ from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
 from armloop.data.tables import place, read_columns, said_of, write_columns
+from armloop.util.arrays import Array, Mask
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 from armloop.util.given import path_of
@@ -54,16 +55,16 @@ class MotionLog:
     a v that is not the rate of q.
     """
 
-    time: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    tau: NDArray[np.float64]
-    vdot: NDArray[np.float64] | None = None
+    time: Array
+    q: Array
+    v: Array
+    tau: Array
+    vdot: Array | None = None
     name: str = "log"
     tau_unit: str = "N*m"
     v_derived: bool = False
 
-    def columns(self) -> dict[str, NDArray[np.float64]]:
+    def columns(self) -> dict[str, Array]:
         """Return what was measured by the names of the columns of its file, (N,) each, in their order."""
         columns = {"time": self.time}
         for kind, values in (("q", self.q), ("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
@@ -136,7 +137,7 @@ class MotionLog:
             )
         kinds = columns_of(Path(name), [str(column) for column in names], joints)
         seconds = _numbers(frame["time"], "time", name)
-        columns: dict[str, NDArray[np.float64]] = {}
+        columns: dict[str, Array] = {}
         for key in chain(*kinds.values()):
             columns[key] = _numbers(frame[key], key, name)
             if columns[key].shape != seconds.shape or seconds.ndim != 1:
@@ -205,7 +206,7 @@ class MotionLog:
         """Return the log itself: in memory it is its own source (see `armloop.data.pieces`)."""
         return self
 
-    def select(self, rows: slice | NDArray[np.bool_]) -> "MotionLog":
+    def select(self, rows: slice | Mask) -> "MotionLog":
         """Return the log of these samples only; a slice gives views."""
         cut = {
             key: None if getattr(self, key) is None else getattr(self, key)[rows]
@@ -293,7 +294,7 @@ def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
     _check(log, str(path), lambda row: place(path, first + row))
 
 
-def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float64]:
+def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> Array:
     gains = _numbers(drive_gains, "drive_gains", str(path)).reshape(-1)
     if len(gains) != n:
         raise LogError(f"{path}: {len(gains)} drive gains for {n} joints; give one per joint, in N*m/A")
@@ -305,7 +306,7 @@ def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float
     return gains
 
 
-def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def differentiated(time: Array, q: Array, name: str) -> Array:
     """(N, n) rates of q by central differences within each run; a run of one sample has none.
 
     Raises `LogError` when time and q do not fit together or time does not rise.
@@ -319,9 +320,7 @@ def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str)
     return v
 
 
-def _side_by_side(
-    columns: dict[str, NDArray[np.float64]], kinds: Mapping[str, list[str]]
-) -> dict[str, NDArray[np.float64]]:
+def _side_by_side(columns: dict[str, Array], kinds: Mapping[str, list[str]]) -> dict[str, Array]:
     """(N, n) of each kind of signal, by its columns' names; they are taken out, for all of them may fill the memory."""
     return {kind: np.stack([columns.pop(key) for key in keys], axis=1) for kind, keys in kinds.items()}
 
@@ -331,12 +330,12 @@ def _check_unit(unit: Any, label: Any) -> None:
         raise LogError(f"{label}: tau unit {unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
 
 
-def _check_shapes(time: NDArray[np.float64], q: NDArray[np.float64], name: str) -> None:
+def _check_shapes(time: Array, q: Array, name: str) -> None:
     if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
         raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
 
 
-def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
+def _numbers(values: Any, label: str, name: str) -> Array:
     """The values as an array of floating-point numbers; raises `LogError` where they are none."""
     try:
         numbers = np.asarray(values)
@@ -357,7 +356,7 @@ def unchecked_log(**values: Any) -> MotionLog:
     return log
 
 
-def _runs(time: NDArray[np.float64]) -> list[slice]:
+def _runs(time: Array) -> list[slice]:
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > GAP_PERIODS * np.median(steps)) if len(steps) else steps[:0]
     edges = [0, *(int(gap) + 1 for gap in gaps), len(time)]
@@ -383,7 +382,7 @@ def _say_doubts(log: MotionLog, label: str | None = None) -> None:
         warn(f"{label or log.name}: {doubt}")
 
 
-def _check_time(time: NDArray[np.float64], label: str, place: Callable[[int], str]) -> None:
+def _check_time(time: Array, label: str, place: Callable[[int], str]) -> None:
     late = np.flatnonzero(np.diff(time) <= 0)
     if len(late):
         row = int(late[0]) + 1

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.filters import filter_reach
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 
 
@@ -28,12 +29,12 @@ class Motion:
     Raises `InputError` when the shapes do not agree.
     """
 
-    time: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    vdot: NDArray[np.float64]
-    starts: NDArray[np.intp] = field(default_factory=lambda: np.array([0]))
-    begins: NDArray[np.float64] | None = None
+    time: Array
+    q: Array
+    v: Array
+    vdot: Array
+    starts: Index = field(default_factory=lambda: np.array([0]))
+    begins: Array | None = None
 
     def __post_init__(self) -> None:
         for key in ("time", "q", "v", "vdot", "starts"):
@@ -65,13 +66,13 @@ class Motion:
         return cls(time, q, v, vdot, starts, begins)
 
     @classmethod
-    def accelerated(cls, q: NDArray[np.float64]) -> "Motion":
+    def accelerated(cls, q: Array) -> "Motion":
         """(P n) samples at rest at postures q (P, n), each joint accelerated by one in turn: they show a mass matrix."""
         postures = np.repeat(q, q.shape[1], axis=0)
         unit = np.tile(np.eye(q.shape[1]), (len(q), 1))
         return cls(np.arange(float(len(postures))), postures, np.zeros_like(postures), unit)
 
-    def take(self, rows: Any, starts: NDArray[np.intp] | None = None) -> "Motion":
+    def take(self, rows: Any, starts: Index | None = None) -> "Motion":
         """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
         starts = np.array([0]) if starts is None else starts
         return Motion(self.time[rows], self.q[rows], self.v[rows], self.vdot[rows], starts)
@@ -95,7 +96,7 @@ class Motion:
         return float(steps[usual].mean()) if usual.any() else float(median)
 
     @cached_property
-    def elapsed(self) -> NDArray[np.float64]:
+    def elapsed(self) -> Array:
         """(N,) seconds since the record of each sample's log began.
 
         Runs whose clock goes on belong to one log; a clock that goes back is another's.
@@ -144,13 +145,13 @@ class Samples:
     """
 
     motion: Motion
-    tau: NDArray[np.float64]
-    moving: NDArray[np.bool_]
+    tau: Array
+    moving: Mask
     period: float
     cutoff_hz: float = 0.0
-    spans: NDArray[np.float64] | None = None
+    spans: Array | None = None
     wider: float = 1.0
-    unknown: NDArray[np.bool_] | None = None
+    unknown: Mask | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -14,14 +14,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.dropouts import repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
 from armloop.data.recorded import Recorded
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
@@ -205,7 +204,7 @@ def as_torque(samples: Samples) -> Samples:
     return replace(samples, motion=replace(motion, q=q, v=v, vdot=vdot), wider=1.0)
 
 
-def independent_rows(samples: Samples) -> NDArray[np.bool_]:
+def independent_rows(samples: Samples) -> Mask:
     """(N,) every so many samples that :data:`INDEPENDENT` are left per period of the corner."""
     rows = np.zeros(samples.motion.samples, dtype=bool)
     for period, runs in _rates(samples).items():

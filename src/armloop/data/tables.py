@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.csv_rows import index_rows
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 from armloop.util.files import replacing
 
@@ -69,9 +69,7 @@ def count_rows(path: Path) -> int:
     return int(pyarrow.parquet.read_metadata(path).num_rows)
 
 
-def read_columns(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None = None
-) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str], rows: tuple[int, int] | None = None) -> dict[str, Array]:
     """Return the columns `names` of a file whose header has been read and holds each of them once.
 
     rows : first row and the one after the last, counted from 0; None reads all
@@ -103,9 +101,7 @@ def read_columns(
     return table
 
 
-def write_columns(
-    path: Path, columns: Mapping[str, NDArray[np.float64]], about: Mapping[str, str] | None = None
-) -> None:
+def write_columns(path: Path, columns: Mapping[str, Array], about: Mapping[str, str] | None = None) -> None:
     """Write named columns as CSV or Parquet, whole or not at all; every digit survives.
 
     about : what a Parquet file keeps beside them, read by :func:`said_of`; a CSV has no place for it
@@ -185,9 +181,7 @@ def is_number(kind: DataType) -> bool:
     return bool(types.is_floating(kind) or types.is_integer(kind))
 
 
-def _read_parquet(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None
-) -> dict[str, NDArray[np.float64]]:
+def _read_parquet(path: Path, names: Sequence[str], rows: tuple[int, int] | None) -> dict[str, Array]:
     import pyarrow
     import pyarrow.parquet
 
@@ -225,9 +219,7 @@ def _some_rows(file: ParquetFile, names: Sequence[str], first: int, last: int) -
     return pyarrow.Table.from_batches(kept)
 
 
-def _read_csv(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None
-) -> dict[str, NDArray[np.float64]]:
+def _read_csv(path: Path, names: Sequence[str], rows: tuple[int, int] | None) -> dict[str, Array]:
     import pyarrow
 
     header = read_header(path)

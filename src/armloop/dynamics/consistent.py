@@ -21,14 +21,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
 from armloop.features.rigid_body import full_columns, random_motion
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 _STATES = 300
 _RANK = 1e-9
@@ -212,7 +211,7 @@ def scales(arm: Arm, links: Array, prior: Array) -> Array:
     return np.tile(mass * np.array([1.0, *[length] * 3, *[length**2] * 6]), arm.n)
 
 
-def _torque_factor(arm: Arm, with_rotor: NDArray[np.intp], links: Array, rotors: Array) -> Array:
+def _torque_factor(arm: Arm, with_rotor: Index, links: Array, rotors: Array) -> Array:
     """R (P, P) with |R x|² the mean square of the torques of parameters x on random motion.
 
     Each joint's torque is in units of the RMS that the given links and rotors need there, so that a wrist counts as

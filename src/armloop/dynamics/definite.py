@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.features.lagrangian import EnergyTerms
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Boxes looked at, at most; and products in them, which take a second or two.
 _BOXES, _WORK = 20_000, 2e9
@@ -70,7 +70,7 @@ class MassTerms:
 
     waves: Array
     powers: NDArray[np.int_]
-    sine: NDArray[np.bool_]
+    sine: Mask
     matrices: Array
     constant: Array
 

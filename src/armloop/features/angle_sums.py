@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.features.double_feature_set import SECOND_SETS, Candidates, Factors
+from armloop.util.arrays import Index
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class AngleSums(Candidates):
         return Factors(len(self.revolute), tuple(waves))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
+    def index(self) -> Index:  # type: ignore[override]
         """(T, K) indices of each candidate's factors; 0 stands for the factor 1."""
         factors = self.factors
         place = {wave: w for w, wave in enumerate(factors.waves)}

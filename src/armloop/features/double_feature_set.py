@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Second feature sets: what the monomials of order N2 are made of, per step and for one-shot SINDy.
 SECOND_SETS = {"none": "", "velocity": "v", "acceleration": "a", "both": "va"}
@@ -98,7 +98,7 @@ class Candidates:
 
     factors: Factors
     #: (T, K) indices of each candidate's factors; 0 stands for the factor 1.
-    index: NDArray[np.intp]
+    index: Index
 
     @property
     def size(self) -> int:
@@ -139,7 +139,7 @@ class DoubleFeatureSet(Candidates):
         return Factors(len(self.revolute))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
+    def index(self) -> Index:  # type: ignore[override]
         """(T, N1 + N2) indices of each candidate's factors; 0 stands for the factor 1."""
         factors, n = self.factors, len(self.revolute)
         s, c, p = (factors.block(kind) for kind in "scq")
@@ -160,7 +160,7 @@ class DoubleFeatureSet(Candidates):
         return np.array([sum(e in first for e in row) for row in self.index])
 
 
-def products(values: Array, index: NDArray[np.intp]) -> Array:
+def products(values: Array, index: Index) -> Array:
     """(N, T) products of the factors ``values`` (N, F) named by ``index`` (T, K), chunk by chunk."""
     out = np.empty((len(index), len(values)))
     for start in range(0, len(values), _CHUNK):
@@ -176,7 +176,7 @@ def products(values: Array, index: NDArray[np.intp]) -> Array:
     return out.T
 
 
-def product_name(row: NDArray[np.intp], names: list[str]) -> str:
+def product_name(row: Index, names: list[str]) -> str:
     """Name of one product: powers written with ``^``, the constant as ``1``."""
     parts = []
     for e in dict.fromkeys(int(e) for e in row if e):

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import phase_name
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Rows of columns evaluated at once.
 _CHUNK = 256
@@ -58,9 +58,9 @@ class EnergyTerms:
         speeds: (p, 2) the joints i <= j (0-based) whose speeds are factors; -1, -1 for a term of U.
     """
 
-    revolute: NDArray[np.bool_]
+    revolute: Mask
     degrees: NDArray[np.int_]
-    sine: NDArray[np.bool_]
+    sine: Mask
     speeds: NDArray[np.int_]
 
     @property
@@ -69,12 +69,12 @@ class EnergyTerms:
         return len(self.sine)
 
     @property
-    def potential(self) -> NDArray[np.bool_]:
+    def potential(self) -> Mask:
         """(p,) which terms belong to U."""
         return np.asarray(self.speeds[:, 0] < 0)
 
     @property
-    def acts(self) -> NDArray[np.bool_]:
+    def acts(self) -> Mask:
         """(n, p) which joints' torque each term appears in."""
         joints = np.arange(len(self.revolute))[:, None]
         return (self.degrees.T != 0) | (joints == self.speeds[:, 0]) | (joints == self.speeds[:, 1])
@@ -186,7 +186,7 @@ def candidates(arm: Arm) -> EnergyTerms:
     )
 
 
-def _degrees(limits: list[int], revolute: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+def _degrees(limits: list[int], revolute: Mask) -> Iterator[tuple[int, ...]]:
     """Degrees within limits; of a wave vector and its negative only the one that starts with a positive entry."""
     ranges = [range(-x if turns else 0, x + 1) for x, turns in zip(limits, revolute, strict=True)]
     for degrees in product(*ranges):
@@ -195,7 +195,7 @@ def _degrees(limits: list[int], revolute: NDArray[np.bool_]) -> Iterator[tuple[i
             yield degrees
 
 
-def _phases(degrees: tuple[int, ...], revolute: NDArray[np.bool_]) -> tuple[bool, ...]:
+def _phases(degrees: tuple[int, ...], revolute: Mask) -> tuple[bool, ...]:
     """Cosine and sine, but only the cosine (one) where no revolute joint takes part."""
     waves = any(k for k, turns in zip(degrees, revolute, strict=True) if turns)
     return (False, True) if waves else (False,)

@@ -13,13 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.regression.determined import combination
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 #: Within a link, what to keep first when one of several parameters must stand for the sum.
 _PREFERENCE = ("mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m")
@@ -63,7 +62,7 @@ class BaseParameters:
         rotors: whether the full parameters include the joints' rotor inertias.
     """
 
-    kept: NDArray[np.intp]
+    kept: Index
     grouping: Array
     rotors: bool = False
 
@@ -90,7 +89,7 @@ class BaseParameters:
         return len(self.kept)
 
     @property
-    def positive(self) -> NDArray[np.bool_]:
+    def positive(self) -> Mask:
         """(r,) sums that no arm makes negative: of masses, principal and rotor inertias, each times a positive number."""
         links = self.grouping.shape[1] // (11 if self.rotors else 10)
         never = [name in ("m", "Ixx", "Iyy", "Izz") for _ in range(links) for name in LINK_PARAMETERS]
@@ -123,7 +122,7 @@ class BaseParameters:
         return np.asarray(start + change)
 
 
-def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
+def _independent(rows: Array, order: list[int]) -> Index:
     """Indices, rising, of the columns that are not sums of those before them in ``order``."""
     basis, kept = np.empty((len(rows), 0)), []
     sizes = np.linalg.norm(rows, axis=0)

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -42,18 +41,18 @@ def residual(model: ReconstructedModel, samples: Samples) -> Array:
     return samples.tau - smooth(samples, model.predict(samples.motion))
 
 
-def score(model: ReconstructedModel, samples: Samples, rows: NDArray[np.bool_] | None = None) -> Score:
+def score(model: ReconstructedModel, samples: Samples, rows: Mask | None = None) -> Score:
     """Score a model on the samples, or on those in ``rows`` (N,)."""
     chosen = np.ones(samples.motion.samples, dtype=bool) if rows is None else rows
     return score_errors(residual(model, samples)[chosen], samples.tau[chosen], samples.moving[chosen])
 
 
-def score_errors(error: Array, tau: Array, moving: NDArray[np.bool_]) -> Score:
+def score_errors(error: Array, tau: Array, moving: Mask) -> Score:
     """Score residuals (N, n) beside the measured torque (N, n), where it is known which samples move (N, n)."""
     return score_of_sums(error_sums(error**2, tau, moving), len(tau))
 
 
-def error_sums(squares: Array, tau: Array, moving: NDArray[np.bool_]) -> Array:
+def error_sums(squares: Array, tau: Array, moving: Mask) -> Array:
     """(2, 3, n) of samples at rest and of moving ones: the squared errors (N, n), the squared torques and the number."""
     terms = (squares, tau**2, np.ones_like(tau))
     return np.array([[np.sum(x, axis=0, where=rows) for x in terms] for rows in (~moving, moving)])

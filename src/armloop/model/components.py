@@ -8,14 +8,13 @@ from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors, product_name, products
 from armloop.features.lagrangian import EnergyTerms
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ModelError
 
 Term = tuple[int, float, str]
@@ -61,7 +60,7 @@ class SparseTerms:
     """
 
     step: int
-    index: NDArray[np.intp]
+    index: Index
     coefficients: Array
     waves: tuple[tuple[int, ...], ...] = ()
     kind: ClassVar[str] = "terms"

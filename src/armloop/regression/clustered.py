@@ -7,15 +7,14 @@ J. Applied Econometrics 38, 2023: the sandwich of Liang and Zeger (1986), correc
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.embedded import unit_scale
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 _RIDGE = 1e-8
 
 
-def clustered_covariance(X: Array, left: Array, cluster: NDArray[np.intp]) -> Array:
+def clustered_covariance(X: Array, left: Array, cluster: Index) -> Array:
     """Covariance (p, p) of fitted coefficients, errors within a cluster being anything, clusters independent.
 
     Args:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: A column whose part outside the others is smaller than this (squared, relative) is theirs already.
 DEPENDENT = 1e-9
@@ -63,11 +62,11 @@ class Moments(Sums):
     def __sub__(self, other: Moments) -> Moments:
         return Moments(self.G - other.G, self.b - other.b, self.yy - other.yy, self.count - other.count)
 
-    def take(self, columns: NDArray[np.intp]) -> Moments:
+    def take(self, columns: Index) -> Moments:
         """The problem restricted to some columns."""
         return Moments(self.G[np.ix_(columns, columns)], self.b[columns], self.yy, self.count)
 
-    def solve(self, columns: NDArray[np.intp] | None = None) -> Array:
+    def solve(self, columns: Index | None = None) -> Array:
         """Least-squares coefficients, scaled Cholesky with a relative ridge of 1e-13 against round-off."""
         sub = self if columns is None else self.take(columns)
         if len(sub.b) == 0:
@@ -75,13 +74,13 @@ class Moments(Sums):
         scale, G = equilibrated(sub.G, 1e-13 * len(sub.b))
         return scale * cho_solve(cho_factor(G, check_finite=False), scale * sub.b, check_finite=False)
 
-    def refitted(self, support: NDArray[np.intp]) -> Array:
+    def refitted(self, support: Index) -> Array:
         """(p,) least-squares coefficients on a support, zero elsewhere."""
         beta = np.zeros(len(self.b))
         beta[support] = self.solve(support)
         return beta
 
-    def gains(self, support: NDArray[np.intp], others: NDArray[np.intp] | None = None) -> tuple[float, Array]:
+    def gains(self, support: Index, others: Index | None = None) -> tuple[float, Array]:
         """Squared error of a support, and by how much each further column alone would lower it.
 
         Args:
@@ -101,14 +100,14 @@ class Moments(Sums):
         gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, TINY), 0.0)
         return max(self.yy - float(h @ h), 0.0), gains
 
-    def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
+    def losses(self, support: Index) -> tuple[float, Array]:
         """Squared error of a support, and by how much dropping each of its columns alone would raise it."""
         scale, S = equilibrated(self.G[np.ix_(support, support)], 1e-12)
         inverse = np.linalg.inv(S)
         beta = inverse @ (scale * self.b[support])
         return max(self.yy - float(beta @ (scale * self.b[support])), 0.0), beta**2 / np.diag(inverse)
 
-    def squared_error(self, beta: Array, columns: NDArray[np.intp] | None = None) -> float:
+    def squared_error(self, beta: Array, columns: Index | None = None) -> float:
         """Σ (y − x β)² for given coefficients; round-off can make it slightly negative, so it is clipped."""
         sub = self if columns is None else self.take(columns)
         return max(0.0, sub.yy - 2 * float(beta @ sub.b) + float(beta @ sub.G @ beta))

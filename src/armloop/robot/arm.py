@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, serial_chain
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ArmError
 from armloop.util.given import path_of, require
 from armloop.util.quiet import quiet
@@ -112,12 +111,12 @@ class Arm:
         return len(self.joints)
 
     @property
-    def revolute(self) -> NDArray[np.bool_]:
+    def revolute(self) -> Mask:
         """(n,) true where the joint turns, false where it slides."""
         return np.array([joint.kind == "revolute" for joint in self.joints])
 
     @property
-    def effort(self) -> NDArray[np.float64]:
+    def effort(self) -> Array:
         """(n,) limits of the generalized forces, N·m (N); infinite where there is none."""
         return np.array([joint.effort for joint in self.joints])
 

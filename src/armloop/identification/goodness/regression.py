@@ -8,12 +8,11 @@ Learning 24, 1996); where neither finds anything, both weights vanish, and so do
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.identification.goodness.split import FOLDS, Split
 from armloop.regression.moments import Moments, total
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
 _PENALTIES = tuple(10.0**k for k in range(-5, 2))
@@ -36,7 +35,7 @@ def left_out(X: Array, y: Array, cut: Split) -> Array:
     return stacked
 
 
-def _ridge(X: Array, y: Array, block: NDArray[np.intp], asked: Array) -> Array:
+def _ridge(X: Array, y: Array, block: Index, asked: Array) -> Array:
     """Ridge regression on standardised columns; the penalty by the error on blocks left out."""
     mean, scale = X.mean(axis=0), X.std(axis=0)
     used = scale > 1e-9 * np.maximum(np.abs(mean), TINY)

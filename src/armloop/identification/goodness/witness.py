@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.goodness.features import Scales, features
 from armloop.regression.moments import Sums
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 #: Most rows of a joint, and seconds that runs of different logs lie apart.
 MOST, APART = 2500, 1e4
@@ -33,7 +32,7 @@ class JointRows:
     residual: Array
     torque: Array
     place: Array
-    run: NDArray[np.intp]
+    run: Index
     judged: Mask
 
     def __add__(self, other: JointRows) -> JointRows:

@@ -14,7 +14,6 @@ from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.filters import filter_reach
 from armloop.data.log import MotionLog
@@ -165,8 +164,8 @@ class Table:
 
     columns: Array
     tau: Array
-    blocks: NDArray[np.intp]
-    moving: NDArray[np.bool_]
+    blocks: Index
+    moving: Mask
     motion: Motion
     stride: int
 
@@ -206,7 +205,7 @@ def table_at(
         unit: (n,) that of the positions, in rad (m): so that dry friction fades at the same speeds in any.
         aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
     """
-    parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
+    parts: list[tuple[Array, Array, Index, Mask]] = []
     motions: list[Motion] = []
     lowest, following = min(corners), 0
     stride = max(1, sum(log.samples for log in logs) * arm.n // _ROWS)

@@ -17,7 +17,6 @@ from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers, stretch
 from armloop.data.log import MotionLog
@@ -25,7 +24,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, ShortRunError, independent_rows, preprocess, velocity_noise
 from armloop.identification.reconstruction.options import Options
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
@@ -56,7 +55,7 @@ class Chunk:
     """
 
     samples: Samples
-    blocks: NDArray[np.intp]
+    blocks: Index
     held_out: Mask
     validation: Mask
     independent: Mask
@@ -100,14 +99,14 @@ class Chunk:
         """Consecutive samples."""
         return self._of(stretch(self.samples, low, high), slice(low, high))
 
-    def take(self, rows: NDArray[np.intp]) -> Chunk:
+    def take(self, rows: Index) -> Chunk:
         """Some samples, in order; each run keeps at least one."""
         old, motion = self.samples, self.samples.motion
         taken = motion.take(rows, np.searchsorted(rows, motion.starts).astype(np.intp))
         samples = replace(old, motion=taken, tau=old.tau[rows], moving=old.moving[rows], unknown=None)
         return self._of(samples, rows)
 
-    def _of(self, samples: Samples, rows: slice | NDArray[np.intp]) -> Chunk:
+    def _of(self, samples: Samples, rows: slice | Index) -> Chunk:
         """Samples, which are some of these, with the parts they play."""
         return replace(self, samples=samples, **{k: x[rows] for k, x in self.roles().items()})
 

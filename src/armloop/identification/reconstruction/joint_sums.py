@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Moments, Sums
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +26,7 @@ class Dealt:
 
     label: Index
     count: int
-    judges: NDArray[np.bool_]
+    judges: Mask
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from armloop.data.blocks import block_sums
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 _RIDGE = 1e-7
 #: Directions of the model's columns that are weaker than this part of the strongest span nothing.
@@ -63,7 +62,7 @@ class Rows:
     weight: Array
     fold: Index
     block: Index
-    inside: NDArray[np.bool_]
+    inside: Mask
 
     def pieces(self) -> list[tuple[int, int, slice]]:
         """Joint and fold of every stretch of rows that share them."""

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armloop.data.blocks import block_numbers
@@ -23,7 +22,7 @@ from armloop.identification.reconstruction.projected import block_covariance, bl
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
 _BAND = 0.4
@@ -46,7 +45,7 @@ class Residual:
 
 
 def find_ripple(
-    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: Mask
 ) -> list[AddedEffect]:
     """Ripples of all joints that turn, strongest first at each.
 
@@ -116,7 +115,7 @@ def _waves(q: Array, order: float) -> Array:
 
 
 def _residuals(
-    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: Mask
 ) -> tuple[list[Residual], float]:
     """Per joint, what the model leaves of the unfiltered torque where the joint moves; and the sample period, s."""
     fine = replace(model.conditioning, oversampling=1e9)

@@ -10,7 +10,6 @@ import warnings
 
 import numpy as np
 import pysindy
-from numpy.typing import NDArray
 
 from armloop.data.blocks import folds
 from armloop.data.motion import Samples
@@ -21,7 +20,7 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
 
@@ -32,9 +31,7 @@ _MOST_SAMPLES = 4000
 _FEWEST_SAMPLES = 100
 
 
-def sindy(
-    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
-) -> Found:
+def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress: Progress) -> Found:
     """Regress the one-shot library with pysindy's STLSQ; threshold and order N1 by held-out error.
 
     The joints' own friction columns, sign(v) and v, are offered to it as they are to the stepwise method.

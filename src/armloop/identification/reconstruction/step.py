@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.angle_sums import AngleSums
 from armloop.features.double_feature_set import DoubleFeatureSet, Factors
@@ -27,7 +26,7 @@ from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError, InputError
 
 #: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
@@ -146,7 +145,7 @@ class _Joint:
     fit: Moments
     all: Moments
     size: int
-    distinct: NDArray[np.bool_]
+    distinct: Mask
     fixed: Index
     profile: Index
     scale: float

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -23,7 +22,7 @@ from armloop.identification.reconstruction.pooled import Pooled
 from armloop.identification.reconstruction.shared import PLAIN_FRICTION, fast_rows, sliding_rows
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Sums
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Consecutive samples that tell laws of the catalogue apart as well as more do.
 _WINDOW = 150_000
@@ -141,7 +140,7 @@ class Training:
         return Pooled(JointSums.of(self.window, design, laws, _at_once), laws, 1, self.repeats, passive)
 
 
-def fitted_rows(chunk: Chunk) -> NDArray[np.bool_]:
+def fitted_rows(chunk: Chunk) -> Mask:
     """(N, n) samples that slide and may be fitted."""
     return np.asarray(sliding_rows(chunk.samples) & ~chunk.held_out[:, None])
 

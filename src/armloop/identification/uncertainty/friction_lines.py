@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Speeds at which a law is compared with its line, and the quantiles of the fitted speeds that they lie between.
 _SPEEDS, _BETWEEN = 100, (0.1, 0.95)
@@ -32,7 +31,7 @@ def friction_line(
     covariance: Array,
     freedom: float,
     samples: Samples,
-    rows: NDArray[np.bool_],
+    rows: Mask,
 ) -> dict[str, Any]:
     """f_c, f_v of a joint (0-based) with standard errors, and the speeds between which they hold.
 

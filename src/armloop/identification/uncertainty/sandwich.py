@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.clustered import delete_one
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
 _RIDGE = 1e-10
@@ -38,7 +37,7 @@ class Equations:
     jacobian: Array
     score: Array
     count: Array
-    stage: NDArray[np.intp]
+    stage: Index
     variance: Array
 
     @property

@@ -13,7 +13,6 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import overlapping
 from armloop.data.motion import Samples
@@ -30,7 +29,7 @@ from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Probl
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, identifiable
 from armloop.regression.moments import added
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0
@@ -48,7 +47,7 @@ class Fitted:
     """
 
     steps: tuple[int, ...]
-    rows: NDArray[np.bool_]
+    rows: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,10 +241,10 @@ class Assembled:
 class _Portion:
     """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,)."""
 
-    index: NDArray[np.intp]
+    index: Index
     joint: int
     stage: int
-    where: NDArray[np.intp]
+    where: Index
     X: Array
     r: Array
 
@@ -266,7 +265,7 @@ def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Itera
                 yield _Portion(start + inside, design.joint, s, design.where, X, r)
 
 
-def _stages(problem: Problem, fitted: Sequence[Fitted]) -> NDArray[np.intp]:
+def _stages(problem: Problem, fitted: Sequence[Fitted]) -> Index:
     order = {step: s for s, one in enumerate(fitted) for step in one.steps}
     return np.array([order[unknown.step] for unknown in problem.unknowns], dtype=np.intp)
 
@@ -287,7 +286,7 @@ def _equations(
     problem: Problem,
     samples: Samples,
     fitted: Sequence[Fitted],
-    blocks: NDArray[np.intp],
+    blocks: Index,
     spread: Array,
     squares: Array | None = None,
 ) -> Equations:
@@ -340,7 +339,7 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
 
 
 def _line(
-    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: NDArray[np.bool_]
+    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: Mask
 ) -> dict[str, Any]:
     """:func:`friction_line` of a joint, whose friction is all in one problem."""
     for part in parts:

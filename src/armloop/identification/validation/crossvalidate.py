@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.repeats import require_different
@@ -17,6 +16,7 @@ from armloop.identification.scoring import Score, residual, score_errors
 from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows
 from armloop.model import ReconstructedModel, model_of
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Mask
 from armloop.util.checkpoints import Kept, digest
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
@@ -161,7 +161,7 @@ def crossvalidate(
 
 
 #: (N, n) residual, measured torque, and which samples move, of the samples that judge.
-_Judged = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+_Judged = tuple[Array, Array, Mask]
 
 
 def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:

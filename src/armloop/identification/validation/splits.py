@@ -13,12 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.log import GAP_PERIODS, MotionLog
 from armloop.data.motion import Motion, Samples
-from armloop.util.arrays import Mask
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 
 #: Seconds since 1970 are known to 0.24 µs; no two samples are so near.
@@ -38,7 +37,7 @@ class Split:
 
     name: str
     training: list[MotionLog]
-    left_out: dict[int, NDArray[np.float64]]
+    left_out: dict[int, Array]
 
 
 def by_file(logs: Sequence[MotionLog]) -> list[Split]:
@@ -89,7 +88,7 @@ def by_blocks(logs: Sequence[MotionLog], seconds: float) -> list[Split]:
     return splits
 
 
-def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np.float64]) -> Mask:
+def judging_rows(time: Array, samples: Samples, blocks: Array) -> Mask:
     """(N,) samples inside the blocks (R, 2), those left aside that the filter may have mixed with others.
 
     Args:
