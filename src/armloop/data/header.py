@@ -52,10 +52,7 @@ def columns_of(path: Path, header: Sequence[str], joints: int | None = None) -> 
     n = max((number for numbers in found.values() for number in numbers), default=1)
     # A header without any q is none: v may be missing only where it can be differentiated.
     kinds = [
-        "q",
-        *(["v"] if found["v"] or not found["q"] else []),
-        "tau",
-        *(["vdot"] if found["vdot"] else []),
+        kind for kind in found if found[kind] or kind in ("q", "tau") or (kind == "v" and not found["q"])
     ]
     missing = [] if "time" in header else ["time"]
     missing += [f"{kind}{j}" for kind in kinds for j in range(1, n + 1) if j not in found[kind]]

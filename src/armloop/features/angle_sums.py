@@ -16,7 +16,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.features.double_feature_set import SECOND_SETS, Candidates, Factors
+from armloop.features.double_feature_set import SECOND_SETS, Candidates, Factors, padded
 from armloop.util.arrays import Index
 
 
@@ -78,9 +78,7 @@ class AngleSums(Candidates):
             first += [(*powers, block[place[wave]]) for block in (c, s)] if any(wave) else [powers]
         rates = [e for kind in SECOND_SETS[self.second] for e in factors.block(kind)]
         second = list(combinations_with_replacement([0, *rates], self.N2)) if rates else [()]
-        rows = [sorted(e for e in a + b if e) for b in second for a in first]
-        width = max(1, *map(len, rows))
-        return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp)
+        return padded([sorted(e for e in a + b if e) for b in second for a in first])
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""

@@ -11,7 +11,7 @@ and do not give the paper's own tables; without it |F1| = C(α1 + N1, N1), which
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -150,14 +150,18 @@ class DoubleFeatureSet(Candidates):
             first = [m for m in first if all(m.count(e) < 2 for e in cosines.intersection(m))]
         rates = [e for kind in SECOND_SETS[self.second] for e in factors.block(kind)]
         second = list(combinations_with_replacement([0, *rates], self.N2)) if rates else [()]
-        width = max(1, self.N1 + (self.N2 if rates else 0))
-        rows = [sorted(a + b) for b in second for a in first]
-        return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
+        return padded([sorted(a + b) for b in second for a in first])
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""
         first = set(self.factors.block("s") + self.factors.block("c") + self.factors.block("q"))
         return np.array([sum(e in first for e in row) for row in self.index])
+
+
+def padded(rows: Sequence[Sequence[int]]) -> Index:
+    """(T, K) factors of products of at most K of them, with the factor 1 before those of shorter ones."""
+    width = max([1, *map(len, rows)])
+    return np.array([[0] * (width - len(row)) + [*row] for row in rows], dtype=np.intp).reshape(-1, width)
 
 
 def products(values: Array, index: Index) -> Array:

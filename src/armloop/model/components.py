@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.features.double_feature_set import Factors, product_name, products
+from armloop.features.double_feature_set import Factors, padded, product_name, products
 from armloop.features.lagrangian import EnergyTerms
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
@@ -87,11 +87,7 @@ class SparseTerms:
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        n = self.coefficients.shape[1]
-        joints = []
-        for j in range(n):
-            used = np.flatnonzero(self.coefficients[:, j])
-            joints.append({self._names[t]: float(self.coefficients[t, j]) for t in used})
+        joints = [{self._names[t]: float(c[t]) for t in np.flatnonzero(c)} for c in self.coefficients.T]
         return {"kind": self.kind, "step": self.step, "joints": joints}
 
     @staticmethod
@@ -101,9 +97,7 @@ class SparseTerms:
         waves = _waves_in(names, arm.n)
         factors = Factors(arm.n, waves)
         known = {factor: e for e, factor in enumerate(factors.names)}
-        rows = [_parse_product(name, known, arm.n) for name in names]
-        width = max([len(row) for row in rows], default=1)
-        index = np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
+        index = padded([_parse_product(name, known, arm.n) for name in names])
         coefficients = np.array([[float(joint.get(name, 0.0)) for joint in joints] for name in names])
         return SparseTerms(int(data["step"]), index, coefficients.reshape(-1, arm.n), waves)
 

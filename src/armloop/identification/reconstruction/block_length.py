@@ -73,9 +73,7 @@ def independent_blocks(
         except ShortRunError:
             continue
         covered += samples.motion.samples * samples.period
-        # the middle of its motion
-        first = max(0, (samples.motion.samples - _SAMPLES // len(some)) // 2)
-        parts.append(stretch(samples, first, min(samples.motion.samples, first + _SAMPLES // len(some))))
+        parts.append(_middle(samples, _SAMPLES // len(some)))
     if not parts:
         return Blocks(seconds, how.reach, 0.0)
     covered *= len(logs) / len(some)
@@ -108,3 +106,10 @@ def _correlation(arm: Arm, parts: Sequence[Samples]) -> float:
         ]
         times.append(float(np.median(found)) if found else period)
     return max(times, default=period)
+
+
+def _middle(samples: Samples, length: int) -> Samples:
+    """The middle of a motion, so many samples."""
+    N = samples.motion.samples
+    first = max(0, (N - length) // 2)
+    return stretch(samples, first, min(N, first + length))

@@ -194,22 +194,16 @@ def reconstruct(
             found.notes += zeros.notes(arm)
         return Attempt(library, how, data, found, blocks.margin)
 
+    tried = [Contender(one, refused=why) for one, why in refused.items()]
     if len(left) == 1:
-        tried = [
-            Contender(one, attempt(one), chosen=True) if one in left else Contender(one, refused=refused[one])
-            for one in wanted
-        ]
-        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, blocks)
-    tried = [
-        Contender(one, refused=refused[one])
-        if one in refused
-        else contender(one, partial(attempt, nested=few))
-        for one in wanted
-    ]
-    tried = choose(tried)
+        tried += [Contender(one, attempt(one), chosen=True) for one in left]
+    else:
+        tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
+    tried.sort(key=lambda one: wanted.index(one.library))
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
-    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, blocks)
+    part: Part = "all" if few or len(left) == 1 else "test"
+    return _finished(tried, part, arm, method, logs, settings, progress, recorded, blocks)
 
 
 def filter_and_blocks(

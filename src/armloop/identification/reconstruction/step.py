@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from armloop.features.angle_sums import AngleSums
-from armloop.features.double_feature_set import DoubleFeatureSet, Factors
+from armloop.features.double_feature_set import DoubleFeatureSet, Factors, padded
 from armloop.features.wave_moments import WaveProducts
 from armloop.identification.reconstruction.attenuation import without_attenuation
 from armloop.identification.reconstruction.data import Data
@@ -120,10 +120,8 @@ def candidates_of(revolute: tuple[bool, ...], plan: StepPlan) -> Candidates:
             if part.step > 1 and (second == 0 or first > N1):
                 continue
             rows.setdefault(key, (part.step, int(first), second))
-    width = max(1, *(len(key) for key in rows))
-    index = np.array([[0] * (width - len(key)) + list(key) for key in rows], dtype=np.intp)
     step, first_order, second_order = np.array(list(rows.values()), dtype=np.intp).T
-    return Candidates(factors, index, step, first_order, second_order, plan.still)
+    return Candidates(factors, padded(list(rows)), step, first_order, second_order, plan.still)
 
 
 def _second_order(part: Part, N2: int) -> int:
