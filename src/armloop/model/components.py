@@ -103,7 +103,7 @@ class SparseTerms:
 
 
 _WAVE = re.compile(r"(?:sin|cos)\(([^()]*)\)")
-_ADDEND = re.compile(r"([+-]?)(?:(\d)\*)?q(\d)")
+_ADDEND = re.compile(r"([+-]?)(?:(\d+)\*)?q(\d+)")
 
 
 def _waves_in(names: list[str], n: int) -> tuple[tuple[int, ...], ...]:
@@ -121,7 +121,7 @@ def _waves_in(names: list[str], n: int) -> tuple[tuple[int, ...], ...]:
 def _parse_product(name: str, known: dict[str, int], n: int) -> list[int]:
     row: list[int] = []
     for part in re.split(r"\*(?![^(]*\))", name):
-        match = re.fullmatch(r"(.+?)(?:\^(\d))?", part)
+        match = re.fullmatch(r"(.+?)(?:\^(\d+))?", part)
         if match is None or match[1] not in known:
             raise ModelError(f"unknown term {name!r}: {part!r} is no function of {n} joints")
         row += [known[match[1]]] * int(match[2] or 1)
