@@ -138,12 +138,12 @@ def test_time_is_counted_from_the_start_of_the_record_not_from_the_first_sample_
     other = MotionLog(50.0 + time, wave, np.cos(time)[:, None], wave)
     motion = preprocess([log, other], Conditioning(10.0)).motion
     first, second, third = motion.starts[:3]
-    elapsed = motion.elapsed()
+    elapsed = motion.elapsed
     # half a period of the corner is cut off; after the gap the same log goes on, and the next counts anew
     np.testing.assert_allclose(elapsed[[first, second, third]], [0.05, 5.05, 0.05], atol=1e-9)
     alone = preprocess([log], Conditioning(10.0)).motion
-    np.testing.assert_array_equal(Motion.joined([alone, alone]).elapsed(), np.tile(alone.elapsed(), 2))
-    np.testing.assert_array_equal(replace(motion, begins=None).elapsed()[[first, third]], 0.0)
+    np.testing.assert_array_equal(Motion.joined([alone, alone]).elapsed, np.tile(alone.elapsed, 2))
+    np.testing.assert_array_equal(replace(motion, begins=None).elapsed[[first, third]], 0.0)
 
 
 def test_smoothing_a_prediction_keeps_runs_apart_too():

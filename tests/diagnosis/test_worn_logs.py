@@ -11,7 +11,6 @@ import rubbing_arm
 from rubbing_arm import model_with_baseline
 
 from armloop.data import signals
-from armloop.data.dropouts import Repaired
 from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
 from armloop.model import ReconstructedModel
@@ -72,5 +71,5 @@ def test_of_a_clean_run(model: ReconstructedModel) -> None:
 def test_taken_as_it_is_a_stuck_torque_would_be_events(
     model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(signals, "repaired", lambda log, lag: Repaired(log.q, log.v, log.tau, None))
+    monkeypatch.setattr(signals, "repaired", lambda log, lag: log)
     assert len(diagnose(model, [stuck(run(6, 0.5))], jobs=1).contacts) > 1

@@ -1,11 +1,14 @@
-"""A rigid body's torques are those of its regressor, whichever way they are computed."""
+"""A rigid body's torques are those of its regressor, however they are computed; sparse terms are what they are called."""
+
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from armloop.data.motion import Motion
 from armloop.features.rigid_body import full_columns
-from armloop.model.components import RigidBody
+from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import load_arm
 
 
@@ -31,3 +34,13 @@ def test_what_a_bound_holds_at_zero_is_not_printed() -> None:
     assert found == ["J2: 0.5 = J2"] and units.startswith("Yj[p] is the torque of joint j per unit")
     assert not RigidBody(np.zeros(33), ("J2",), np.zeros(1)).legend()
     assert body.to_dict()["base_parameters"] == {"mx2 + 0.4 m3": 0.0, "J2": 0.5}
+
+
+def test_waves_of_angles_beyond_the_ninth_are_read_as_they_are_written() -> None:
+    wave = tuple(int(k) for k in (0, 0, 0, 0, 0, 0, 0, 0, 2, 0, -12))
+    index = np.array([[1, 3 + 11 + 10, 3 + 11 + 10]])
+    terms = SparseTerms(2, index, np.eye(11)[:1], (wave,))
+    assert list(terms.to_dict()["joints"][0]) == ["sin(2*q9-12*q11)*v11^2"]
+    joints: Any = SimpleNamespace(n=11)
+    again = SparseTerms.from_dict(terms.to_dict(), joints)
+    assert again.waves == (wave,) and again.to_dict() == terms.to_dict()

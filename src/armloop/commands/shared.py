@@ -115,7 +115,7 @@ def check_columns(paths: list[str], arm: Arm | None) -> None:
             raise LogError(
                 f"{path}: is packed; unpack it first (gzip -d, unzip): a motion log ends in .csv or .parquet"
             )
-        n, _ = check_header(Path(path))
+        n = len(check_header(Path(path))["q"])
         if arm is not None and n != arm.n:
             names = ", ".join(arm.joint_names)
             # of a model's arm there is no URDF in which a joint could be locked

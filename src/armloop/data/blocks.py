@@ -6,16 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from armloop.data.motion import Motion, Samples
-from armloop.util.arrays import Mask
+from armloop.util.arrays import Array, Index, Mask
 
 
-def block_numbers(
-    motion: Motion, seconds: float, spans: NDArray[np.float64] | None = None
-) -> NDArray[np.intp]:
+def block_numbers(motion: Motion, seconds: float, spans: Array | None = None) -> Index:
     """(N,) number of the block each sample lies in: runs, cut into pieces of at most ``seconds``.
 
     Args:
@@ -37,12 +34,12 @@ def block_numbers(
     return numbers
 
 
-def folds(samples: Samples, count: int, seconds: float) -> NDArray[np.intp]:
+def folds(samples: Samples, count: int, seconds: float) -> Index:
     """(N,) fold of each sample: blocks dealt out in turn, so that every fold sees all parts of the data."""
     return block_numbers(samples.motion, seconds, samples.spans) % count
 
 
-def halves(blocks: NDArray[np.intp]) -> NDArray[np.intp]:
+def halves(blocks: Index) -> Index:
     """(N,) fold, 0 or 1, of samples in numbered blocks: permuted block randomisation, of every two blocks one each.
 
     Dealt out in turn, each of two folds would see but half of a motion that repeats itself.
@@ -59,7 +56,7 @@ def widened(rows: Mask, motion: Motion, reach: int) -> Mask:
     return wide
 
 
-def block_sums(values: NDArray[np.float64], blocks: NDArray[np.intp]) -> NDArray[np.float64]:
+def block_sums(values: Array, blocks: Index) -> Array:
     """(B,) sums of values (N,) over the blocks that occur, in order."""
     _, index = np.unique(blocks, return_inverse=True)
     return np.asarray(np.bincount(index, weights=values), dtype=float)

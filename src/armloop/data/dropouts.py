@@ -9,12 +9,12 @@ to the last digit, or is cut off, is left out: nothing is fitted to it, and noth
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, Mask, stretches
+from armloop.util.arrays import TINY, Array, Index, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
 _SPIKE, _BACK = 15.0, 0.3
@@ -38,28 +38,8 @@ _FEWEST_TO_SHIFT = 4
 _CUT, _PILED, _LEVELS_BESIDE, _LEVELS = 0.01, 10, 5, 50
 
 
-@dataclass(frozen=True, eq=False)
-class Repaired:
-    """A record without spikes, v in time with q.
-
-    Attributes:
-        q, v, tau: (N, n).
-        lost: (N, n) samples whose torque is no measurement; None where there are none.
-    """
-
-    q: Array
-    v: Array
-    tau: Array
-    lost: Mask | None
-
-    def part(self, rows: slice) -> Repaired:
-        """Some of its rows."""
-        lost = None if self.lost is None else self.lost[rows]
-        return Repaired(self.q[rows], self.v[rows], self.tau[rows], lost)
-
-
-def repaired(log: Recorded, lag: float = 0.0) -> Repaired:
-    """The record without spikes, v moved to where q changes as it says, and which torques are none.
+def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
+    """The record without spikes, v moved to where q changes as it says, and which torques are none (``lost``).
 
     Args:
         lag: seconds by which v is late.
@@ -72,7 +52,7 @@ def repaired(log: Recorded, lag: float = 0.0) -> Repaired:
             lost[first : last + 1, j] = True
         for value, _ in cut:
             lost[:, j] |= clean.tau[:, j] == value
-    return Repaired(clean.q, _in_time(clean, lag), clean.tau, lost if lost.any() else None)
+    return replace(clean, v=_in_time(clean, lag), lost=lost if lost.any() else None)
 
 
 def _in_time(log: Recorded, lag: float) -> Array:

@@ -12,25 +12,18 @@ from armloop.util.errors import LogError
 _JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
 
 
-def check_header(path: Path, joints: int | None = None) -> tuple[int, bool]:
-    """Return the number of joints of a file and whether accelerations are there, from its header alone.
-
-    joints : how many joints the arm has; None takes what the file has
-
-    Raises `LogError` when the file is missing or its columns are not those of a log.
-    """
-    n, has_vdot = joints_of(path, read_header(path))
-    if joints is not None and n != joints:
-        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
-    return n, has_vdot
+def check_header(path: Path, joints: int | None = None) -> dict[str, list[str]]:
+    """The columns of a file's header, as of :func:`columns_of`; raises `LogError` when the file is missing, too."""
+    return columns_of(path, read_header(path), joints)
 
 
-def joints_of(path: Path, header: Sequence[str]) -> tuple[int, bool]:
-    """Return the number of joints of the columns of a header and whether accelerations are among them.
+def columns_of(path: Path, header: Sequence[str], joints: int | None = None) -> dict[str, list[str]]:
+    """Return the names of the columns of each kind that is there, ``q`` and ``tau`` at least, joint by joint.
 
     path : where they stand, for the message
+    joints : how many joints the arm has; None takes what the header has
 
-    Raises `LogError` when they are not those of a log.
+    Raises `LogError` when they are not those of a log, or of another number of joints.
     """
     if header and header[0].startswith(("#", "%", "//")):
         raise LogError(
@@ -59,10 +52,7 @@ def joints_of(path: Path, header: Sequence[str]) -> tuple[int, bool]:
     n = max((number for numbers in found.values() for number in numbers), default=1)
     # A header without any q is none: v may be missing only where it can be differentiated.
     kinds = [
-        "q",
-        *(["v"] if found["v"] or not found["q"] else []),
-        "tau",
-        *(["vdot"] if found["vdot"] else []),
+        kind for kind in found if found[kind] or kind in ("q", "tau") or (kind == "v" and not found["q"])
     ]
     missing = [] if "time" in header else ["time"]
     missing += [f"{kind}{j}" for kind in kinds for j in range(1, n + 1) if j not in found[kind]]
@@ -72,8 +62,10 @@ def joints_of(path: Path, header: Sequence[str]) -> tuple[int, bool]:
             "it must be time,q1..qn,v1..vn,tau1..taun (optionally vdot1..vdotn; v may be left out) with one n; "
             "`armloop convert` reads other names and units"
         )
-    return n, bool(found["vdot"])
+    if joints is not None and n != joints:
+        raise LogError(f"{path}: the columns are those of {n} joints; the arm has {joints}")
+    return {kind: [f"{kind}{j}" for j in range(1, n + 1)] for kind, numbers in found.items() if numbers}
 
 
-def _listed(names: Sequence[str], most: int = 6) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")

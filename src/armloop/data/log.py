@@ -10,18 +10,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from html import escape
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armloop.data.header import check_header, joints_of
+from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
-from armloop.data.tables import place, read_columns, read_header, said_of, write_columns
+from armloop.data.tables import place, read_columns, said_of, write_columns
+from armloop.util.arrays import Array, Mask
 from armloop.util.doubts import warn
 from armloop.util.errors import LogError
 from armloop.util.given import path_of
@@ -54,16 +55,16 @@ class MotionLog:
     a v that is not the rate of q.
     """
 
-    time: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    tau: NDArray[np.float64]
-    vdot: NDArray[np.float64] | None = None
+    time: Array
+    q: Array
+    v: Array
+    tau: Array
+    vdot: Array | None = None
     name: str = "log"
     tau_unit: str = "N*m"
     v_derived: bool = False
 
-    def columns(self) -> dict[str, NDArray[np.float64]]:
+    def columns(self) -> dict[str, Array]:
         """Return what was measured by the names of the columns of its file, (N,) each, in their order."""
         columns = {"time": self.time}
         for kind, values in (("q", self.q), ("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
@@ -72,17 +73,11 @@ class MotionLog:
         return columns
 
     def __post_init__(self) -> None:
-        if self.tau_unit not in TAU_UNITS:
-            raise LogError(
-                f"{self.name}: tau unit {self.tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}"
-            )
+        _check_unit(self.tau_unit, self.name)
         for key in ("time", "q", "v", "tau", "vdot"):
             if key != "vdot" or self.vdot is not None:
                 object.__setattr__(self, key, _numbers(getattr(self, key), key, self.name))
-        if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
-            raise LogError(
-                f"{self.name}: time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}"
-            )
+        _check_shapes(self.time, self.q, self.name)
         if 0 in self.q.shape:
             raise LogError(f"{self.name}: q is {self.q.shape}; a log has samples and joints")
         for label, values in (("v", self.v), ("tau", self.tau), ("vdot", self.vdot)):
@@ -140,29 +135,16 @@ class MotionLog:
                 f"{name}: {type(frame).__name__} has no columns by name; give a data frame or a dict of columns "
                 "time,q1..,v1..,tau1.., or arrays to MotionLog.from_arrays"
             )
-        header = [str(column) for column in names]
-        n, _ = joints_of(Path(name), header)
-        if joints is not None and n != joints:
-            raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
-        kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
+        kinds = columns_of(Path(name), [str(column) for column in names], joints)
         seconds = _numbers(frame["time"], "time", name)
-        columns: dict[str, NDArray[np.float64]] = {}
-        for key in (f"{kind}{j}" for kind in kinds for j in range(1, n + 1)):
+        columns: dict[str, Array] = {}
+        for key in chain(*kinds.values()):
             columns[key] = _numbers(frame[key], key, name)
             if columns[key].shape != seconds.shape or seconds.ndim != 1:
                 raise LogError(
                     f"{name}: {key} has the shape {columns[key].shape}, time {seconds.shape}; each column must be (N,)"
                 )
-        cells = {kind: np.stack([columns[f"{kind}{j}"] for j in range(1, n + 1)], axis=1) for kind in kinds}
-        return cls.from_arrays(
-            seconds,
-            cells["q"],
-            cells["tau"],
-            v=cells.get("v"),
-            vdot=cells.get("vdot"),
-            name=name,
-            tau_unit=tau_unit,
-        )
+        return cls.from_arrays(seconds, **_side_by_side(columns, kinds), name=name, tau_unit=tau_unit)
 
     def __repr__(self) -> str:
         runs, seconds = len(self.runs()), float(self.time[-1] - self.time[0])
@@ -224,7 +206,7 @@ class MotionLog:
         """Return the log itself: in memory it is its own source (see `armloop.data.pieces`)."""
         return self
 
-    def select(self, rows: slice | NDArray[np.bool_]) -> "MotionLog":
+    def select(self, rows: slice | Mask) -> "MotionLog":
         """Return the log of these samples only; a slice gives views."""
         cut = {
             key: None if getattr(self, key) is None else getattr(self, key)[rows]
@@ -253,9 +235,8 @@ def read_log(
     Raises `LogError`, one line that names the file, the column or row, what is wrong and what would be right.
     """
     path = path_of(path, "the path of a log", LogError)
-    if not isinstance(tau_unit, str) or tau_unit not in TAU_UNITS:
-        raise LogError(f"{path}: tau unit {tau_unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
-    n, _ = check_header(path, joints)
+    _check_unit(tau_unit, path)
+    kinds = check_header(path, joints)
     told = said_of(path, _UNIT)
     if told not in (None, *TAU_UNITS):
         raise LogError(
@@ -266,16 +247,12 @@ def read_log(
             f"{path}: tau holds motor currents (A), as the file itself says; give --tau-unit A, and --drive-gains to make "
             "torques of them"
         )
-    gains = None if drive_gains is None else _check_gains(path, drive_gains, n)
+    gains = None if drive_gains is None else _check_gains(path, drive_gains, len(kinds["q"]))
 
-    header = read_header(path)
-    kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
-    names = ["time", *(f"{kind}{j}" for kind in kinds for j in range(1, n + 1))]
     # The row before some is checked with them: what does not follow from it is a fault there, as in the whole.
     first, before = (max(0, rows[0] - 1), min(1, rows[0])) if rows else (0, 0)
-    table = read_columns(path, names, (first, rows[1]) if rows else None)
-    stacked = {kind: np.stack([table.pop(f"{kind}{j}") for j in range(1, n + 1)], axis=1) for kind in kinds}
-    time = table["time"]
+    table = read_columns(path, ["time", *chain(*kinds.values())], (first, rows[1]) if rows else None)
+    time, stacked = table.pop("time"), _side_by_side(table, kinds)
     if len(time) - before < FEWEST_SAMPLES:
         raise LogError(f"{path}: {len(time) - before} rows; a motion log has at least {FEWEST_SAMPLES}")
     derived = "v" not in kinds
@@ -317,7 +294,7 @@ def check_log(path: Path, log: MotionLog, first: int = 0) -> None:
     _check(log, str(path), lambda row: place(path, first + row))
 
 
-def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float64]:
+def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> Array:
     gains = _numbers(drive_gains, "drive_gains", str(path)).reshape(-1)
     if len(gains) != n:
         raise LogError(f"{path}: {len(gains)} drive gains for {n} joints; give one per joint, in N*m/A")
@@ -329,13 +306,12 @@ def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> NDArray[np.float
     return gains
 
 
-def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def differentiated(time: Array, q: Array, name: str) -> Array:
     """(N, n) rates of q by central differences within each run; a run of one sample has none.
 
     Raises `LogError` when time and q do not fit together or time does not rise.
     """
-    if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
-        raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
+    _check_shapes(time, q, name)
     _check_time(time, name, lambda row: f"row {row + 1}")
     v = np.zeros_like(q)
     for run in _runs(time):
@@ -344,7 +320,22 @@ def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str)
     return v
 
 
-def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
+def _side_by_side(columns: dict[str, Array], kinds: Mapping[str, list[str]]) -> dict[str, Array]:
+    """(N, n) of each kind of signal, by its columns' names; they are taken out, for all of them may fill the memory."""
+    return {kind: np.stack([columns.pop(key) for key in keys], axis=1) for kind, keys in kinds.items()}
+
+
+def _check_unit(unit: Any, label: Any) -> None:
+    if not isinstance(unit, str) or unit not in TAU_UNITS:
+        raise LogError(f"{label}: tau unit {unit!r} is unknown; it must be one of {', '.join(TAU_UNITS)}")
+
+
+def _check_shapes(time: Array, q: Array, name: str) -> None:
+    if time.ndim != 1 or q.ndim != 2 or len(q) != len(time):
+        raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
+
+
+def _numbers(values: Any, label: str, name: str) -> Array:
     """The values as an array of floating-point numbers; raises `LogError` where they are none."""
     try:
         numbers = np.asarray(values)
@@ -365,7 +356,7 @@ def unchecked_log(**values: Any) -> MotionLog:
     return log
 
 
-def _runs(time: NDArray[np.float64]) -> list[slice]:
+def _runs(time: Array) -> list[slice]:
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > GAP_PERIODS * np.median(steps)) if len(steps) else steps[:0]
     edges = [0, *(int(gap) + 1 for gap in gaps), len(time)]
@@ -391,7 +382,7 @@ def _say_doubts(log: MotionLog, label: str | None = None) -> None:
         warn(f"{label or log.name}: {doubt}")
 
 
-def _check_time(time: NDArray[np.float64], label: str, place: Callable[[int], str]) -> None:
+def _check_time(time: Array, label: str, place: Callable[[int], str]) -> None:
     late = np.flatnonzero(np.diff(time) <= 0)
     if len(late):
         row = int(late[0]) + 1

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.filters import filter_reach
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 
 
@@ -28,12 +29,12 @@ class Motion:
     Raises `InputError` when the shapes do not agree.
     """
 
-    time: NDArray[np.float64]
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
-    vdot: NDArray[np.float64]
-    starts: NDArray[np.intp] = field(default_factory=lambda: np.array([0]))
-    begins: NDArray[np.float64] | None = None
+    time: Array
+    q: Array
+    v: Array
+    vdot: Array
+    starts: Index = field(default_factory=lambda: np.array([0]))
+    begins: Array | None = None
 
     def __post_init__(self) -> None:
         for key in ("time", "q", "v", "vdot", "starts"):
@@ -64,7 +65,14 @@ class Motion:
         begins = np.concatenate([m.time[m.starts] if m.begins is None else m.begins for m in motions])
         return cls(time, q, v, vdot, starts, begins)
 
-    def take(self, rows: Any, starts: NDArray[np.intp] | None = None) -> "Motion":
+    @classmethod
+    def accelerated(cls, q: Array) -> "Motion":
+        """(P n) samples at rest at postures q (P, n), each joint accelerated by one in turn: they show a mass matrix."""
+        postures = np.repeat(q, q.shape[1], axis=0)
+        unit = np.tile(np.eye(q.shape[1]), (len(q), 1))
+        return cls(np.arange(float(len(postures))), postures, np.zeros_like(postures), unit)
+
+    def take(self, rows: Any, starts: Index | None = None) -> "Motion":
         """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
         starts = np.array([0]) if starts is None else starts
         return Motion(self.time[rows], self.q[rows], self.v[rows], self.vdot[rows], starts)
@@ -87,15 +95,12 @@ class Motion:
         usual = np.abs(steps - median) <= 1e-2 * median
         return float(steps[usual].mean()) if usual.any() else float(median)
 
-    def elapsed(self) -> NDArray[np.float64]:
+    @cached_property
+    def elapsed(self) -> Array:
         """(N,) seconds since the record of each sample's log began.
 
         Runs whose clock goes on belong to one log; a clock that goes back is another's.
         """
-        return self._elapsed
-
-    @cached_property
-    def _elapsed(self) -> NDArray[np.float64]:
         steps = self.time[self.starts[1:]] - self.time[self.starts[1:] - 1]
         first = np.concatenate([[True], steps <= 0])
         lengths = np.diff(np.append(self.starts[first], self.samples))
@@ -140,13 +145,13 @@ class Samples:
     """
 
     motion: Motion
-    tau: NDArray[np.float64]
-    moving: NDArray[np.bool_]
+    tau: Array
+    moving: Mask
     period: float
     cutoff_hz: float = 0.0
-    spans: NDArray[np.float64] | None = None
+    spans: Array | None = None
     wider: float = 1.0
-    unknown: NDArray[np.bool_] | None = None
+    unknown: Mask | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -32,21 +32,17 @@ class LogSource(Protocol):
     @property
     def name(self) -> str:
         """What to call the log."""
-        ...
 
     @property
     def joints(self) -> int:
         """The number of joints."""
-        ...
 
     @property
     def samples(self) -> int:
         """The number of samples."""
-        ...
 
     def read(self) -> MotionLog:
         """The log itself."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -97,16 +93,14 @@ def log_sources(
     Raises:
         LogError: a file is missing, or its header is not that of a log of so many joints, or a file is given twice.
     """
-    files = [_whole(Path(path), joints, recorded) for path in paths]
+    files = []
+    for path in map(Path, paths):
+        check_header(path, joints)
+        files.append(LogPiece(path, joints, count_rows(path), None, recorded))
     _require_different_files(files)
     if sum(file.samples for file in files) <= in_memory:
         return files
     return [piece for file in files for piece in _cut(file)]
-
-
-def _whole(path: Path, joints: int, recorded: dict[str, Any]) -> LogPiece:
-    check_header(path, joints)
-    return LogPiece(path, joints, count_rows(path), None, recorded)
 
 
 def _require_different_files(files: Sequence[LogPiece]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class Finding:
 class Recorded:
     """A recorded motion of n joints at N instants in runs without gaps, and what the checks share.
 
-    time (N,), q, v, tau (N, n), vdot (N, n) or None; ``derived``: v was differentiated from q.
+    time (N,), q, v, tau (N, n), vdot (N, n) or None; ``derived``: v was differentiated from q; ``lost`` (N, n): samples
+    whose torque is known to be no measurement, None where there are none.
     """
 
     time: Array
@@ -37,3 +38,4 @@ class Recorded:
     vdot: Array | None
     runs: Sequence[slice]
     derived: bool = False
+    lost: Mask | None = None

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Mask, stretches
+from armloop.util.arrays import TINY, Array, stretches
 
 # Window of the comparison of rates, s, and the rate (rms, rad/s or m/s) from which a joint is judged.
 _WINDOW, _MOVES = 0.05, 0.05
@@ -62,6 +62,11 @@ class Windows:
         sizes = np.outer(np.linalg.norm(self.change, axis=0), np.linalg.norm(self.integral, axis=0))
         return np.asarray(products / np.maximum(sizes, TINY))
 
+    def scale(self, j: int) -> tuple[float, float]:
+        """How nearly v is proportional to the rate of q at a joint, as its correlation with it, and by what factor."""
+        similar, (of_q, of_v) = float(self.similarity()[j, j]), self.rates()
+        return similar, similar * float(of_v[j] / of_q[j])
+
 
 def windows_of(log: Recorded) -> Windows | None:
     """None where no run is long enough for a few of them."""
@@ -82,11 +87,10 @@ def windows_of(log: Recorded) -> Windows | None:
 
 def scale(windows: Windows) -> Iterator[Finding]:
     """v that is proportional to the rate of q, by a factor that is not one."""
-    similar = windows.similarity()
     of_q, of_v = windows.rates()
     for j in np.flatnonzero((np.maximum(of_q, of_v) > _MOVES) & (np.minimum(of_q, of_v) > 0)):
-        factor = float(similar[j, j] * of_v[j] / of_q[j])
-        if abs(similar[j, j]) > 0.9 and not 0.5 < factor < 2.0:
+        similar, factor = windows.scale(int(j))
+        if abs(similar) > 0.9 and not 0.5 < factor < 2.0:
             yield Finding(
                 f"column v{j + 1}",
                 f"is {factor:.3g} times the rate of q{j + 1}, {_likely_cause(factor)}; "
@@ -101,16 +105,15 @@ def accelerations(log: Recorded) -> Iterator[Finding]:
     windows = windows_of(replace(log, q=log.v, v=log.vdot, vdot=None))
     if windows is None:
         return
-    similar = windows.similarity()
     of_v, of_vdot = windows.rates()
     for j in np.flatnonzero(of_v > _ACCELERATES):
-        factor = float(similar[j, j] * of_vdot[j] / of_v[j])
+        similar, factor = windows.scale(int(j))
         if of_vdot[j] < 0.02 * of_v[j]:
             yield Finding(
                 f"column vdot{j + 1}",
                 f"is next to zero, while v{j + 1} changes; leave out all columns vdot to have v differentiated",
             )
-        elif abs(similar[j, j]) > 0.9 and not 0.5 < factor < 2.0:
+        elif abs(similar) > 0.9 and not 0.5 < factor < 2.0:
             yield Finding(
                 f"column vdot{j + 1}",
                 f"is {factor:.3g} times the rate of v{j + 1}; it must be in rad/s² (m/s²), or left out",
@@ -186,10 +189,8 @@ def disagreements(log: Recorded) -> Iterator[Finding]:
     if windows is None:
         return
     every = _errors(log, windows)
-    of_q, of_v = windows.rates()
     for j, errors in every.items():
-        similar = float(windows.similarity()[j, j])
-        factor = similar * float(of_v[j] / of_q[j])
+        similar, factor = windows.scale(j)
         if similar > _ALIKE and abs(factor - 1) > _OFF:
             yield Finding(
                 f"column v{j + 1}",
@@ -220,8 +221,12 @@ def velocity_lag(log: Recorded) -> float:
 def _inner_windows(log: Recorded) -> Windows | None:
     """Windows that stay within their run at every lag that is tried; None where they are too few."""
     windows = windows_of(log)
-    inside = None if windows is None else _far_from_the_ends(log, windows)
-    if windows is None or inside is None or inside.sum() < 10:
+    if windows is None:
+        return None
+    first, last = log.time[[[run.start, run.stop - 1] for run in log.runs]].T
+    run = np.searchsorted(first, windows.start, side="right") - 1
+    inside = (windows.start + _LAGS[0] >= first[run]) & (windows.end + _LAGS[-1] <= last[run])
+    if inside.sum() < 10:
         return None
     keys = ("start", "end", "change", "integral")
     return replace(windows, **{key: getattr(windows, key)[inside] for key in keys})
@@ -252,14 +257,6 @@ def _common_lag(log: Recorded, errors: dict[int, Array]) -> float:
     inner = [int(np.clip(np.argmin(e), 1, len(_LAGS) - 2)) for e in told]
     own = np.array([_vertex(_LAGS, e, k) for e, k in zip(told, inner, strict=True)])
     return lag if np.mean(np.abs(own - lag) <= _AGREE * abs(lag)) >= _MOST else 0.0
-
-
-def _far_from_the_ends(log: Recorded, windows: Windows) -> Mask:
-    """(W,) windows that stay within their run at every lag that is tried."""
-    first = np.array([log.time[run.start] for run in log.runs])
-    last = np.array([log.time[run.stop - 1] for run in log.runs])
-    run = np.searchsorted(first, windows.start, side="right") - 1
-    return np.asarray((windows.start + _LAGS[0] >= first[run]) & (windows.end + _LAGS[-1] <= last[run]))
 
 
 def _error(log: Recorded, windows: Windows, j: int, lag: float) -> float:

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.data.dropouts import Repaired, repaired
+from armloop.data.dropouts import repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
-from armloop.util.arrays import Array
+from armloop.data.recorded import Recorded
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
@@ -117,7 +117,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         lag = log.velocity_lag
         fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= _FELT else 0.0)
         for run in log.runs():
-            part = _condition_run(log.select(run), fresh.part(run), how, how.dead_zone * noise)
+            part = _condition_run(fresh, run, how, how.dead_zone * noise)
             if part is not None:
                 parts.append(part)
                 spans.append(log.time[[run.start, run.stop - 1]])
@@ -127,7 +127,12 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
             f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
         )
-    parts = _at_one_rate(parts)
+    # All at the period of the coarsest, on cubic splines: they have passed the filter, and even the coarsest keeps what has.
+    coarsest = max(_period(part[0]) for part in parts)
+    parts = [
+        _thinned(part, coarsest) if _differ(_period(part[0]) or coarsest, coarsest) else part
+        for part in parts
+    ]
     starts = np.cumsum([0] + [len(part[0]) for part in parts[:-1]])
     time, q, v, vdot, tau, moving, lost = (np.concatenate(column) for column in zip(*parts, strict=True))
     period = _period(parts[0][0]) or 1.0
@@ -199,7 +204,7 @@ def as_torque(samples: Samples) -> Samples:
     return replace(samples, motion=replace(motion, q=q, v=v, vdot=vdot), wider=1.0)
 
 
-def independent_rows(samples: Samples) -> NDArray[np.bool_]:
+def independent_rows(samples: Samples) -> Mask:
     """(N,) every so many samples that :data:`INDEPENDENT` are left per period of the corner."""
     rows = np.zeros(samples.motion.samples, dtype=bool)
     for period, runs in _rates(samples).items():
@@ -228,18 +233,6 @@ def _differ(a: float, b: float) -> bool:
     return abs(a - b) > _ALIKE * b
 
 
-def _at_one_rate(parts: list[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """Runs of :func:`_condition_run`, on cubic splines at the period of the coarsest where their rates differ.
-
-    They have passed the filter, and even the coarsest keeps what has.
-    """
-    coarsest = max(_period(part[0]) for part in parts)
-    return [
-        _thinned(part, coarsest) if _differ(_period(part[0]) or coarsest, coarsest) else part
-        for part in parts
-    ]
-
-
 def _thinned(part: tuple[Any, ...], period: float) -> tuple[Any, ...]:
     from scipy.interpolate import CubicSpline
 
@@ -251,26 +244,25 @@ def _thinned(part: tuple[Any, ...], period: float) -> tuple[Any, ...]:
     return part[0][0] + grid, *values, moving[after] & moving[after - 1], lost[after] | lost[after - 1]
 
 
-def _condition_run(
-    log: MotionLog, fresh: Repaired, how: Conditioning, dead_zone: Array
-) -> tuple[Any, ...] | None:
+def _condition_run(log: Recorded, run: slice, how: Conditioning, dead_zone: Array) -> tuple[Any, ...] | None:
     from scipy.interpolate import CubicSpline
     from scipy.ndimage import binary_dilation
 
-    grid, keep = _grid(log.time, how)
+    time = log.time[run]
+    grid, keep = _grid(time, how)
     if grid is None:
         return None
-    period = uniform_period(log.time)
+    period = uniform_period(time)
     # From the run's start: what stamps far from zero lose to rounding must not grow along the run.
-    elapsed = log.time - log.time[0]
-    resolution = 2 * float(np.spacing(np.abs(log.time[[0, -1]]).max()))
+    elapsed = time - time[0]
+    resolution = 2 * float(np.spacing(np.abs(time[[0, -1]]).max()))
     even = bool(np.abs(grid - elapsed).max() < 1e-3 * period + resolution)
 
     def on_grid(x: Array) -> Array:
-        return x if even else CubicSpline(elapsed, x)(grid)
+        return x[run] if even else CubicSpline(elapsed, x[run])(grid)
 
     low_pass = LowPass(WIDER * how.cutoff_hz, period)
-    q, v, tau = (on_grid(x) for x in (fresh.q, fresh.v, fresh.tau))
+    q, v, tau = (on_grid(x) for x in (log.q, log.v, log.tau))
     slow, tau = np.split(LowPass(how.cutoff_hz, period)(np.hstack([v, tau])), 2, axis=1)
     q, v = np.split(low_pass(np.hstack([q, v])), 2, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
@@ -282,10 +274,10 @@ def _condition_run(
     around = np.ones((2 * reach + 1, 1))
     smeared = binary_dilation(still, around)
     lost = np.zeros_like(still)
-    if fresh.lost is not None:
+    if log.lost is not None:
         nearest = np.clip(np.searchsorted(elapsed, grid - 0.5 * period), 0, len(grid) - 1)
-        lost = binary_dilation(fresh.lost[nearest], around)
-    return log.time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
+        lost = binary_dilation(log.lost[run][nearest], around)
+    return time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
 
 
 def _grid(time: Array, how: Conditioning) -> tuple[Any, slice]:

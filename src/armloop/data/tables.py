@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.csv_rows import index_rows
+from armloop.util.arrays import Array
 from armloop.util.errors import LogError
 from armloop.util.files import replacing
 
@@ -68,9 +69,7 @@ def count_rows(path: Path) -> int:
     return int(pyarrow.parquet.read_metadata(path).num_rows)
 
 
-def read_columns(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None = None
-) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: Path, names: Sequence[str], rows: tuple[int, int] | None = None) -> dict[str, Array]:
     """Return the columns `names` of a file whose header has been read and holds each of them once.
 
     rows : first row and the one after the last, counted from 0; None reads all
@@ -78,7 +77,11 @@ def read_columns(
     Every array is (N,) and finite. Raises `LogError` that names the row and column of the first cell that is
     not a finite number, or the first row that has too few or too many cells.
     """
+    import pyarrow
+
     table = (_read_parquet if kind_of(path) == PARQUET else _read_csv)(path, names, rows)
+    if rows is not None:  # every process that reads pieces would keep what one of them took
+        pyarrow.default_memory_pool().release_unused()
     faults = {
         name: int(np.argmin(good))
         for name, cells in table.items()
@@ -87,7 +90,10 @@ def read_columns(
     if faults:
         name = min(faults, key=lambda key: faults[key])
         value, row = table[name][faults[name]], faults[name] + (rows[0] if rows else 0)
-        cell = _csv_cell(path, name, row) if kind_of(path) == CSV else str(value)
+        cell = str(value)
+        if kind_of(path) == CSV:
+            _, cells = next(islice(_csv_rows(path), row + 1, None))
+            cell = cells[read_header(path).index(name)]
         wrong = "too large a number" if np.isfinite(value) else "not a finite number"
         raise LogError(
             f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
@@ -95,9 +101,7 @@ def read_columns(
     return table
 
 
-def write_columns(
-    path: Path, columns: Mapping[str, NDArray[np.float64]], about: Mapping[str, str] | None = None
-) -> None:
+def write_columns(path: Path, columns: Mapping[str, Array], about: Mapping[str, str] | None = None) -> None:
     """Write named columns as CSV or Parquet, whole or not at all; every digit survives.
 
     about : what a Parquet file keeps beside them, read by :func:`said_of`; a CSV has no place for it
@@ -135,10 +139,8 @@ def place(path: Path, row: int) -> str:
     """Name the data row with index `row` (from 0) as a user counts it: `row 3 (line 4)`."""
     if kind_of(path) != CSV:
         return f"row {row + 1}"
-    for index, (line, _) in enumerate(_csv_rows(path), start=-1):
-        if index == row:
-            return f"row {row + 1} (line {line})"
-    return f"row {row + 1}"
+    line, _ = next(islice(_csv_rows(path), row + 1, None), (None, []))
+    return f"row {row + 1}" + ("" if line is None else f" (line {line})")
 
 
 def kind_of(path: Path) -> str:
@@ -179,9 +181,7 @@ def is_number(kind: DataType) -> bool:
     return bool(types.is_floating(kind) or types.is_integer(kind))
 
 
-def _read_parquet(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None
-) -> dict[str, NDArray[np.float64]]:
+def _read_parquet(path: Path, names: Sequence[str], rows: tuple[int, int] | None) -> dict[str, Array]:
     import pyarrow
     import pyarrow.parquet
 
@@ -197,9 +197,6 @@ def _read_parquet(
         if not is_number(kind):
             raise LogError(f"{path}: column {name} holds {kind}; it must hold floating-point numbers")
         columns[name] = table[name].to_numpy().astype(np.float64)
-    if rows is not None:  # every process that reads pieces would keep what one of them took
-        del table
-        pyarrow.default_memory_pool().release_unused()
     return columns
 
 
@@ -222,9 +219,7 @@ def _some_rows(file: ParquetFile, names: Sequence[str], first: int, last: int) -
     return pyarrow.Table.from_batches(kept)
 
 
-def _read_csv(
-    path: Path, names: Sequence[str], rows: tuple[int, int] | None
-) -> dict[str, NDArray[np.float64]]:
+def _read_csv(path: Path, names: Sequence[str], rows: tuple[int, int] | None) -> dict[str, Array]:
     import pyarrow
 
     header = read_header(path)
@@ -237,11 +232,7 @@ def _read_csv(
             table = _some_csv_rows(path, len(header), list(wanted.values()), *rows)
     except pyarrow.ArrowInvalid as error:
         raise _csv_fault(path, header, names, error) from error
-    columns = {name: table[key].to_numpy() for name, key in wanted.items()}
-    if rows is not None:
-        del table
-        pyarrow.default_memory_pool().release_unused()
-    return columns
+    return {name: table[key].to_numpy() for name, key in wanted.items()}
 
 
 def _csv_table(source: Any, width: int, wanted: list[str], **how: Any) -> Table:
@@ -304,15 +295,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return cell.isascii() and "_" not in cell  # Python reads 1_000 and ١ as numbers, nobody else does
-
-
-def _csv_cell(path: Path, name: str, row: int) -> str:
-    rows = _csv_rows(path)
-    header = [cell.strip() for cell in next(rows)[1]]
-    for index, (_, cells) in enumerate(rows):
-        if index == row:
-            return cells[header.index(name)]
-    raise IndexError(row)
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:

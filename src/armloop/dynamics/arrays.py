@@ -88,20 +88,15 @@ def _stack(values: Sequence[Any], N: int) -> Array:
 
 def training_range(model: ReconstructedModel) -> tuple[Array, Array]:
     """Lower and upper positions (n,) that the model was fitted on; a radian (metre) about zero if it does not say."""
-    n = model.arm.n
-    size = np.array(model.history.get("range", [[1.0] * n] * 3 + [[0.0] * n]), dtype=float)
-    return size[3] - size[0], size[3] + size[0]
+    half, _, _, centre = model.ranges
+    return centre - half, centre + half
 
 
-def require_mass_matrix(
-    model: ReconstructedModel, *, postures: int = _POSTURES, seed: int = 0
-) -> tuple[float, Array]:
+def require_mass_matrix(model: ReconstructedModel) -> tuple[float, Array]:
     """Check that forward dynamics is possible: (M + M^T) / 2 is positive definite over the training range.
 
-    Then M itself can be inverted too, and a torque always accelerates its own joint its own way.
-
-    Args:
-        postures: how many random ones within :func:`training_range` are tried.
+    Then M itself can be inverted too, and a torque always accelerates its own joint its own way. Many random postures within
+    :func:`training_range` are tried.
 
     Returns:
         The smallest eigenvalue found and the posture (n,) it was found at.
@@ -110,7 +105,7 @@ def require_mass_matrix(
         ModelError: it is not, or the model has no mass matrix.
     """
     lower, upper = training_range(model)
-    q = np.random.default_rng(seed).uniform(lower, upper, (postures, model.arm.n))
+    q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, model.arm.n))
     smallest = np.linalg.eigvalsh(Dynamics(model, symmetric=True).mass_matrix(q))[:, 0]
     worst = int(np.argmin(smallest))
     value, at = float(smallest[worst]), q[worst]

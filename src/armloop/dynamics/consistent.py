@@ -21,15 +21,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
-from armloop.data.motion import Motion
-from armloop.features.rigid_body import full_columns
+from armloop.features.rigid_body import full_columns, random_motion
 from armloop.robot.arm import Arm
-from armloop.robot.kinematics import LINK_PARAMETERS, nominal_parameters
-from armloop.util.arrays import Array
+from armloop.robot.kinematics import nominal_parameters
+from armloop.util.arrays import Array, Index
 
 _STATES = 300
 _RANK = 1e-9
@@ -52,7 +50,7 @@ class ConsistentInertia:
     """Link inertias of bodies that can exist.
 
     Attributes:
-        links: (10 n,) parameters in the order of :data:`LINK_PARAMETERS`.
+        links: (10 n,) parameters in the order of :data:`armloop.robot.kinematics.LINK_PARAMETERS`.
         rotors: (n,) inertias of the drives, seen at the joint; not negative.
         exact: whether they have the base parameters that were asked for; no bodies have them otherwise, and these
             are those with the nearest torques.
@@ -104,7 +102,8 @@ def nearest_bodies(R: Array, fixed: Array, wanted: Array, prior: Array, weights:
     size, n = len(prior), len(prior) // 10
     bodies = _bodies(prior.reshape(n, 10))
     drives = np.maximum(wanted[size:], _THICKNESS)
-    x = np.concatenate([_parameters_of(bodies).ravel(), drives])
+    links = np.linalg.lstsq(_UNITS.reshape(10, 16).T, bodies.reshape(-1, 16).T)[0].T
+    x = np.concatenate([links.ravel(), drives])
     for weight in weights:
         x = _nearest(R / np.sqrt(weight), wanted, bodies, drives, x)
     # What it still lacks of what is wanted, put right by the least change if it stays a body.
@@ -130,11 +129,6 @@ def pseudo_inertias(parameters: Array) -> Array:
 _UNITS = pseudo_inertias(np.eye(10))
 
 
-def _parameters_of(J: Array) -> Array:
-    """(n, 10) parameters of (n, 4, 4) pseudo-inertias."""
-    return np.asarray(np.linalg.lstsq(_UNITS.reshape(10, 16).T, J.reshape(-1, 16).T)[0].T)
-
-
 def _bodies(prior: Array) -> Array:
     """Pseudo-inertias (n, 4, 4) of a prior's links, none thinner than a body that counts; unity where none has mass."""
     if not (prior[:, 0] > 0).any():
@@ -153,16 +147,14 @@ def _nearest(R: Array, wanted: Array, bodies: Array, drives: Array, x: Array) ->
     Newton's method with an exact line search. With J = L L^T both Hessian and slope are G^T times something, so that
     each step is a least-squares problem with the root of the Hessian's condition.
     """
-    n = len(bodies)
-    prior = np.linalg.inv(bodies)
+    n, prior = len(bodies), np.linalg.inv(bodies)
+    #: what ``towards`` is at the prior itself
+    at_prior = np.concatenate([np.tile(np.eye(4).ravel(), n), np.ones(len(drives))])
     for _ in range(_STEPS):
         L, barrier = _root(x, n), barrier_factor(x, n)
         towards = np.concatenate([(L.swapaxes(1, 2) @ prior @ L).ravel(), x[10 * n :] / drives])
         off = R @ (x - wanted)
-        least = np.linalg.lstsq(
-            np.vstack([R, barrier]), np.concatenate([off, towards - _ones(n, len(drives))])
-        )
-        step = -least[0]
+        step = -np.linalg.lstsq(np.vstack([R, barrier]), np.concatenate([off, towards - at_prior]))[0]
         far, near = R @ step, barrier @ step
         growth = np.linalg.eigvalsh(near[: 16 * n].reshape(n, 4, 4)).ravel()
         growth = np.append(growth, near[16 * n :])
@@ -197,11 +189,6 @@ def _is_inside(x: Array, n: int) -> bool:
     return bool((x[10 * n :] > 0).all())
 
 
-def _ones(n: int, drives: int) -> Array:
-    """What ``towards`` is at the prior itself: n identities, and ones."""
-    return np.concatenate([np.tile(np.eye(4).ravel(), n), np.ones(drives)])
-
-
 def _exact_length(slope: float, curvature: float, growth: Array) -> float:
     """The t > 0 that minimises slope t + curvature t² / 2 - Σ log(1 + growth t); a log's argument stays positive."""
 
@@ -221,25 +208,16 @@ def scales(arm: Arm, links: Array, prior: Array) -> Array:
     if not mass:
         moments = np.abs(links.reshape(-1, 10)[:, 1:])
         mass = max(moments[:, :3].max() / length, moments[:, 3:].max() / length**2, 1e-3)
-    kinds = {"m": mass}
-    sizes = [
-        kinds.get(name, mass * length if name.startswith("m") else mass * length**2)
-        for name in LINK_PARAMETERS
-    ]
-    return np.tile(np.array(sizes), arm.n)
+    return np.tile(mass * np.array([1.0, *[length] * 3, *[length**2] * 6]), arm.n)
 
 
-def _torque_factor(arm: Arm, with_rotor: NDArray[np.intp], links: Array, rotors: Array) -> Array:
+def _torque_factor(arm: Arm, with_rotor: Index, links: Array, rotors: Array) -> Array:
     """R (P, P) with |R x|² the mean square of the torques of parameters x on random motion.
 
     Each joint's torque is in units of the RMS that the given links and rotors need there, so that a wrist counts as
     much as a shoulder.
     """
-    rng = np.random.default_rng(0)
-    q = rng.uniform(-np.pi, np.pi, (_STATES, arm.n))
-    v, vdot = rng.normal(size=(2, _STATES, arm.n))
-    motion = Motion(np.arange(float(_STATES)), q, v, 3 * vdot)
-    columns = full_columns(arm, motion, rotors=True)
+    columns = full_columns(arm, random_motion(arm.n, _STATES), rotors=True)
     size = np.sqrt(np.mean((columns @ np.concatenate([links, rotors])) ** 2, axis=0))
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))
     rows = (columns / np.where(size > 0, size, 1.0)[:, None]).reshape(-1, 11 * arm.n)

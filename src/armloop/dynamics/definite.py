@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.features.lagrangian import EnergyTerms
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Boxes looked at, at most; and products in them, which take a second or two.
 _BOXES, _WORK = 20_000, 2e9
@@ -70,7 +70,7 @@ class MassTerms:
 
     waves: Array
     powers: NDArray[np.int_]
-    sine: NDArray[np.bool_]
+    sine: Mask
     matrices: Array
     constant: Array
 
@@ -156,12 +156,11 @@ class MassTerms:
         rest = (curved + _ROUNDING) * most
         rest += np.abs(f) * (most - size - rising) + np.abs(slope) * w * (most - size)
         raw, cells = self.matrices.reshape(-1, n * n), (len(f), k, n, n)
-        if k == 0:
-            return np.zeros(cells), (rest @ np.abs(raw)).reshape(-1, n, n), np.zeros(cells)
+        tangents, mine = (np.reshape(x, (k, *f.shape)).swapaxes(0, 1) for x in (steps, shares))
         return (
-            (np.stack(steps, axis=1) @ raw).reshape(cells),
+            (tangents @ raw).reshape(cells),
             (rest @ np.abs(raw)).reshape(-1, n, n),
-            (np.stack(shares, axis=1) @ np.abs(raw)).reshape(cells),
+            (mine @ np.abs(raw)).reshape(cells),
         )
 
     def _factor(self, q: Array) -> Array:

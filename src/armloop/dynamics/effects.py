@@ -7,14 +7,15 @@ arrays alone is asked for its torque at samples (:mod:`armloop.dynamics.own_effe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from armloop.dynamics.equations import Array, BodyEquations, Equations, Numbers, Rows
 from armloop.dynamics.own_effects import OwnEffectEquations
 from armloop.laws.effects import Value, effect
-from armloop.laws.effects.base import Body, Placed, StateLaw
+from armloop.laws.effects.base import Placed
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
 from armloop.util.errors import ModelError
@@ -38,7 +39,7 @@ class EffectLaw:
     @property
     def has_inertia(self) -> bool:
         """Whether its torque depends on the acceleration."""
-        return self.equations is not None and getattr(self.equations, "has_inertia", True)
+        return self.equations is not None and self.equations.has_inertia
 
 
 class _AlongEquations(Equations):
@@ -51,7 +52,7 @@ class _AlongEquations(Equations):
         self.has_inertia = self._inertia != 0.0
 
     def inertia(self, q: Numbers) -> Rows:
-        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        M = super().inertia(q)
         j, k, ratio = self._along
         M[j][j] = self._inertia
         if ratio:
@@ -72,29 +73,11 @@ class _StateEquations(Equations):
 
     has_inertia = False
 
-    def __init__(self, n: int, law: StateLaw, functions: Functions) -> None:
-        self.n, self._law, self._functions = n, law, functions
-
-    def inertia(self, q: Numbers) -> Rows:
-        return [[0.0] * self.n for _ in range(self.n)]
+    def __init__(self, n: int, law: Callable[[Numbers, Numbers], list[Any]]) -> None:
+        self.n, self._law = n, law
 
     def rest(self, q: Numbers, v: Numbers) -> list[Any]:
-        return self._law(self._functions, q, v)
-
-
-class _WeightEquations(Equations):
-    """Links as their weight alone: no inertia, no Coriolis torques."""
-
-    has_inertia = False
-
-    def __init__(self, links: BodyEquations) -> None:
-        self.n, self._links = links.n, links
-
-    def inertia(self, q: Numbers) -> Rows:
-        return [[0.0] * self.n for _ in range(self.n)]
-
-    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
-        return self._links.rest(q, [0.0] * self.n)
+        return self._law(q, v)
 
 
 def effect_law(
@@ -124,10 +107,12 @@ def effect_law(
     except KeyError as error:
         raise ModelError(f"effect {name}: parameter {error} is missing") from error
     if body is not None:
-        return EffectLaw(_body_equations(arm, body, functions), load=kind.load)
+        links = BodyEquations(arm, body.parameters, functions, body.gravity)
+        weight = _StateEquations(arm.n, lambda q, v: links.rest(q, [0.0] * arm.n))
+        return EffectLaw(weight if body.weight_only else links, load=kind.load)
     of_state = kind.of_state(parameters)
     if of_state is not None:
-        return EffectLaw(_StateEquations(arm.n, of_state, functions), load=kind.load)
+        return EffectLaw(_StateEquations(arm.n, partial(of_state, functions)), load=kind.load)
     if law is None:
         return EffectLaw(OwnEffectEquations(arm, kind, parameters, inertial), load=kind.load)
     friction = tuple(t for t in law.terms if t.element.part == "friction")
@@ -136,8 +121,3 @@ def effect_law(
         Placed(law.along, friction) if friction else None,
         kind.load,
     )
-
-
-def _body_equations(arm: Arm, body: Body, functions: Functions) -> Equations:
-    links = BodyEquations(arm, body.parameters, functions, body.gravity)
-    return _WeightEquations(links) if body.weight_only else links

@@ -22,11 +22,14 @@ Rows = list[list[Any]]
 
 
 class Equations(ABC):
-    """M(q) and rest(q, v) of one part of a model."""
+    """M(q) and rest(q, v) of one part of a model; ``has_inertia``: whether its torque depends on the acceleration."""
 
-    @abstractmethod
+    n: int
+    has_inertia: bool = True
+
     def inertia(self, q: Numbers) -> Rows:
-        """The n rows of M(q). Raises ``ModelError`` where the torque is not linear in the acceleration."""
+        """The n rows of M(q), zero by default. Raises ``ModelError`` where the torque is not linear in the acceleration."""
+        return [[0.0] * self.n for _ in range(self.n)]
 
     @abstractmethod
     def rest(self, q: Numbers, v: Numbers) -> list[Any]:
@@ -63,7 +66,7 @@ class EnergyEquations(Equations):
         self._waves = list(dict.fromkeys(term[0] for term in self._terms))
 
     def inertia(self, q: Numbers) -> Rows:
-        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        M = super().inertia(q)
         phases = self._phases(q)
         for wave, powers, sine, i, j, c in self._terms:
             if i >= 0:

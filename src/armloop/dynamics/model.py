@@ -61,20 +61,11 @@ class ModelEquations:
         self.functions = functions
         # A fault of a sensor is none of the arm, an event of one run none of the next.
         kept = [a for a in model.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
-        added = [(a.effect, a.parameters) for a in kept]
-        inertial = model.inertial_parameters() if any(e.needs_inertial for e, _ in added) else None
-        laws = [
-            effect_law(
-                model.arm,
-                effect.name,
-                effect.joint,
-                {key: estimate.value for key, estimate in parameters.items()},
-                functions,
-                inertial,
-                effect.other_joint,
-            )
-            for effect, parameters in added
-        ]
+        inertial = model.inertial_parameters() if any(a.effect.needs_inertial for a in kept) else None
+        laws = []
+        for a in kept:
+            name, joint, other = a.effect.place
+            laws.append(effect_law(model.arm, name, joint, a.values, functions, inertial, other))
         used = [c for c in model.components if not isinstance(c, SparseTerms) or c.step <= step]
         self._parts: list[tuple[Equations, bool]] = [
             (part, True) for part in equations(model.arm, used, functions)

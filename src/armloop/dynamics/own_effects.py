@@ -39,7 +39,7 @@ class OwnEffectEquations(Equations):
         self._arm, self._effect, self._parameters = arm, effect, dict(parameters)
         self._inertial = inertial
         self._one = effect.pointwise(arm, self._parameters, inertial)
-        self._has_inertia = self._probe()
+        self.has_inertia = self._probe()
 
     def _probe(self) -> bool:
         """Whether the torque grows with the acceleration."""
@@ -61,26 +61,18 @@ class OwnEffectEquations(Equations):
             )
         return bool(np.abs(once - rest).max() > size)
 
-    @property
-    def has_inertia(self) -> bool:
-        """Whether the torque depends on the acceleration."""
-        return self._has_inertia
-
     def inertia(self, q: Numbers) -> Rows:
         nothing = [0.0] * self.n
-        if not self._has_inertia:
-            return [list(nothing) for _ in range(self.n)]
-        rest = self._torque(q, nothing, nothing)
-        columns = [self._torque(q, nothing, [float(k == j) for k in range(self.n)]) for j in range(self.n)]
+        if not self.has_inertia:
+            return super().inertia(q)
+        rest = self.rest(q, nothing)
+        columns = [self.torque(q, nothing, [float(k == j) for k in range(self.n)]) for j in range(self.n)]
         return [[columns[j][i] - rest[i] for j in range(self.n)] for i in range(self.n)]
 
     def rest(self, q: Numbers, v: Numbers) -> list[Any]:
-        return self._torque(q, v, [0.0] * self.n)
+        return self.torque(q, v, [0.0] * self.n)
 
     def torque(self, q: Numbers, v: Numbers, vdot: Numbers) -> list[Any]:
-        return self._torque(q, v, vdot)
-
-    def _torque(self, q: Numbers, v: Numbers, vdot: Numbers) -> list[Any]:
         numbers = [*q, *v, *vdot]
         if all(isinstance(x, float | int) for x in numbers):
             state = np.array(numbers, dtype=float).reshape(3, self.n)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -154,9 +155,7 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
         np.linalg.norm(M, axis=(1, 2)), TINY
     )
 
-    def mass(q: Array) -> Array:
-        return mass_matrix(model, q)
-
+    mass = partial(mass_matrix, model)
     values, postures = lowest(mass, low, high, q, least, rng)
     certificate, proof = _certificate(model, q[:_FEW], M[:_FEW]), None
     if values[0] > 0 and not certificate:
@@ -169,12 +168,12 @@ def check_physics(model: ReconstructedModel, seed: int = 0) -> PhysicsChecks:
     driving, speeds = _driving(model, low, high, rng)
     return PhysicsChecks(
         least=float(values[0]),
-        least_at=_tuple(postures[0]),
+        least_at=tuple(postures[0].tolist()),
         negative=float(np.mean(least <= 0)),
         asymmetry=float(tilt.max()),
-        asymmetry_at=_tuple(q[int(np.argmax(tilt))]),
-        driving=_tuple(driving),
-        driving_at=_tuple(speeds),
+        asymmetry_at=tuple(q[int(np.argmax(tilt))].tolist()),
+        driving=tuple(driving.tolist()),
+        driving_at=tuple(speeds.tolist()),
         certificate=certificate,
         proven=1.0 if certificate else proof.share if proof is not None else 0.0,
         yaw=None if gravity_sees_first_joint(arm) or not arm.revolute[0] else _yaw(model, low, high, rng),
@@ -268,11 +267,9 @@ def _proof(model: ReconstructedModel, q: Array, M: Array, low: Array, high: Arra
         return None
     body = model.components[0]
     rest = _same_everywhere(M - body.mass_matrix(q), M)
-    return (
-        None
-        if rest is None
-        else prove_definite(MassTerms.of(body.energy, body.coefficients, rest), low, high)
-    )
+    if rest is None:
+        return None
+    return prove_definite(MassTerms.of(body.energy, body.coefficients, rest), low, high)
 
 
 def _same_everywhere(rest: Array, M: Array) -> Array | None:
@@ -324,10 +321,6 @@ def _torque(model: ReconstructedModel, q: Array, v: Array, vdot: Array) -> Array
     """(N, n) torques of samples that have nothing to do with each other: each is a run of its own."""
     motion = Motion(np.arange(float(len(q))), q, v, vdot, np.arange(len(q)))
     return model.predict(motion, sensors=False)
-
-
-def _tuple(x: Array) -> tuple[float, ...]:
-    return tuple(float(value) for value in x)
 
 
 def _posture(q: tuple[float, ...]) -> str:

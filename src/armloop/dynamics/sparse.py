@@ -63,7 +63,7 @@ class SparseEquations(Equations):
                 "reconstruct it stepwise"
             )
         values = self._values(q, [0.0] * self.n)
-        M: Rows = [[0.0] * self.n for _ in range(self.n)]
+        M = super().inertia(q)
         for k, plain, weights in self._inertial:
             product = prod([values[e] for e in plain])
             for j, c in weights:
@@ -74,8 +74,10 @@ class SparseEquations(Equations):
         values = self._values(q, v)
         tau: list[Any] = [0.0] * self.n
         for plain, weights in self._still:
-            product = _product([values[e] for e in plain])
-            if product is not None:
+            factors = [values[e] for e in plain]
+            # at rest most terms need not be multiplied
+            if not any(map(is_nothing, factors)):
+                product = prod(factors)
                 for j, c in weights:
                     tau[j] = tau[j] + c * product
         return tau
@@ -111,8 +113,3 @@ class SparseArrayEquations(SparseEquations):
         columns = [np.broadcast_to(np.asarray(x, dtype=float), np.shape(q[0])) for x in (*q, *v, *vdot)]
         q_all, v_all, vdot_all = np.split(np.stack(columns, axis=1), 3, axis=1)
         return list(self._table.torques(q_all, v_all, vdot_all).T)
-
-
-def _product(factors: list[Any]) -> Any:
-    """The product, or None where a factor is the number nothing: at rest most terms need not be multiplied."""
-    return None if any(is_nothing(x) for x in factors) else prod(factors)

@@ -16,7 +16,8 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.features.double_feature_set import SECOND_SETS, Candidates, Factors
+from armloop.features.double_feature_set import SECOND_SETS, Candidates, Factors, padded
+from armloop.util.arrays import Index
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class AngleSums(Candidates):
         return Factors(len(self.revolute), tuple(waves))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
+    def index(self) -> Index:  # type: ignore[override]
         """(T, K) indices of each candidate's factors; 0 stands for the factor 1."""
         factors = self.factors
         place = {wave: w for w, wave in enumerate(factors.waves)}
@@ -77,9 +78,7 @@ class AngleSums(Candidates):
             first += [(*powers, block[place[wave]]) for block in (c, s)] if any(wave) else [powers]
         rates = [e for kind in SECOND_SETS[self.second] for e in factors.block(kind)]
         second = list(combinations_with_replacement([0, *rates], self.N2)) if rates else [()]
-        rows = [sorted(e for e in a + b if e) for b in second for a in first]
-        width = max(1, *map(len, rows))
-        return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp)
+        return padded([sorted(e for e in a + b if e) for b in second for a in first])
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""

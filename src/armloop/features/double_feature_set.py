@@ -11,6 +11,7 @@ and do not give the paper's own tables; without it |F1| = C(α1 + N1, N1), which
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Second feature sets: what the monomials of order N2 are made of, per step and for one-shot SINDy.
 SECOND_SETS = {"none": "", "velocity": "v", "acceleration": "a", "both": "va"}
@@ -53,7 +54,7 @@ class Factors:
     @cached_property
     def names(self) -> list[str]:
         """Readable names, joints counted from 1."""
-        phases = [_phase_name(wave) for wave in self.waves]
+        phases = [phase_name(wave) for wave in self.waves]
         names = ["1"] + [f"{function}({phase})" for function in ("sin", "cos") for phase in phases]
         return names + [f"{symbol}{j + 1}" for symbol in ("q", "v", "vdot") for j in range(self.n)]
 
@@ -69,8 +70,21 @@ class Factors:
         }[kind]
         return list(range(first, first + count))
 
+    def parted(self, row: Iterable[int]) -> tuple[tuple[int, ...], bool, list[int]]:
+        """Of a product of factors its wave, whether that is a sine, and which of q, v, v̇ (from 0) are its other factors.
 
-def _phase_name(wave: tuple[int, ...]) -> str:
+        Without a wave it is the cosine of nothing. Raises ``ValueError`` where there is more than one.
+        """
+        w, entries = len(self.waves), [int(e) for e in row if e]
+        waves = [e for e in entries if e <= 2 * w]
+        if len(waves) > 1:
+            raise ValueError(f"candidate {entries} has {len(waves)} waves; angle sums have at most one")
+        wave = self.waves[(waves[0] - 1) % w] if waves else (0,) * self.n
+        return wave, bool(waves) and waves[0] <= w, [e - 1 - 2 * w for e in entries if e > 2 * w]
+
+
+def phase_name(wave: Iterable[int]) -> str:
+    """A sum of multiples of angles, such as ``2*q1-q3``."""
     parts = ""
     for j, k in enumerate(wave):
         if k:
@@ -84,7 +98,7 @@ class Candidates:
 
     factors: Factors
     #: (T, K) indices of each candidate's factors; 0 stands for the factor 1.
-    index: NDArray[np.intp]
+    index: Index
 
     @property
     def size(self) -> int:
@@ -125,7 +139,7 @@ class DoubleFeatureSet(Candidates):
         return Factors(len(self.revolute))
 
     @cached_property
-    def index(self) -> NDArray[np.intp]:  # type: ignore[override]
+    def index(self) -> Index:  # type: ignore[override]
         """(T, N1 + N2) indices of each candidate's factors; 0 stands for the factor 1."""
         factors, n = self.factors, len(self.revolute)
         s, c, p = (factors.block(kind) for kind in "scq")
@@ -136,9 +150,7 @@ class DoubleFeatureSet(Candidates):
             first = [m for m in first if all(m.count(e) < 2 for e in cosines.intersection(m))]
         rates = [e for kind in SECOND_SETS[self.second] for e in factors.block(kind)]
         second = list(combinations_with_replacement([0, *rates], self.N2)) if rates else [()]
-        width = max(1, self.N1 + (self.N2 if rates else 0))
-        rows = [sorted(a + b) for b in second for a in first]
-        return np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
+        return padded([sorted(a + b) for b in second for a in first])
 
     def order(self) -> NDArray[np.int_]:
         """(T,) order in the first feature set of each candidate, for nested choices of N1."""
@@ -146,7 +158,13 @@ class DoubleFeatureSet(Candidates):
         return np.array([sum(e in first for e in row) for row in self.index])
 
 
-def products(values: Array, index: NDArray[np.intp]) -> Array:
+def padded(rows: Sequence[Sequence[int]]) -> Index:
+    """(T, K) factors of products of at most K of them, with the factor 1 before those of shorter ones."""
+    width = max([1, *map(len, rows)])
+    return np.array([[0] * (width - len(row)) + [*row] for row in rows], dtype=np.intp).reshape(-1, width)
+
+
+def products(values: Array, index: Index) -> Array:
     """(N, T) products of the factors ``values`` (N, F) named by ``index`` (T, K), chunk by chunk."""
     out = np.empty((len(index), len(values)))
     for start in range(0, len(values), _CHUNK):
@@ -162,7 +180,7 @@ def products(values: Array, index: NDArray[np.intp]) -> Array:
     return out.T
 
 
-def product_name(row: NDArray[np.intp], names: list[str]) -> str:
+def product_name(row: Index, names: list[str]) -> str:
     """Name of one product: powers written with ``^``, the constant as ``1``."""
     parts = []
     for e in dict.fromkeys(int(e) for e in row if e):

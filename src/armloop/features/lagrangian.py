@@ -36,8 +36,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.features.double_feature_set import phase_name
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Rows of columns evaluated at once.
 _CHUNK = 256
@@ -57,9 +58,9 @@ class EnergyTerms:
         speeds: (p, 2) the joints i <= j (0-based) whose speeds are factors; -1, -1 for a term of U.
     """
 
-    revolute: NDArray[np.bool_]
+    revolute: Mask
     degrees: NDArray[np.int_]
-    sine: NDArray[np.bool_]
+    sine: Mask
     speeds: NDArray[np.int_]
 
     @property
@@ -68,12 +69,12 @@ class EnergyTerms:
         return len(self.sine)
 
     @property
-    def potential(self) -> NDArray[np.bool_]:
+    def potential(self) -> Mask:
         """(p,) which terms belong to U."""
         return np.asarray(self.speeds[:, 0] < 0)
 
     @property
-    def acts(self) -> NDArray[np.bool_]:
+    def acts(self) -> Mask:
         """(n, p) which joints' torque each term appears in."""
         joints = np.arange(len(self.revolute))[:, None]
         return (self.degrees.T != 0) | (joints == self.speeds[:, 0]) | (joints == self.speeds[:, 1])
@@ -145,15 +146,11 @@ class EnergyTerms:
                 out[:, m, t] += rate[:, t] * v[:, other[t]] + f[:, t] * vdot[:, other[t]]
 
     def _name(self, t: int) -> str:
-        parts, phase = [], ""
-        for m, degree in enumerate(self.degrees[t]):
-            if degree and self.revolute[m]:
-                size = "" if abs(degree) == 1 else f"{abs(degree)}*"
-                phase += (" - " if degree < 0 else " + ") + f"{size}q{m + 1}"
-            elif degree:
-                parts.append(f"q{m + 1}" + (f"^{degree}" if degree > 1 else ""))
-        if phase:
-            parts.insert(0, f"{'sin' if self.sine[t] else 'cos'}({phase.removeprefix(' + ')})")
+        degrees = self.degrees[t]
+        phase = phase_name(degrees * self.revolute).replace("+", " + ").replace("-", " - ")
+        parts = [f"{'sin' if self.sine[t] else 'cos'}({phase})"] if phase else []
+        for m in np.flatnonzero(degrees * ~self.revolute):
+            parts.append(f"q{m + 1}" + (f"^{degrees[m]}" if degrees[m] > 1 else ""))
         i, j = self.speeds[t]
         if i >= 0:
             parts.append(f"v{i + 1}^2" if i == j else f"v{i + 1}*v{j + 1}")
@@ -189,7 +186,7 @@ def candidates(arm: Arm) -> EnergyTerms:
     )
 
 
-def _degrees(limits: list[int], revolute: NDArray[np.bool_]) -> Iterator[tuple[int, ...]]:
+def _degrees(limits: list[int], revolute: Mask) -> Iterator[tuple[int, ...]]:
     """Degrees within limits; of a wave vector and its negative only the one that starts with a positive entry."""
     ranges = [range(-x if turns else 0, x + 1) for x, turns in zip(limits, revolute, strict=True)]
     for degrees in product(*ranges):
@@ -198,7 +195,7 @@ def _degrees(limits: list[int], revolute: NDArray[np.bool_]) -> Iterator[tuple[i
             yield degrees
 
 
-def _phases(degrees: tuple[int, ...], revolute: NDArray[np.bool_]) -> tuple[bool, ...]:
+def _phases(degrees: tuple[int, ...], revolute: Mask) -> tuple[bool, ...]:
     """Cosine and sine, but only the cosine (one) where no revolute joint takes part."""
     waves = any(k for k, turns in zip(degrees, revolute, strict=True) if turns)
     return (False, True) if waves else (False,)

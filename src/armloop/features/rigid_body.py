@@ -13,12 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.regression.determined import combination
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import LINK_PARAMETERS, regressor
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 #: Within a link, what to keep first when one of several parameters must stand for the sum.
 _PREFERENCE = ("mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "m")
@@ -41,6 +41,14 @@ def full_columns(arm: Arm, motion: Motion, rotors: bool = False) -> Array:
     return np.concatenate([columns, motion.vdot[:, :, None] * np.eye(arm.n)], axis=2)
 
 
+def random_motion(n: int, samples: int, seed: int = 0) -> Motion:
+    """A motion that excites every parameter: positions within half a turn, speeds of a few rad/s, accelerations likewise."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-np.pi, np.pi, (samples, n))
+    v, vdot = rng.normal(size=(2, samples, n))
+    return Motion(np.arange(float(samples)), q, v, 3 * vdot)
+
+
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
     """r sums of the P full parameters that determine the torques: ``base = grouping @ full``.
@@ -54,7 +62,7 @@ class BaseParameters:
         rotors: whether the full parameters include the joints' rotor inertias.
     """
 
-    kept: NDArray[np.intp]
+    kept: Index
     grouping: Array
     rotors: bool = False
 
@@ -65,16 +73,11 @@ class BaseParameters:
         Sums are led by parameters near the base: a link's mass is shared out over the links before it,
         as is usual. Which parameters can be seen depends on ``arm.gravity`` too.
         """
-        rng = np.random.default_rng(seed)
-        q = rng.uniform(-np.pi, np.pi, (_EXCITATION, arm.n))
-        v, vdot = rng.normal(size=(2, _EXCITATION, arm.n))
-        random = Motion(np.arange(float(_EXCITATION)), q, v, 3 * vdot)
-        columns = full_columns(arm, random, rotors)
-        return cls._keeping(columns, _independent(_rows(columns), _usual_order(arm.n, rotors)), rotors)
-
-    @classmethod
-    def _keeping(cls, columns: Array, kept: NDArray[np.intp], rotors: bool) -> BaseParameters:
-        rows = _rows(columns)
+        columns = full_columns(arm, random_motion(arm.n, _EXCITATION, seed), rotors)
+        rows = columns.reshape(-1, columns.shape[2])
+        within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
+        order = [10 * link + index for link in range(arm.n) for index in within]
+        kept = _independent(rows, [*order, *range(10 * arm.n, rows.shape[1])])
         grouping: Array = np.linalg.lstsq(rows[:, kept], rows, rcond=None)[0].astype(float)
         grouping[np.abs(grouping) < _TOLERANCE] = 0.0
         grouping[:, kept] = np.eye(len(kept))
@@ -86,7 +89,7 @@ class BaseParameters:
         return len(self.kept)
 
     @property
-    def positive(self) -> NDArray[np.bool_]:
+    def positive(self) -> Mask:
         """(r,) sums that no arm makes negative: of masses, principal and rotor inertias, each times a positive number."""
         links = self.grouping.shape[1] // (11 if self.rotors else 10)
         never = [name in ("m", "Ixx", "Iyy", "Izz") for _ in range(links) for name in LINK_PARAMETERS]
@@ -97,7 +100,9 @@ class BaseParameters:
     def names(self) -> list[str]:
         """Every sum in readable form, such as ``"Izz1 + Iyy2 + 0.376 m3"`` (SI units)."""
         labels = parameter_names(self.grouping.shape[1] // (11 if self.rotors else 10), self.rotors)
-        return [_sum(row, labels, int(lead)) for row, lead in zip(self.grouping, self.kept, strict=True)]
+        return [
+            combination(row, labels, int(lead)) for row, lead in zip(self.grouping, self.kept, strict=True)
+        ]
 
     def columns(self, arm: Arm, motion: Motion) -> Array:
         """(N, n, r) torques per unit of every base parameter."""
@@ -117,17 +122,7 @@ class BaseParameters:
         return np.asarray(start + change)
 
 
-def _rows(columns: Array) -> Array:
-    return columns.reshape(-1, columns.shape[2])
-
-
-def _usual_order(n: int, rotors: bool) -> list[int]:
-    within = [LINK_PARAMETERS.index(name) for name in _PREFERENCE]
-    links = [10 * link + index for link in range(n) for index in within]
-    return links + [10 * n + joint for joint in range(n) if rotors]
-
-
-def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
+def _independent(rows: Array, order: list[int]) -> Index:
     """Indices, rising, of the columns that are not sums of those before them in ``order``."""
     basis, kept = np.empty((len(rows), 0)), []
     sizes = np.linalg.norm(rows, axis=0)
@@ -142,12 +137,3 @@ def _independent(rows: Array, order: list[int]) -> NDArray[np.intp]:
             basis = np.column_stack([basis, own / np.linalg.norm(own)])
             kept.append(index)
     return np.sort(np.array(kept, dtype=np.intp))
-
-
-def _sum(row: Array, labels: list[str], lead: int) -> str:
-    text = labels[lead]
-    for index in np.flatnonzero(row):
-        if index != lead:
-            size = f"{abs(row[index]):.3g}"
-            text += (" + " if row[index] > 0 else " - ") + (size + " " if size != "1" else "") + labels[index]
-    return text

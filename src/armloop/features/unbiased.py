@@ -73,16 +73,11 @@ def wave_terms(factors: Factors, index: Index) -> list[WaveTerm]:
     Raises:
         ValueError: a candidate has more than one wave.
     """
-    w, n = len(factors.waves), factors.n
     terms = []
     for row in index:
-        entries = [int(e) for e in row if e]
-        waves = [e for e in entries if e <= 2 * w]
-        if len(waves) > 1:
-            raise ValueError(f"candidate {entries} has {len(waves)} waves; angle sums have at most one")
-        wave = factors.waves[(waves[0] - 1) % w] if waves else (0,) * n
-        powers = np.bincount([e - 1 - 2 * w for e in entries if e > 2 * w], minlength=3 * n)
-        terms.append(WaveTerm(tuple(wave), bool(waves) and waves[0] <= w, tuple(powers.tolist())))
+        wave, sine, others = factors.parted(row)
+        powers = np.bincount(others, minlength=3 * factors.n)
+        terms.append(WaveTerm(wave, sine, tuple(powers.tolist())))
     return terms
 
 

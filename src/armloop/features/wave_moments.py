@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-from armloop.features.double_feature_set import Factors, products
+from armloop.features.double_feature_set import Candidates, Factors
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array, Index
 
 Wave = tuple[int, ...]
@@ -30,8 +31,8 @@ _CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class WaveSums:
-    """Sums over samples from which the moments of wave candidates are looked up; they add and subtract.
+class WaveSums(Sums):
+    """Sums over samples from which the moments of wave candidates are looked up; they add over blocks of samples.
 
     Attributes:
         table: (2 waves, monomials) Σ h vᵀ: even rows cosines, odd rows sines.
@@ -44,22 +45,6 @@ class WaveSums:
     cross: Array
     given: Array
     count: int
-
-    def __add__(self, other: WaveSums) -> WaveSums:
-        return WaveSums(
-            self.table + other.table,
-            self.cross + other.cross,
-            self.given + other.given,
-            self.count + other.count,
-        )
-
-    def __sub__(self, other: WaveSums) -> WaveSums:
-        return WaveSums(
-            self.table - other.table,
-            self.cross - other.cross,
-            self.given - other.given,
-            self.count - other.count,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +101,7 @@ def _with_parents(waves: set[Wave], n: int) -> list[Wave]:
 
 
 @dataclass(frozen=True, eq=False)
-class WaveProducts:
+class WaveProducts(Candidates):
     """Candidates, each at most one wave times factors qᵢ, vᵢ, v̇ᵢ, as :class:`AngleSums` lists them.
 
     Attributes:
@@ -129,15 +114,6 @@ class WaveProducts:
 
     factors: Factors
     index: Index
-
-    @property
-    def size(self) -> int:
-        """Number of candidates T."""
-        return len(self.index)
-
-    def columns(self, motion: Motion) -> Array:
-        """(N, T) values of the candidates, for few samples or few candidates."""
-        return products(self.factors.evaluate(motion), self.index)
 
     def only(self, candidates: Index) -> WaveProducts:
         """Some of the candidates, with no other waves among their factors."""
@@ -155,25 +131,13 @@ class WaveProducts:
     @cached_property
     def _split(self) -> tuple[list[tuple[Wave, int]], list[Monomial], Index, Index]:
         """Functions (wave, 0 cosine or 1 sine), monomials, and of each candidate the places of its two parts."""
-        w, n = len(self.factors.waves), self.factors.n
         functions: dict[tuple[Wave, int], int] = {}
         monomials: dict[Monomial, int] = {}
         parts = []
         for row in self.index:
-            entries = [int(e) for e in row if e]
-            waves = [e for e in entries if e <= 2 * w]
-            if len(waves) > 1:
-                raise ValueError(f"candidate {entries} has {len(waves)} waves; angle sums have at most one")
-            function: tuple[Wave, int] = ((0,) * n, 0)
-            if waves:
-                function = (self.factors.waves[(waves[0] - 1) % w], int(waves[0] <= w))
-            monomial = tuple(sorted(e - 1 - 2 * w for e in entries if e > 2 * w))
-            parts.append(
-                (
-                    functions.setdefault(function, len(functions)),
-                    monomials.setdefault(monomial, len(monomials)),
-                )
-            )
+            wave, sine, others = self.factors.parted(row)
+            function = functions.setdefault((wave, int(sine)), len(functions))
+            parts.append((function, monomials.setdefault(tuple(sorted(others)), len(monomials))))
         own = np.array(parts, dtype=np.intp).reshape(-1, 2)
         return list(functions), list(monomials), own[:, 0], own[:, 1]
 

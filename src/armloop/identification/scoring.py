@@ -6,16 +6,16 @@ limits), so standstill says little about a model and is never mixed into the fig
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -41,31 +41,41 @@ def residual(model: ReconstructedModel, samples: Samples) -> Array:
     return samples.tau - smooth(samples, model.predict(samples.motion))
 
 
-def score(model: ReconstructedModel, samples: Samples, rows: NDArray[np.bool_] | None = None) -> Score:
+def score(model: ReconstructedModel, samples: Samples, rows: Mask | None = None) -> Score:
     """Score a model on the samples, or on those in ``rows`` (N,)."""
     chosen = np.ones(samples.motion.samples, dtype=bool) if rows is None else rows
     return score_errors(residual(model, samples)[chosen], samples.tau[chosen], samples.moving[chosen])
 
 
-def score_errors(error: Array, tau: Array, moving: NDArray[np.bool_]) -> Score:
+def score_errors(error: Array, tau: Array, moving: Mask) -> Score:
     """Score residuals (N, n) beside the measured torque (N, n), where it is known which samples move (N, n)."""
-    return Score(
-        overall=_errors(error, tau, np.ones_like(moving)),
-        moving=_errors(error, tau, moving),
-        standstill=_errors(error, tau, ~moving),
-        rms=[_rms(tau[moving[:, j], j]) for j in range(tau.shape[1])],
-        samples=len(tau),
-    )
+    return score_of_sums(error_sums(error**2, tau, moving), len(tau))
 
 
-def _rms(x: Array) -> float | None:
-    return float(np.sqrt(np.mean(x**2))) if len(x) else None
+def error_sums(squares: Array, tau: Array, moving: Mask) -> Array:
+    """(2, 3, n) of samples at rest and of moving ones: the squared errors (N, n), the squared torques and the number."""
+    terms = (squares, tau**2, np.ones_like(tau))
+    return np.array([[np.sum(x, axis=0, where=rows) for x in terms] for rows in (~moving, moving)])
 
 
-def _errors(error: Array, tau: Array, mask: NDArray[np.bool_]) -> dict[str, Any]:
-    rmse, nrmse = [], []
-    for j in range(tau.shape[1]):
-        size, scale = _rms(error[mask[:, j], j]), _rms(tau[mask[:, j], j])
-        rmse.append(size)
-        nrmse.append(size / scale if size is not None and scale else None)
-    return {"rmse": rmse, "nrmse": nrmse}
+def score_of_sums(sums: Array, samples: int) -> Score:
+    """The score of :func:`error_sums`."""
+    rest, moving = sums
+    rms = root_mean(moving[1], moving[2])
+    return Score(errors_of(rest + moving), errors_of(moving), errors_of(rest), rms, samples)
+
+
+def errors_of(sums: Array) -> dict[str, Any]:
+    """RMSE and nRMSE per joint of sums (3, n)."""
+    rmse = root_mean(sums[0], sums[2])
+    return {"rmse": rmse, "nrmse": ratios(rmse, root_mean(sums[1], sums[2]))}
+
+
+def ratios(errors: Sequence[float | None], sizes: Sequence[float | None]) -> list[float | None]:
+    """Errors over sizes, joint by joint; None where there is none."""
+    return [e / t if e is not None and t else None for e, t in zip(errors, sizes, strict=True)]
+
+
+def root_mean(totals: Array, counts: Array) -> list[float | None]:
+    """Roots of totals over counts, joint by joint; None where nothing counts."""
+    return [float(np.sqrt(t / c)) if c else None for t, c in zip(totals, counts, strict=True)]

@@ -189,7 +189,7 @@ def column(
     if element.part == "inertia":
         return vdot
     sign = sliding_direction(element, motion, along, parameter) if sign is None else sign
-    values = element.value(Sliding(q, v, sign, motion.elapsed()), parameter, NUMPY)
+    values = element.value(Sliding(q, v, sign, motion.elapsed), parameter, NUMPY)
     if element.by_load:
         assert load is not None
         values = values * np.abs(load[:, along.joint])

@@ -8,14 +8,13 @@ from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
-from armloop.features.double_feature_set import Factors, product_name, products
+from armloop.features.double_feature_set import Factors, padded, product_name, products
 from armloop.features.lagrangian import EnergyTerms
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import ModelError
 
 Term = tuple[int, float, str]
@@ -28,24 +27,19 @@ class Component(Protocol):
 
     def torque(self, arm: Arm, motion: Motion, step: int) -> Array:
         """(N, n) torque of what was found up to ``step``."""
-        ...
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         """(step, coefficient, name) of every term of one joint (0-based)."""
-        ...
 
     def legend(self) -> list[str]:
         """What symbols in the terms stand for, one line each."""
-        ...
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready values."""
-        ...
 
     @staticmethod
     def from_dict(data: dict[str, Any], arm: Arm) -> Component:
         """Rebuild from :meth:`to_dict`, the content of a file as `armloop.schemas.model` checks it."""
-        ...
 
 
 _LEGEND = (
@@ -66,7 +60,7 @@ class SparseTerms:
     """
 
     step: int
-    index: NDArray[np.intp]
+    index: Index
     coefficients: Array
     waves: tuple[tuple[int, ...], ...] = ()
     kind: ClassVar[str] = "terms"
@@ -93,11 +87,7 @@ class SparseTerms:
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        n = self.coefficients.shape[1]
-        joints = []
-        for j in range(n):
-            used = np.flatnonzero(self.coefficients[:, j])
-            joints.append({self._names[t]: float(self.coefficients[t, j]) for t in used})
+        joints = [{self._names[t]: float(c[t]) for t in np.flatnonzero(c)} for c in self.coefficients.T]
         return {"kind": self.kind, "step": self.step, "joints": joints}
 
     @staticmethod
@@ -107,15 +97,13 @@ class SparseTerms:
         waves = _waves_in(names, arm.n)
         factors = Factors(arm.n, waves)
         known = {factor: e for e, factor in enumerate(factors.names)}
-        rows = [_parse_product(name, known, arm.n) for name in names]
-        width = max([len(row) for row in rows], default=1)
-        index = np.array([[0] * (width - len(row)) + row for row in rows], dtype=np.intp).reshape(-1, width)
+        index = padded([_parse_product(name, known, arm.n) for name in names])
         coefficients = np.array([[float(joint.get(name, 0.0)) for joint in joints] for name in names])
         return SparseTerms(int(data["step"]), index, coefficients.reshape(-1, arm.n), waves)
 
 
 _WAVE = re.compile(r"(?:sin|cos)\(([^()]*)\)")
-_ADDEND = re.compile(r"([+-]?)(?:(\d)\*)?q(\d)")
+_ADDEND = re.compile(r"([+-]?)(?:(\d+)\*)?q(\d+)")
 
 
 def _waves_in(names: list[str], n: int) -> tuple[tuple[int, ...], ...]:
@@ -133,7 +121,7 @@ def _waves_in(names: list[str], n: int) -> tuple[tuple[int, ...], ...]:
 def _parse_product(name: str, known: dict[str, int], n: int) -> list[int]:
     row: list[int] = []
     for part in re.split(r"\*(?![^(]*\))", name):
-        match = re.fullmatch(r"(.+?)(?:\^(\d))?", part)
+        match = re.fullmatch(r"(.+?)(?:\^(\d+))?", part)
         if match is None or match[1] not in known:
             raise ModelError(f"unknown term {name!r}: {part!r} is no function of {n} joints")
         row += [known[match[1]]] * int(match[2] or 1)

@@ -21,9 +21,9 @@ from armloop.data.signals import Conditioning
 from armloop.laws.effects import Context, Effect, Estimate, Value, effect
 from armloop.laws.effects.base import Placed, entry, fill
 from armloop.laws.effects.base import Pointwise as EffectPointwise
-from armloop.laws.friction import Acting, FrictionLaw
+from armloop.laws.friction import FrictionLaw
 from armloop.model.components import COMPONENTS, Component
-from armloop.model.pointwise import InverseDynamics, pointwise, stacked
+from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.arrays import Array
@@ -242,17 +242,15 @@ class ReconstructedModel:
         """The function behind :meth:`feedforward`, for loops in which a look-up counts."""
         if step not in self._pointwise:
             _check_step(step)
-            self._pointwise[step] = pointwise(*self._parts(step), step)
+            self._pointwise[step] = pointwise(self._parts(step), step)
         return self._pointwise[step]
 
     def stacked_drive(self, step: int = 3) -> Callable[[Array], Sequence[float]]:
         """The same function of q, v and vdot behind each other in one array (3n,), -> n torques; the fastest there is."""
         _check_step(step)
-        return stacked(*self._parts(step), step)
+        return stacked(self._parts(step), step)
 
-    def _parts(
-        self, step: int
-    ) -> tuple[Arm, tuple[Component, ...], list[list[Acting]], list[tuple[bool, EffectPointwise]]]:
+    def _parts(self, step: int) -> Parts:
         """What acts at one sample: added effects that are friction of one joint stand with its friction."""
         added = [a for a in self.effects if step >= 3 and not a.effect.sensor and not a.effect.event]
         inertial = self.inertial_parameters() if any(a.effect.needs_inertial for a in added) else None
@@ -264,7 +262,7 @@ class ReconstructedModel:
                 effects.append((a.effect.load, a.pointwise(self.arm, inertial)))
             else:
                 friction[law.along.joint] += law.terms
-        return self.arm, self.components, friction, effects
+        return Parts(self.arm, self.components, friction, effects)
 
     @cached_property
     def _pointwise(self) -> dict[int, InverseDynamics]:

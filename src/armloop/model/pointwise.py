@@ -7,7 +7,7 @@ recursive Newton-Euler algorithm, energies through the Euler-Lagrange equations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,25 +28,29 @@ class InverseDynamics(Protocol):
 
     def __call__(self, q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
         """(n,) torque at q, v, vdot (n,), with the friction of the velocities ``sliding``, by default v."""
-        ...
 
 
-def pointwise(
-    arm: Arm,
-    components: Sequence[Component],
-    friction: Sequence[Sequence[Acting]],
-    effects: Sequence[tuple[bool, EffectPointwise]],
-    step: int,
-) -> InverseDynamics:
-    """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
+class Parts(NamedTuple):
+    """What acts at one sample.
 
-    Args:
+    Attributes:
         friction: the elements that act on each joint.
         effects: each with whether its torque loads the joint, so that friction grows with it; one that does
             not is friction itself or knows no velocity, and takes the velocities that friction does.
+    """
+
+    arm: Arm
+    components: Sequence[Component]
+    friction: Sequence[Sequence[Acting]]
+    effects: Sequence[tuple[bool, EffectPointwise]]
+
+
+def pointwise(parts: Parts, step: int) -> InverseDynamics:
+    """A function (q, v, vdot), each (n,), -> (n,) torque that a controller should supply.
 
     Friction with memory acts as if fully slid: one sample has no past.
     """
+    arm, components, friction, effects = parts
     sparse = [c for c in components if isinstance(c, SparseTerms) and c.step <= step and len(c.index)]
     terms = WaveTable(sparse).torque if sparse else lambda q, v, vdot: np.zeros(arm.n)
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
@@ -74,22 +78,17 @@ def pointwise(
     return torque
 
 
-def stacked(
-    arm: Arm,
-    components: Sequence[Component],
-    friction: Sequence[Sequence[Acting]],
-    effects: Sequence[tuple[bool, EffectPointwise]],
-    step: int,
-) -> Callable[[Array], Sequence[float]]:
+def stacked(parts: Parts, step: int) -> Callable[[Array], Sequence[float]]:
     """The same function of q, v and vdot behind each other, (3n,) -> n torques.
 
     A sum of sparse terms with friction by Eq. (34) and nothing else takes two thirds of the time so.
     """
+    arm, components, friction, effects = parts
     n, acting = arm.n, [c for c in components if not isinstance(c, SparseTerms) or c.step <= step]
     sparse = [c for c in acting if isinstance(c, SparseTerms) and len(c.index)]
     laws = [_numbers(joint) for joint in friction]
     if effects or not sparse or len(sparse) < len(acting) or any(others for _, others in laws):
-        drive = pointwise(arm, components, friction, effects, step)
+        drive = pointwise(parts, step)
         return lambda x: drive(x[:n], x[n : 2 * n], x[2 * n :]).tolist()
     terms = WaveTable(sparse).stacked
     numbers = [(offset, viscous, dry + drop, -drop, speed) for (offset, dry, drop, viscous, speed), _ in laws]

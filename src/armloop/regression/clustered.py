@@ -7,15 +7,14 @@ J. Applied Econometrics 38, 2023: the sandwich of Liang and Zeger (1986), correc
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.regression.embedded import unit_scale
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 _RIDGE = 1e-8
 
 
-def clustered_covariance(X: Array, left: Array, cluster: NDArray[np.intp]) -> Array:
+def clustered_covariance(X: Array, left: Array, cluster: Index) -> Array:
     """Covariance (p, p) of fitted coefficients, errors within a cluster being anything, clusters independent.
 
     Args:
@@ -40,9 +39,21 @@ def clustered_covariance(X: Array, left: Array, cluster: NDArray[np.intp]) -> Ar
         score[:, a] = sums(Z[:, a] * left)
         for b in range(a + 1):
             gram[:, a, b] = gram[:, b, a] = sums(Z[:, a] * Z[:, b])
-    # Where a constraint has moved the solution the scores do not add up to zero: what all rows have in common is no error.
-    score -= np.outer(count / len(cluster), score.sum(axis=0))
-    without = gram.sum(axis=0) - gram + _RIDGE * np.eye(p)
+    return delete_one(gram, score, count[:, None] / len(cluster), _RIDGE) * np.outer(scale, scale)
+
+
+def delete_one(jacobian: Array, score: Array, share: Array, ridge: float) -> Array:
+    """Covariance (p, p) of the root of estimating equations by leaving out each of B clusters.
+
+    Args:
+        jacobian, score: (B, p, p) and (B, p) their sums over each cluster, in columns of unit length.
+        share: (B, p) or (B, 1) of all rows that each cluster has.
+        ridge: against columns that a cluster's removal leaves dependent.
+    """
+    # Scores of least squares sum to zero; where a constraint or a correction for noise in the columns moved the solution
+    # they do not, and what all rows have in common is no error.
+    score = score - share * score.sum(axis=0)
+    without = jacobian.sum(axis=0) - jacobian + ridge * np.eye(score.shape[1])
     moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
     moved -= moved.mean(axis=0)
-    return np.asarray(moved.T @ moved * ((B - 1) / B) * np.outer(scale, scale))
+    return np.asarray(moved.T @ moved * (len(score) - 1) / len(score))

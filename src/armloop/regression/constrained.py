@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-from armloop.regression.moments import unit_length
+from armloop.regression.moments import equilibrated
 from armloop.util.arrays import TINY, Array
 
 #: Rows c of new constraints c·θ ≥ 0 that θ violates; empty if there is none.
@@ -50,10 +50,9 @@ def constrained_least_squares(
         TooCostly: what the constraints cost exceeds ``most``.
         ArithmeticError: no solution is found, or the last one still violates a constraint.
     """
-    # In coordinates in which G is the identity the problem is a projection, however collinear the columns are.
     # In coordinates z = Lᵀθ with G = LLᵀ the cost is ‖z − z₀‖²: as well conditioned as it can be.
-    scale = unit_length(np.diag(G))
-    L = np.linalg.cholesky(G * np.outer(scale, scale) + 1e-12 * np.eye(len(b)))
+    scale, S = equilibrated(G, 1e-12)
+    L = np.linalg.cholesky(S)
     target = solve_triangular(L, scale * b, lower=True)
     free = float(np.sum((L.T @ (start / scale) - target) ** 2))
     theta, rows = start, np.zeros((0, len(b)))

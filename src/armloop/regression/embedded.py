@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from armloop.regression.moments import Moments, unit_length
 from armloop.util.arrays import Array
@@ -47,24 +48,15 @@ def solve(
     """
     if not effects:
         return np.zeros(0), [], np.zeros((0, 0))
-    edges = np.cumsum([0, *sizes])
-    found: tuple[float, Array, list[Array], Array] | None = None
+    edges, found = np.cumsum(sizes)[:-1], []
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
     for ridge in (_RIDGE, _STRONG_RIDGE):
-        free = _ridge(moments.G, moments.b, ridge)
-        x = [e.start(free[a:b]) for e, a, b in zip(effects, edges, edges[1:], strict=False)]
-        answer = _gauss_newton(moments, effects, x)
-        if found is None or answer[0] < found[0]:
-            found = answer
-        if _is_linear(found[3]):
-            break
-    assert found is not None
-    return found[1], found[2], found[3]
-
-
-def _is_linear(J: Array) -> bool:
-    """Whether coefficients are the free parameters themselves, so that there is but one minimum."""
-    return J.shape[0] == J.shape[1] and bool((np.eye(len(J)) == J).all())
+        free = np.split(_ridge(moments.G, moments.b, ridge), edges)
+        x = [effect.start(own) for effect, own in zip(effects, free, strict=True)]
+        found.append(_gauss_newton(moments, effects, x))
+        if np.array_equal(found[0][3], np.eye(len(moments.b))):
+            break  # coefficients are the free parameters themselves, and there is but one minimum
+    return min(found, key=lambda answer: answer[0])[1:]
 
 
 def _gauss_newton(
@@ -72,11 +64,11 @@ def _gauss_newton(
 ) -> tuple[float, Array, list[Array], Array]:
     """Squared error, coefficients, free parameters and derivative at the minimum reached from x."""
     beta, J = _embed(effects, x)
-    error = moments.squared_error(beta)
+    error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
     for _ in range(_ITERATIONS):
         step = _ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
         for damping in (1.0, 0.3, 0.1, 0.03):
-            trial = _split(np.concatenate(x) + damping * step, x)
+            trial = list(np.split(np.concatenate(x) + damping * step, edges))
             new_beta, new_J = _embed(effects, trial)
             new_error = moments.squared_error(new_beta)
             if new_error < error:
@@ -90,19 +82,9 @@ def _gauss_newton(
     return error, beta, x, J
 
 
-def _split(flat: Array, like: Sequence[Array]) -> list[Array]:
-    return list(np.split(flat, np.cumsum([len(part) for part in like])[:-1]))
-
-
 def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Array]:
-    pairs = [effect.embed(free) for effect, free in zip(effects, x, strict=True)]
-    beta = np.concatenate([b for b, _ in pairs])
-    J = np.zeros((len(beta), sum(j.shape[1] for _, j in pairs)))
-    row = column = 0
-    for b, j in pairs:
-        J[row : row + len(b), column : column + j.shape[1]] = j
-        row, column = row + len(b), column + j.shape[1]
-    return beta, J
+    betas, slopes = zip(*(effect.embed(free) for effect, free in zip(effects, x, strict=True)), strict=True)
+    return np.concatenate(betas), np.asarray(block_diag(*slopes))
 
 
 def _ridge(G: Array, b: Array, ridge: float = _RIDGE) -> Array:

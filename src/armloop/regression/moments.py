@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: A column whose part outside the others is smaller than this (squared, relative) is theirs already.
 DEPENDENT = 1e-9
 
 
+class Sums:
+    """Base of dataclasses of sums over samples: they add over blocks of these, field by field."""
+
+    def __add__(self, other: Self) -> Self:
+        pairs = ((getattr(self, field.name), getattr(other, field.name)) for field in fields(self))  # type: ignore[arg-type]
+        return type(self)(*(added(a, b) for a, b in pairs))
+
+
+def added(one: Any, other: Any) -> Any:
+    """The sum of two things that add; of lists entry by entry, of dicts key by key, what one lacks being nothing."""
+    if isinstance(one, list):
+        return [added(a, b) for a, b in zip(one, other, strict=True)]
+    if isinstance(one, dict):
+        return one | {key: added(one[key], b) if key in one else b for key, b in other.items()}
+    return one + other
+
+
 @dataclass(frozen=True, eq=False)
-class Moments:
+class Moments(Sums):
     """Sums that determine a least-squares problem min ‖y − X β‖².
 
     Attributes:
@@ -42,28 +59,28 @@ class Moments:
         """Moments of no samples of p columns."""
         return Moments(np.zeros((p, p)), np.zeros(p), 0.0, 0.0)
 
-    def __add__(self, other: Moments) -> Moments:
-        return Moments(self.G + other.G, self.b + other.b, self.yy + other.yy, self.count + other.count)
-
     def __sub__(self, other: Moments) -> Moments:
         return Moments(self.G - other.G, self.b - other.b, self.yy - other.yy, self.count - other.count)
 
-    def take(self, columns: NDArray[np.intp]) -> Moments:
+    def take(self, columns: Index) -> Moments:
         """The problem restricted to some columns."""
         return Moments(self.G[np.ix_(columns, columns)], self.b[columns], self.yy, self.count)
 
-    def solve(self, columns: NDArray[np.intp] | None = None) -> Array:
+    def solve(self, columns: Index | None = None) -> Array:
         """Least-squares coefficients, scaled Cholesky with a relative ridge of 1e-13 against round-off."""
         sub = self if columns is None else self.take(columns)
         if len(sub.b) == 0:
             return np.zeros(0)
-        scale = unit_length(np.diag(sub.G))
-        G = sub.G * np.outer(scale, scale)
-        ridge = 1e-13 * len(G)
-        factor = cho_factor(G + ridge * np.eye(len(G)), check_finite=False)
-        return scale * cho_solve(factor, scale * sub.b, check_finite=False)
+        scale, G = equilibrated(sub.G, 1e-13 * len(sub.b))
+        return scale * cho_solve(cho_factor(G, check_finite=False), scale * sub.b, check_finite=False)
 
-    def gains(self, support: NDArray[np.intp], others: NDArray[np.intp] | None = None) -> tuple[float, Array]:
+    def refitted(self, support: Index) -> Array:
+        """(p,) least-squares coefficients on a support, zero elsewhere."""
+        beta = np.zeros(len(self.b))
+        beta[support] = self.solve(support)
+        return beta
+
+    def gains(self, support: Index, others: Index | None = None) -> tuple[float, Array]:
         """Squared error of a support, and by how much each further column alone would lower it.
 
         Args:
@@ -74,26 +91,23 @@ class Moments:
         size, b = np.diag(self.G)[others], self.b[others]
         if len(support) == 0:
             return self.yy, b**2 / np.maximum(size, TINY)
-        scale = unit_length(np.diag(self.G)[support])
-        S = self.G[np.ix_(support, support)] * np.outer(scale, scale)
-        L = np.linalg.cholesky(S + 1e-12 * np.eye(len(support)))
+        scale, S = equilibrated(self.G[np.ix_(support, support)], 1e-12)
         # One small inverse and a product: a search asks thousands of times, and solving takes several times longer.
-        inverse = dtrtri(L, lower=1)[0] * scale
+        inverse = dtrtri(np.linalg.cholesky(S), lower=1)[0] * scale
         H = inverse @ (self.G[support] if whole else self.G[np.ix_(support, others)])
         h = inverse @ self.b[support]
         own = size - np.einsum("kp,kp->p", H, H)
         gains = np.where(own > DEPENDENT * size, (b - h @ H) ** 2 / np.maximum(own, TINY), 0.0)
         return max(self.yy - float(h @ h), 0.0), gains
 
-    def losses(self, support: NDArray[np.intp]) -> tuple[float, Array]:
+    def losses(self, support: Index) -> tuple[float, Array]:
         """Squared error of a support, and by how much dropping each of its columns alone would raise it."""
-        scale = unit_length(np.diag(self.G)[support])
-        S = self.G[np.ix_(support, support)] * np.outer(scale, scale) + 1e-12 * np.eye(len(support))
+        scale, S = equilibrated(self.G[np.ix_(support, support)], 1e-12)
         inverse = np.linalg.inv(S)
         beta = inverse @ (scale * self.b[support])
         return max(self.yy - float(beta @ (scale * self.b[support])), 0.0), beta**2 / np.diag(inverse)
 
-    def squared_error(self, beta: Array, columns: NDArray[np.intp] | None = None) -> float:
+    def squared_error(self, beta: Array, columns: Index | None = None) -> float:
         """Σ (y − x β)² for given coefficients; round-off can make it slightly negative, so it is clipped."""
         sub = self if columns is None else self.take(columns)
         return max(0.0, sub.yy - 2 * float(beta @ sub.b) + float(beta @ sub.G @ beta))
@@ -102,6 +116,12 @@ class Moments:
 def unit_length(squares: Array) -> Array:
     """(p,) factors that make columns of these squared lengths (p,) one long; finite for a column of nothing."""
     return np.asarray(1 / np.sqrt(np.maximum(squares, TINY)))
+
+
+def equilibrated(G: Array, ridge: float) -> tuple[Array, Array]:
+    """(p,) factors that make the columns of a Gram matrix (p, p) one long, and that of these columns, with a ridge."""
+    scale = unit_length(np.diag(G))
+    return scale, G * np.outer(scale, scale) + ridge * np.eye(len(G))
 
 
 def total(parts: Iterable[Moments]) -> Moments:

@@ -53,11 +53,9 @@ class Sparse:
         assert kind is not None
         return kind()
 
-    def support(
-        self, moments: Moments, forced: Index, power: float = 0.0, parts: Sequence[Moments] = ()
-    ) -> Index:
+    def support(self, moments: Moments, forced: Index) -> Index:
         """Columns to keep, ``forced`` ones included, sorted; see :meth:`fit`."""
-        return self.fit(moments, forced, power, parts)[0]
+        return self.fit(moments, forced)[0]
 
     def fit(
         self, moments: Moments, forced: Index, power: float = 0.0, parts: Sequence[Moments] = ()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,10 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.robot.urdf import as_of_a_body, base_links, read_urdf, serial_chain
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ArmError
 from armloop.util.given import path_of, require
 from armloop.util.quiet import quiet
@@ -113,12 +111,12 @@ class Arm:
         return len(self.joints)
 
     @property
-    def revolute(self) -> NDArray[np.bool_]:
+    def revolute(self) -> Mask:
         """(n,) true where the joint turns, false where it slides."""
         return np.array([joint.kind == "revolute" for joint in self.joints])
 
     @property
-    def effort(self) -> NDArray[np.float64]:
+    def effort(self) -> Array:
         """(n,) limits of the generalized forces, N·m (N); infinite where there is none."""
         return np.array([joint.effort for joint in self.joints])
 
@@ -224,11 +222,8 @@ def load_arm(spec: str | Path, lock: Mapping[str, float] | None = None, tip: str
 
 def mechanics_only(root: ElementTree.Element) -> str:
     """The URDF without geometry, sensors and vendor tags: meshes need not exist to load the mechanics."""
-    keep = {"link", "joint"}
     slim = ElementTree.Element("robot", root.attrib)
-    for element in root:
-        if element.tag not in keep:
-            continue
+    for element in (element for element in root if element.tag in ("link", "joint")):
         copy = ElementTree.fromstring(ElementTree.tostring(element))
         for child in list(copy):
             if child.tag in {"visual", "collision"}:
@@ -246,24 +241,23 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
     from pydrake.multibody.tree import JointIndex, RevoluteJoint, WeldJoint
 
     plant = MultibodyPlant(time_step=0.0)
-    base = _base_link(root, path)
+    bases = list(base_links(root))
+    if len(bases) != 1:
+        found = ", ".join(bases) or "none (a loop)"
+        raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(bases)}: {found}")
     try:
         # What it warns of (links without mass, joints it does not know) is checked here or in `urdf`.
         with quiet("drake"):
             (instance,) = Parser(plant).AddModelsFromString(mechanics_only(root), "urdf")
         # A root link called "world" is Drake's world itself: nothing is left to weld.
-        if base != "world":
-            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(base, instance))
+        if bases != ["world"]:
+            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(bases[0], instance))
         plant.Finalize()
     except (RuntimeError, ValueError) as error:
-        raise ArmError(f"{path}: unreadable URDF: {_one_line(str(error))}") from error
+        raise ArmError(f"{path}: unreadable URDF: {error}") from error
 
-    moving = []
-    for index in range(plant.num_joints()):
-        joint = plant.get_joint(JointIndex(index))
-        if isinstance(joint, WeldJoint):
-            continue
-        moving.append(joint)
+    every = (plant.get_joint(JointIndex(index)) for index in range(plant.num_joints()))
+    moving = [joint for joint in every if not isinstance(joint, WeldJoint)]
     if not moving:
         raise ArmError(f"{path}: the URDF has no moving joint; an arm needs at least one")
     moving = _ordered_chain(plant, moving, path)
@@ -303,15 +297,6 @@ def _from_urdf(root: ElementTree.Element, urdf: str, path: Path) -> Arm:
     return Arm(name, tuple(joints), X_PF, axis, mass, com, inertia, X_tool, urdf=urdf)
 
 
-def _base_link(root: ElementTree.Element, path: Path) -> str:
-    """Name of the link that is no joint's child."""
-    roots = list(base_links(root))
-    if len(roots) != 1:
-        found = ", ".join(roots) or "none (a loop)"
-        raise ArmError(f"{path}: a serial arm has exactly one base link, this URDF has {len(roots)}: {found}")
-    return roots[0]
-
-
 def _ordered_chain(plant: Any, moving: list[Any], path: Path) -> list[Any]:
     """The moving joints from base to tip; raises ``ArmError`` if the mechanism branches."""
     ordered: list[Any] = []
@@ -338,7 +323,3 @@ def _effort_limit(root: ElementTree.Element, name: str) -> float:
             effort = float(limit.get("effort", ""))
             return effort if effort > 0 else np.inf
     return np.inf
-
-
-def _one_line(message: str) -> str:
-    return re.sub(r"\s+", " ", message).strip()

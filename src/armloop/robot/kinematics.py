@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armloop.robot.arm import Arm
+from armloop.robot.urdf import cross_matrix, rotation_about
 from armloop.util.arrays import Array
 
 #: Parameters of one link, about its frame's origin and in its frame.
@@ -37,14 +38,6 @@ class LinkMotion:
     w: Array
     wdot: Array
     a: Array
-
-
-def _rotations(axis: Array, angle: Array) -> Array:
-    """Rotation matrices (N, 3, 3) about a unit axis (Rodrigues)."""
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
-    return np.eye(3) + s * K + (1 - c) * (K @ K)
 
 
 def _cross(x: Array, y: Array) -> Array:
@@ -83,8 +76,7 @@ def link_motion(arm: Arm, q: Array, v: Array, vdot: Array, gravity: Array | None
         R_PF, p_PF, s = arm.X_PF[i, :3, :3], arm.X_PF[i, :3, 3], arm.axis[i]
         turning = joint.kind == "revolute"
         if turning:
-            x, y, z = s
-            K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            K = cross_matrix(s)
             B, C = R_PF @ K, R_PF @ (K @ K)  # Rodrigues
             R[i] = R_PF[..., None] + B[..., None] * np.sin(q[:, i]) + C[..., None] * (1 - np.cos(q[:, i]))
             p[i] = p_PF[:, None]
@@ -160,11 +152,8 @@ def _fill(Y: Array, arm: Arm, motion: LinkMotion, link: int) -> None:
 
 def nominal_parameters(arm: Arm) -> Array:
     """The arm's nominal link parameters as one vector (10 n), in the order of :func:`regressor`."""
-    rows = []
-    for m, c, inertia in zip(arm.mass, arm.com, arm.inertia, strict=True):
-        tensor = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-        rows.append([m, *(m * c), *tensor])
-    return np.concatenate([np.array(row) for row in rows])
+    tensor = arm.inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return np.column_stack([arm.mass, arm.mass[:, None] * arm.com, tensor]).ravel()
 
 
 def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
@@ -185,7 +174,7 @@ def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
         R = R @ arm.X_PF[i, :3, :3]
         axes[i], origins[i] = R @ s, p
         if joint.kind == "revolute":
-            R = R @ _rotations(s, q[:, i])
+            R = R @ rotation_about(s, q[:, i])
         else:
             p = p + q[:, i : i + 1] * axes[i]
         if link == i + 1 < n:

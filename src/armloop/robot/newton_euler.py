@@ -17,6 +17,7 @@ from armloop.util.arrays import Array
 from armloop.util.functions import MATH, NUMPY, Functions
 
 Vector = tuple[Any, Any, Any]
+Matrix = tuple[Vector, Vector, Vector]
 MassMatrix = Callable[[Sequence[Any] | Array], list[list[Any]]]
 InverseDynamics = Callable[[Sequence[Any] | Array, Sequence[Any] | Array, Sequence[Any] | Array], list[Any]]
 
@@ -34,15 +35,8 @@ def inverse_dynamics(
     n = arm.n
     g = arm.gravity if gravity is None else gravity
     upward: Vector = (-float(g[0]), -float(g[1]), -float(g[2]))
-    fixed = [_matrix(arm.X_PF[i, :3, :3]) for i in range(n)]
-    origins: list[Vector] = [_vector(arm.X_PF[i, :3, 3]) for i in range(n)]
-    axes: list[Vector] = [_vector(arm.axis[i]) for i in range(n)]
-    turning = arm.revolute.tolist()
+    turning, axes, joint_pose = _chain(arm, functions)
     bodies = [tuple(float(x) for x in parameters[10 * i : 10 * i + 10]) for i in range(n)]
-    # Where a prismatic joint's axis points in the previous link: it does not turn with q.
-    slides = [_times(fixed[i], axes[i]) for i in range(n)]
-
-    sin, cos = functions.sin, functions.cos
 
     def torques(q: Sequence[Any] | Array, v: Sequence[Any] | Array, vdot: Sequence[Any] | Array) -> list[Any]:
         # Python's own floats: numpy's scalars take three times as long.
@@ -50,16 +44,13 @@ def inverse_dynamics(
         w: Vector = (0.0, 0.0, 0.0)
         wdot: Vector = (0.0, 0.0, 0.0)
         a = upward
-        R: list[tuple[Vector, Vector, Vector]] = []
+        R: list[Matrix] = []
         p: list[Vector] = []
         forces: list[Vector] = []
         moments: list[Vector] = []
         for i in range(n):
             axis, rate, accel = axes[i], v[i], vdot[i]
-            if turning[i]:
-                R_i, p_i = _product(fixed[i], _rotation(axis, sin(q[i]), cos(q[i]))), origins[i]
-            else:
-                R_i, p_i = fixed[i], _plus(origins[i], slides[i], q[i])
+            R_i, p_i = joint_pose(i, q[i])
             lever = _cross(w, p_i)
             swing, spin = _cross(wdot, p_i), _cross(w, lever)
             a = _into(R_i, (a[0] + swing[0] + spin[0], a[1] + swing[1] + spin[1], a[2] + swing[2] + spin[2]))
@@ -106,24 +97,15 @@ def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> Mas
     inverse dynamics with unit accelerations. Arguments as of :func:`inverse_dynamics`.
     """
     n = arm.n
-    fixed = [_matrix(arm.X_PF[i, :3, :3]) for i in range(n)]
-    origins: list[Vector] = [_vector(arm.X_PF[i, :3, 3]) for i in range(n)]
-    axes: list[Vector] = [_vector(arm.axis[i]) for i in range(n)]
-    turning = arm.revolute.tolist()
-    slides = [_times(fixed[i], axes[i]) for i in range(n)]
+    turning, axes, joint_pose = _chain(arm, functions)
     bodies = []
     for i in range(n):
         mass, mx, my, mz, xx, yy, zz, xy, xz, yz = (float(x) for x in parameters[10 * i : 10 * i + 10])
         bodies.append((mass, (mx, my, mz), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))
-    sin, cos = functions.sin, functions.cos
 
     def rows(q: Sequence[Any] | Array) -> list[list[Any]]:
         q = q.tolist() if isinstance(q, np.ndarray) else q
-        R = [
-            _product(fixed[i], _rotation(axes[i], sin(q[i]), cos(q[i]))) if turning[i] else fixed[i]
-            for i in range(n)
-        ]
-        p = [origins[i] if turning[i] else _plus(origins[i], slides[i], q[i]) for i in range(n)]
+        R, p = zip(*(joint_pose(i, q[i]) for i in range(n)), strict=True)
         M: list[list[Any]] = [[0.0] * n for _ in range(n)]
         mass: Any
         moment: Vector
@@ -155,26 +137,41 @@ def mass_matrix(arm: Arm, parameters: Array, functions: Functions = MATH) -> Mas
     return rows
 
 
+def _chain(
+    arm: Arm, functions: Functions
+) -> tuple[list[bool], list[Vector], Callable[[int, Any], tuple[Matrix, Vector]]]:
+    """Which joints turn, their axes, and the pose (rotation, origin) of link i in the one before at a coordinate."""
+    turning, axes = arm.revolute.tolist(), [_vector(axis) for axis in arm.axis]
+    fixed = [_matrix(X[:3, :3]) for X in arm.X_PF]
+    origins = [_vector(X[:3, 3]) for X in arm.X_PF]
+    # Where a prismatic joint's axis points in the previous link: it does not turn with q.
+    slides = [_times(R, axis) for R, axis in zip(fixed, axes, strict=True)]
+    sin, cos = functions.sin, functions.cos
+
+    def pose(i: int, q: Any) -> tuple[Matrix, Vector]:
+        if turning[i]:
+            return _product(fixed[i], _rotation(axes[i], sin(q), cos(q))), origins[i]
+        return fixed[i], _plus(origins[i], slides[i], q)
+
+    return turning, axes, pose
+
+
 def _moved(
-    R: tuple[Vector, Vector, Vector], p: Vector, mass: Any, moment: Vector, inertia: tuple[Vector, ...]
-) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
+    R: Matrix, p: Vector, mass: Any, moment: Vector, inertia: tuple[Vector, ...]
+) -> tuple[Vector, Matrix]:
     """First moment and inertia of a body about the origin of the previous frame, in that frame."""
     h = _times(R, moment)
     turned = _product(_product(R, inertia), tuple(zip(*R, strict=True)))
     twice = 2.0 * (p[0] * h[0] + p[1] * h[1] + p[2] * h[2])
     shift = twice + mass * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-    a, b, c = (
+    rows: Any = tuple(
         tuple(
             turned[i][j] - p[i] * h[j] - h[i] * p[j] - mass * p[i] * p[j] + (shift if i == j else 0.0)
             for j in range(3)
         )
         for i in range(3)
     )
-    return _plus(h, p, mass), (_triple(a), _triple(b), _triple(c))
-
-
-def _triple(x: tuple[Any, ...]) -> Vector:
-    return x[0], x[1], x[2]
+    return _plus(h, p, mass), rows
 
 
 def _wrench(body: tuple[float, ...], w: Vector, wdot: Vector, a: Vector) -> tuple[Vector, Vector]:
@@ -201,7 +198,7 @@ def _wrench(body: tuple[float, ...], w: Vector, wdot: Vector, a: Vector) -> tupl
     return force, moment
 
 
-def _rotation(axis: Vector, s: Any, c: Any) -> tuple[Vector, Vector, Vector]:
+def _rotation(axis: Vector, s: Any, c: Any) -> Matrix:
     """The rotation about a unit axis by an angle with sine s and cosine c (Rodrigues)."""
     x, y, z = axis
     k = 1.0 - c
@@ -212,7 +209,7 @@ def _rotation(axis: Vector, s: Any, c: Any) -> tuple[Vector, Vector, Vector]:
     )
 
 
-def _product(A: tuple[Vector, ...], B: tuple[Vector, ...]) -> tuple[Vector, Vector, Vector]:
+def _product(A: tuple[Vector, ...], B: tuple[Vector, ...]) -> Matrix:
     columns = list(zip(*B, strict=True))
     rows = [tuple(r[0] * c[0] + r[1] * c[1] + r[2] * c[2] for c in columns) for r in A]
     return rows[0], rows[1], rows[2]
@@ -249,5 +246,5 @@ def _vector(x: Array) -> Vector:
     return float(x[0]), float(x[1]), float(x[2])
 
 
-def _matrix(A: Array) -> tuple[Vector, Vector, Vector]:
+def _matrix(A: Array) -> Matrix:
     return _vector(A[0]), _vector(A[1]), _vector(A[2])

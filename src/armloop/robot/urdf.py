@@ -6,6 +6,7 @@ Its links and joints are checked by :mod:`armloop.robot.urdf_checks`. Entities a
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -122,13 +123,9 @@ def _names(root: Element, kind: str, path: Path) -> list[str]:
         names.append(name)
     if len(names) > _MOST_ELEMENTS:
         raise ArmError(f"{path}: {len(names)} <{kind}> elements; at most {_MOST_ELEMENTS} are supported")
-    twice = (
-        next((name for name in names if names.count(name) > 1), None)
-        if len(set(names)) < len(names)
-        else None
-    )
-    if twice is not None:
-        raise ArmError(f"{path}: {kind} {twice!r} is declared twice; names must be unique")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ArmError(f"{path}: {kind} {twice[0]!r} is declared twice; names must be unique")
     return names
 
 
@@ -216,7 +213,7 @@ def _fix(joint: Element, value: float, path: Path) -> None:
     if joint.get("type") == "prismatic":
         xyz = xyz + value * (R @ direction)
     else:
-        R = R @ _about(direction, value)
+        R = R @ rotation_about(direction, value)
     for key in ("axis", "limit", "mimic", "dynamics", "safety_controller", "calibration"):
         for element in joint.findall(key):
             joint.remove(element)
@@ -227,14 +224,21 @@ def _fix(joint: Element, value: float, path: Path) -> None:
 
 def _rotation(rpy: Array) -> Array:
     """URDF's fixed-axis roll, pitch and yaw: Rz(yaw) Ry(pitch) Rx(roll)."""
-    x, y, z = (_about(axis, angle) for axis, angle in zip(np.eye(3), rpy, strict=True))
+    x, y, z = (rotation_about(axis, angle) for axis, angle in zip(np.eye(3), rpy, strict=True))
     return z @ y @ x
 
 
-def _about(axis: Array, angle: float) -> Array:
+def rotation_about(axis: Array, angle: Array | float) -> Array:
+    """(..., 3, 3) rotation about a unit axis (3,) by angles (...) (Rodrigues)."""
+    K = cross_matrix(axis)
+    s, c = np.sin(angle), np.cos(angle)
+    return np.asarray(np.eye(3) + np.multiply.outer(s, K) + np.multiply.outer(1 - c, K @ K))
+
+
+def cross_matrix(axis: Array) -> Array:
+    """(3, 3) matrix of the cross product with an axis."""
     x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
 def _angles(R: Array) -> Array:
@@ -246,18 +250,14 @@ def _angles(R: Array) -> Array:
     return np.array([0.0, pitch, np.arctan2(-R[0, 1], R[1, 1])])
 
 
-def _listed(names: list[str], most: int = 12) -> str:
-    return ", ".join(names[:most]) + (" ..." if len(names) > most else "") if names else "none"
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:12]) + (" ..." if len(names) > 12 else "") or "none"
 
 
 def base_links(root: Element) -> Iterator[str]:
     """Names of the links that are no joint's child; ``world`` for one that is welded or jointed to it undeclared."""
     names = [link.get("name", "") for link in root.findall("link")]
-    parents, children = (
-        zip(*(_links(joint) for joint in root.findall("joint")), strict=True)
-        if root.findall("joint")
-        else ((), ())
-    )
-    yield from (name for name in names if name not in children)
-    if "world" in parents and "world" not in names:
+    parents = {child: parent for parent, child in map(_links, root.findall("joint"))}
+    yield from (name for name in names if name not in parents)
+    if "world" in parents.values() and "world" not in names:
         yield "world"

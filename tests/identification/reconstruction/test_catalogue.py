@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -175,24 +176,24 @@ class TestSearch:
         effects: list[Any],
         trials: Callable[[str, float, list[str]], Any],
     ) -> list[tuple[str, float, float]]:
-        class Columns:
-            def __init__(self, arm: Any, samples: Any) -> None:
-                self.context = None
+        asked = []
 
-            def raw(self, effect: Any, shape: float) -> np.ndarray:
-                return np.ones((1, 1, 2))
+        def columns(name: str, context: Any, shape: float) -> np.ndarray:
+            asked.append((name, shape))
+            return np.ones((1, 1, 2))
 
-            def smoothed(self, effect: Any, shape: float) -> Any:
-                return effect.place[0], shape
+        for one in effects:
+            one.full_columns = partial(columns, one.place[0])
 
         def bench(laws: Any) -> Any:
             taken = [law.effect.place[0] for law in laws]
             return SimpleNamespace(trial=lambda columns, new, worth: trials(*columns, taken))
 
         monkeypatch.setattr(catalogue, "permanent", lambda arm: effects)
-        monkeypatch.setattr(catalogue, "_Columns", Columns)
+        monkeypatch.setattr(catalogue, "_smoothed", lambda samples, columns: asked[-1])
         nothing: Any = None
-        laws = catalogue.search(nothing, nothing, bench, lambda text: None)
+        samples: Any = SimpleNamespace(motion=None, period=1.0)
+        laws = catalogue.search(nothing, samples, bench, lambda text: None)
         assert laws.tried == len([e for e in effects if not e.needs_model])
         return [(law.effect.place[0], law.shape, law.gain) for law in laws.chosen]
 
@@ -290,9 +291,7 @@ class TestSearch:
             return columns + 1
 
         monkeypatch.setattr(catalogue, "smooth", smooth)
-        samples: Any = SimpleNamespace(motion=None, period=0.01)
-        effect: Any = SimpleNamespace(full_columns=lambda context, shape: raw)
         nothing: Any = None
-        made = catalogue._Columns(nothing, samples).smoothed(effect, 0.0)
+        made = catalogue._smoothed(nothing, raw)
         np.testing.assert_array_equal(made, np.stack([0 * x, x + 1, -x - 1, 2 * x + 1, x + 1], axis=1))
         assert len(filtered) == 2

@@ -105,8 +105,7 @@ def test_what_acts_alike_on_several_joints_is_filtered_once(
     samples = Samples(motion, np.zeros((8, 3)), np.ones((8, 3), dtype=bool), 1.0)
     wave = RNG.normal(size=(8, 2))
     columns = np.stack([sign * wave for sign in signs], axis=1)
-    law: Any = SimpleNamespace(full_columns=lambda context, shape: shape * columns)
-    found = catalogue._Columns(three_axis(), samples).smoothed(law, 3.0)
+    found = catalogue._smoothed(samples, 3.0 * columns)
     expected = np.stack([3.0 * sign * (0.5 * wave + np.roll(wave, 1, axis=0)) for sign in signs], axis=1)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert calls == [(8, 2)] * filtered

@@ -145,7 +145,8 @@ def test_effects_load_friction_if_they_load_the_joint() -> None:
     body: Any = SimpleNamespace(torque=lambda arm, motion, step: np.full((2, 3), 3.0))
     effects: Any = tuple(
         SimpleNamespace(
-            effect=SimpleNamespace(load=load), torque=lambda context, size=size: np.full((2, 3), size)
+            effect=SimpleNamespace(load=load, sensor=False, needs_inertial=False),
+            torque=lambda context, size=size: np.full((2, 3), size),
         )
         for load, size in ((True, 1.0), (False, 10.0))
     )

@@ -16,10 +16,12 @@ from exact_parts import ARMS, energies, model_of, scara_terms
 from armloop.data.motion import Motion, Samples
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.uncertainty import propagated
-from armloop.identification.uncertainty.propagated import torque_errors
+from armloop.identification.uncertainty.propagated import leading, torque_errors
+from armloop.identification.uncertainty.sandwich import Equations
 from armloop.identification.uncertainty.solving import moved, solve, solve_given_terms
 from armloop.identification.uncertainty.standard_errors import (
     Assembled,
+    Errors,
     Fitted,
     _residuals,
     covariances,
@@ -304,6 +306,15 @@ def test_the_directions_kept_have_the_torques_errors(kind: str, tmp_path: Path) 
     (tmp_path / "broken.json").write_text(json.dumps(data_of), encoding="utf-8")
     with pytest.raises(ModelError, match=r"uncertainty\.torque: directions must be one row for each"):
         load_model(tmp_path / "broken.json")
+
+
+def test_a_regression_that_is_met_exactly_leaves_the_directions_of_the_others_as_they_are() -> None:
+    jacobian = np.array([[[4.0, 0.0], [1.0, 9.0]]] * 3)
+    equations = Equations(jacobian, np.zeros((3, 2)), np.ones((3, 2)), np.array([0, 1]), np.array([0.0, 4.0]))
+    errors = Errors([], np.diag([0.0, 0.25]), np.ones(2), equations)
+    np.testing.assert_array_equal(errors.gram, [[12.0, 0.0], [0.0, 6.75]])
+    directions = leading(errors.covariance, errors.gram)
+    np.testing.assert_allclose(directions @ directions.T, errors.covariance, atol=1e-15)
 
 
 def test_of_many_unknowns_the_directions_that_the_torque_feels_most_are_kept(

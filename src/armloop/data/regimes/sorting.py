@@ -84,9 +84,12 @@ def sort_samples(motion: Motion, indicator: str = "robust", seed: int = 0) -> Cl
         names = _ranked(np.abs(best.cluster_centers_))[best.labels_]
     else:
         best = fitted(KMeans(3, init=_IDEAL, n_init=1), z)
-        names = _switched(best.cluster_centers_)[best.labels_]
+        moves, accelerates = best.cluster_centers_.T > 0.5
+        names = (1 + np.where(accelerates, 2, moves.astype(int)))[best.labels_]
         names[(names == Condition.STATIC) & (z[:, 1] > 0.5)] = Condition.VARYING_VELOCITY
-    return Clusters(names, z, best.cluster_centers_, wcss, _elbow(wcss), int(best.n_iter_))
+    # the elbow is farthest below the chord from the first to the last value
+    elbow = int(np.argmax(np.linspace(wcss[0], wcss[-1], len(wcss)) - wcss)) + 1
+    return Clusters(names, z, best.cluster_centers_, wcss, elbow, int(best.n_iter_))
 
 
 def _ranked(level: Array) -> NDArray[np.int_]:
@@ -97,16 +100,3 @@ def _ranked(level: Array) -> NDArray[np.int_]:
     names = np.full(3, int(Condition.CONSTANT_VELOCITY))
     names[static], names[varying] = Condition.STATIC, Condition.VARYING_VELOCITY
     return names
-
-
-def _switched(centers: Array) -> NDArray[np.int_]:
-    """(3,) names of clusters by what their centres have switched on."""
-    moves, accelerates = centers.T > 0.5
-    return np.asarray(1 + np.where(accelerates, 2, moves.astype(int)))
-
-
-def _elbow(wcss: list[float]) -> int:
-    """Number of clusters farthest below the chord from the first to the last value."""
-    y = np.array(wcss)
-    chord = np.linspace(y[0], y[-1], len(y))
-    return int(np.argmax(chord - y)) + 1

@@ -70,9 +70,9 @@ def EffectTorque_(T: type) -> Any:
             self.arm = arm
             self._given["parameters"] = dict(parameters)
             self._smoothing = smoothing
-            self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
             if not effect_kind(name).simulated:
                 raise ModelError(f"effect {name} is found in logs alone; no system can have it")
+            self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
             event = effect_kind(name).role == "event"
             self._interval = (number(parameters["start"]), number(parameters["end"])) if event else None
             n = self._n = arm.n

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
+from armloop.util.arrays import Array
 
 #: How far beyond its range, in parts of it, a quantity still counts as inside: ranges leave out the rarest samples.
 _MARGIN = 0.05
 
 
-def outside_trained_range(motion: Motion, ranges: Any) -> NDArray[np.float64]:
+def outside_trained_range(motion: Motion, ranges: Any) -> Array:
     """(n,) part of the samples in which a joint's q, v or vdot lies beyond what the model was fitted on.
 
     Args:

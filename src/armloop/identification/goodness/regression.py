@@ -8,11 +8,11 @@ Learning 24, 1996); where neither finds anything, both weights vanish, and so do
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from armloop.identification.goodness.split import FOLDS, Split
-from armloop.util.arrays import TINY, Array
+from armloop.regression.moments import Moments, total
+from armloop.util.arrays import TINY, Array, Index
 
 #: Penalties of the ridge, in units of the number of samples, for columns of unit variance.
 _PENALTIES = tuple(10.0**k for k in range(-5, 2))
@@ -35,26 +35,20 @@ def left_out(X: Array, y: Array, cut: Split) -> Array:
     return stacked
 
 
-def _ridge(X: Array, y: Array, block: NDArray[np.intp], asked: Array) -> Array:
+def _ridge(X: Array, y: Array, block: Index, asked: Array) -> Array:
     """Ridge regression on standardised columns; the penalty by the error on blocks left out."""
     mean, scale = X.mean(axis=0), X.std(axis=0)
     used = scale > 1e-9 * np.maximum(np.abs(mean), TINY)
     Z = np.column_stack([(X[:, used] - mean[used]) / scale[used], np.ones(len(X))])
-    inner = block % 4
-    parts = [(Z[inner == k], y[inner == k]) for k in range(4)]
-    G, b = [z.T @ z for z, _ in parts], [z.T @ t for z, t in parts]
+    parts = [Moments.of(Z[block % 4 == k], y[block % 4 == k]) for k in range(4)]
+    whole = total(parts)
 
-    def solved(A: Array, c: Array, count: int, penalty: float) -> Array:
-        return np.asarray(np.linalg.solve(A + penalty * max(count, 1) * np.eye(len(A)), c), dtype=float)
+    def solved(sums: Moments, penalty: float) -> Array:
+        ridge = penalty * max(sums.count, 1.0) * np.eye(len(sums.b))
+        return np.asarray(np.linalg.solve(sums.G + ridge, sums.b), dtype=float)
 
-    errors = []
-    for penalty in _PENALTIES:
-        error = 0.0
-        for k, (z, t) in enumerate(parts):
-            theta = solved(np.sum(G, axis=0) - G[k], np.sum(b, axis=0) - b[k], len(X) - len(z), penalty)
-            error += float(np.sum((t - z @ theta) ** 2))
-        errors.append(error)
-    theta = solved(np.sum(G, axis=0), np.sum(b, axis=0), len(X), _PENALTIES[int(np.argmin(errors))])
+    errors = [sum(p.squared_error(solved(whole - p, penalty)) for p in parts) for penalty in _PENALTIES]
+    theta = solved(whole, _PENALTIES[int(np.argmin(errors))])
     return np.column_stack([(asked[:, used] - mean[used]) / scale[used], np.ones(len(asked))]) @ theta
 
 

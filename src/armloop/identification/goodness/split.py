@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 FOLDS = 4
 #: A block is so many times as long as the gap beside it; there are at least so many blocks, however long the gap
@@ -41,7 +40,7 @@ class Split:
     gap: float
     enough: bool
 
-    def fitted(self, fold: int) -> NDArray[np.bool_]:
+    def fitted(self, fold: int) -> Mask:
         """(M,) samples that may be fitted when a fold is judged: no closer to it than the gap."""
         judged = self.fold == fold
         if self.gap <= 0 or not judged.any():

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.goodness.features import Scales, features
-from armloop.util.arrays import Array, Mask
+from armloop.regression.moments import Sums
+from armloop.util.arrays import Array, Index, Mask
 
 #: Most rows of a joint, and seconds that runs of different logs lie apart.
 MOST, APART = 2500, 1e4
@@ -32,7 +32,7 @@ class JointRows:
     residual: Array
     torque: Array
     place: Array
-    run: NDArray[np.intp]
+    run: Index
     judged: Mask
 
     def __add__(self, other: JointRows) -> JointRows:
@@ -51,13 +51,10 @@ class JointRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Witness:
+class Witness(Sums):
     """Rows of all joints; witnesses of different logs add."""
 
-    joints: tuple[JointRows, ...]
-
-    def __add__(self, other: Witness) -> Witness:
-        return Witness(tuple(a + b for a, b in zip(self.joints, other.joints, strict=True)))
+    joints: list[JointRows]
 
 
 def witness(
@@ -82,11 +79,12 @@ def witness(
     motion = samples.motion
     scales = scales or Scales.of(motion)
     judged = np.ones(motion.samples, dtype=bool) if judged is None else judged
-    run = np.repeat(np.arange(len(motion.starts)), [r.stop - r.start for r in motion.runs()])
-    place = (
-        np.concatenate([motion.time[r] - motion.time[r.start] for r in motion.runs()])
-        + _offsets(motion.runs(), motion.time)[run]
-    )
+    runs = motion.runs()
+    run = np.repeat(np.arange(len(runs)), [r.stop - r.start for r in runs])
+    # all runs laid out one after the other, far apart
+    lengths = [float(motion.time[r.stop - 1] - motion.time[r.start]) + APART for r in runs]
+    begins = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    place = motion.time - motion.time[motion.starts][run] + begins[run]
     apart = independent_rows(samples)
     found = []
     for j in range(motion.joints):
@@ -96,10 +94,4 @@ def witness(
         found.append(
             JointRows(X, residual[rows, j], samples.tau[rows, j], place[rows], run[rows], judged[rows])
         )
-    return Witness(tuple(found))
-
-
-def _offsets(runs: list[slice], time: Array) -> Array:
-    """(R,) where each run begins when all are laid out one after the other, far apart, s."""
-    lengths = [float(time[r.stop - 1] - time[r.start]) + APART for r in runs]
-    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    return Witness(found)

@@ -18,23 +18,17 @@ from armloop.identification.reconstruction.sums import Choice, Columns
 from armloop.identification.reconstruction.trials import Fit
 from armloop.model.components import SparseTerms
 from armloop.regression.errors_in_variables import corrected
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class _Sums:
-    """Per joint: plain G, unbiased G and b of its chosen columns; they add over chunks."""
+class _Sums(Sums):
+    """Per joint: plain G, unbiased G and b of its chosen columns."""
 
-    plain: tuple[Array, ...]
-    exact: tuple[Array, ...]
-    cross: tuple[Array, ...]
-
-    def __add__(self, other: _Sums) -> _Sums:
-        return _Sums(
-            tuple(a + b for a, b in zip(self.plain, other.plain, strict=True)),
-            tuple(a + b for a, b in zip(self.exact, other.exact, strict=True)),
-            tuple(a + b for a, b in zip(self.cross, other.cross, strict=True)),
-        )
+    plain: list[Array]
+    exact: list[Array]
+    cross: list[Array]
 
 
 def without_attenuation(
@@ -93,4 +87,4 @@ def _of(chunk: Chunk, choice: Choice, columns: Columns, fits: Sequence[Fit], noi
         plain.append((X.T @ X)[np.ix_(back, back)])
         exact.append(G[np.ix_(back, back)])
         cross.append(b[back])
-    return _Sums(tuple(plain), tuple(exact), tuple(cross))
+    return _Sums(plain, exact, cross)

@@ -14,7 +14,6 @@ from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.filters import filter_reach
 from armloop.data.log import MotionLog
@@ -105,10 +104,10 @@ def choose_bandwidth(
     aside = [held_out[k] for k, enough in zip(_selected(logs), long, strict=True) if enough]
     chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
-    tables = [table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners]
-    if any(table is None for table in tables):
-        return Bandwidth(highest)
+    tables = (table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners)
     made = [table for table in tables if table is not None]
+    if len(made) < len(corners):
+        return Bandwidth(highest)
     rows = made[0].moving
     counted = rows.sum(axis=0) >= _FEWEST
     if not counted.any():
@@ -165,8 +164,8 @@ class Table:
 
     columns: Array
     tau: Array
-    blocks: NDArray[np.intp]
-    moving: NDArray[np.bool_]
+    blocks: Index
+    moving: Mask
     motion: Motion
     stride: int
 
@@ -206,7 +205,7 @@ def table_at(
         unit: (n,) that of the positions, in rad (m): so that dry friction fades at the same speeds in any.
         aside: per log, (B, 2) intervals that nothing is taken from, nor from where a filter has mixed it with them.
     """
-    parts: list[tuple[Array, Array, NDArray[np.intp], NDArray[np.bool_]]] = []
+    parts: list[tuple[Array, Array, Index, Mask]] = []
     motions: list[Motion] = []
     lowest, following = min(corners), 0
     stride = max(1, sum(log.samples for log in logs) * arm.n // _ROWS)

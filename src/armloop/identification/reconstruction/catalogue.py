@@ -65,15 +65,6 @@ class Law:
         constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
         return Law(effect, shape, columns.shape[2], constant, gain)
 
-    def to_dict(self) -> dict[str, object]:
-        """JSON-ready values."""
-        names = {
-            "effect": self.effect.name,
-            "joint": self.effect.joint,
-            "other_joint": self.effect.other_joint,
-        }
-        return {**names, "removes": self.gain}
-
 
 @dataclass(frozen=True, eq=False)
 class Laws:
@@ -112,18 +103,16 @@ class Laws:
 
     def mass(self, arm: Arm, q: Array) -> Array:
         """(P, n, n, p) what each coefficient adds to M(q) at postures q (P, n)."""
-        n = arm.n
-        repeated, still = np.repeat(q, n, axis=0), np.zeros((len(q) * n, n))
-        pushed = np.tile(np.eye(n), (len(q), 1))
+        n, pushed = arm.n, Motion.accelerated(q)
         parts = [np.zeros((len(q), n, n, 0))]
         for law in self.chosen:
             if law.effect.needs_model or law.effect.memory:
                 parts.append(np.zeros((len(q), n, n, law.size)))
                 continue
-            both = []
-            for vdot in (pushed, still):
-                motion = Motion(np.arange(float(len(still))), repeated, still, vdot)
-                both.append(law.effect.full_columns(Context(arm, motion), law.shape))
+            both = [
+                law.effect.full_columns(Context(arm, motion), law.shape)
+                for motion in (pushed, replace(pushed, vdot=pushed.v))
+            ]
             added = (both[0] - both[1]).reshape(len(q), n, n, law.size)
             parts.append(added.transpose(0, 2, 1, 3))
         return np.concatenate(parts, axis=3)
@@ -177,17 +166,19 @@ def search(
     # its coefficients are its free parameters: so it is one of the columns of a regression
     listed = [effect for effect in permanent(arm) if not effect.needs_model]
     chosen: list[Law] = []
-    columns = _Columns(arm, samples)
-    tried = len(listed)
+    context, tried = Context(arm, samples.motion, period=samples.period), len(listed)
     while len(chosen) < _MOST:
         own = bench(chosen)
         taken = {law.effect.place for law in chosen}
         trials = []
         for effect in listed:
             if effect.place not in taken:
-                found = _best_shape(own, effect, columns)
-                if found is not None and is_worth(found[1], tried) and _plausible(arm, effect, *found):
-                    trials.append((effect, *found))
+                found = _best_shape(own, effect, context, samples)
+                if found is not None and is_worth(found[1], tried):
+                    shape, trial = found
+                    estimates = effect.estimates(arm, trial.coefficients, trial.covariance, shape)
+                    if effect.plausible(arm, estimates):
+                        trials.append((effect, shape, trial))
         if not trials:
             break
         most = max(trial.removed for _, _, trial in trials)
@@ -196,7 +187,7 @@ def search(
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
-        chosen.append(Law.found(effect, shape, columns.raw(effect, shape), trial.share))
+        chosen.append(Law.found(effect, shape, effect.full_columns(context, shape), trial.share))
     return Laws(chosen, tried)
 
 
@@ -218,46 +209,29 @@ def is_worth(trial: Trial, tried: int) -> bool:
     return trial.share > WORTH and trial.score > enough and trial.everywhere
 
 
-def _plausible(arm: Arm, effect: Effect, shape: float, found: Trial) -> bool:
-    return effect.plausible(arm, effect.estimates(arm, found.coefficients, found.covariance, shape))
-
-
-def _best_shape(own: Projected, effect: Effect, columns: _Columns) -> tuple[float, Trial] | None:
+def _best_shape(
+    own: Projected, effect: Effect, context: Context, samples: Samples
+) -> tuple[float, Trial] | None:
     """The shape that removes most on left-out blocks; None where the effect can say nothing new."""
     best: tuple[float, Trial] | None = None
-    shapes = list(effect.shapes(columns.context))
+    shapes = list(effect.shapes(context))
     if len(shapes) > 8:
         return None
     for shape in shapes:
-        trial = own.trial(columns.smoothed(effect, shape), _NEW, WORTH)
+        trial = own.trial(_smoothed(samples, effect.full_columns(context, shape)), _NEW, WORTH)
         if trial is not None and (best is None or trial.removed > best[1].removed):
             best = shape, trial
     return best
 
 
-class _Columns:
-    """Columns of the laws on the training motion; kept for nobody, for all of them together may be more than the log."""
-
-    def __init__(self, arm: Arm, samples: Samples) -> None:
-        self._samples = samples
-        self.context = Context(arm, samples.motion, period=samples.period)
-
-    def raw(self, effect: Effect, shape: float) -> Array:
-        """(N, n, p) unfiltered."""
-        return effect.full_columns(self.context, shape)
-
-    def smoothed(self, effect: Effect, shape: float) -> Array:
-        """(N, n, p) through the samples' filter."""
-        columns = self.raw(effect, shape)
-        acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
-        # what acts alike, or against each other, on several joints is filtered once
-        like = {j: _ratio(columns[:, j], columns[:, acts[0]]) for j in acts[1:]}
-        for j in acts:
-            ratio = like.get(j)
-            columns[:, j] = (
-                smooth(self._samples, columns[:, j]) if ratio is None else ratio * columns[:, acts[0]]
-            )
-        return columns
+def _smoothed(samples: Samples, columns: Array) -> Array:
+    """A law's columns (N, n, p) through the samples' filter, in place; what acts alike on several joints passes it once."""
+    acts = [j for j in range(columns.shape[1]) if columns[:, j].any()]
+    like = {j: _ratio(columns[:, j], columns[:, acts[0]]) for j in acts[1:]}
+    for j in acts:
+        ratio = like.get(j)
+        columns[:, j] = smooth(samples, columns[:, j]) if ratio is None else ratio * columns[:, acts[0]]
+    return columns
 
 
 def _ratio(x: Array, y: Array) -> float | None:

@@ -11,12 +11,12 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import partial, reduce
+from itertools import chain
 from math import gcd
 from operator import add
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers, stretch
 from armloop.data.log import MotionLog
@@ -24,7 +24,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, ShortRunError, independent_rows, preprocess, velocity_noise
 from armloop.identification.reconstruction.options import Options
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
@@ -55,7 +55,7 @@ class Chunk:
     """
 
     samples: Samples
-    blocks: NDArray[np.intp]
+    blocks: Index
     held_out: Mask
     validation: Mask
     independent: Mask
@@ -78,6 +78,10 @@ class Chunk:
             own &= ~_near(~own, self.samples.motion, margin)
         return own
 
+    def chunk(self) -> Chunk:
+        """The chunk itself: in memory it need not be made."""
+        return self
+
     def nested(self) -> Chunk:
         """The same with one more fold held out, which alone chooses the library."""
         choosing = self.blocks % self.folds == _CHOOSING
@@ -95,14 +99,14 @@ class Chunk:
         """Consecutive samples."""
         return self._of(stretch(self.samples, low, high), slice(low, high))
 
-    def take(self, rows: NDArray[np.intp]) -> Chunk:
+    def take(self, rows: Index) -> Chunk:
         """Some samples, in order; each run keeps at least one."""
         old, motion = self.samples, self.samples.motion
         taken = motion.take(rows, np.searchsorted(rows, motion.starts).astype(np.intp))
         samples = replace(old, motion=taken, tau=old.tau[rows], moving=old.moving[rows], unknown=None)
         return self._of(samples, rows)
 
-    def _of(self, samples: Samples, rows: slice | NDArray[np.intp]) -> Chunk:
+    def _of(self, samples: Samples, rows: slice | Index) -> Chunk:
         """Samples, which are some of these, with the parts they play."""
         return replace(self, samples=samples, **{k: x[rows] for k, x in self.roles().items()})
 
@@ -132,16 +136,6 @@ class _Conditioned:
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """A chunk in memory."""
-
-    kept: Chunk
-
-    def chunk(self) -> Chunk:
-        return self.kept
-
-
-@dataclass(frozen=True, eq=False)
 class Data:
     """All samples of a reconstruction.
 
@@ -152,7 +146,7 @@ class Data:
         progress: who is told how far a pass over logs that are not in memory is.
     """
 
-    parts: Sequence[_Conditioned | _Kept]
+    parts: Sequence[_Conditioned | Chunk]
     reference: Chunk
     workers: Workers
     progress: Progress = silent
@@ -161,7 +155,7 @@ class Data:
     def of(samples: Samples, options: Options, held_out: Mask | None = None) -> Data:
         """Samples in memory; ``held_out`` (N,) by default is every ``folds``-th block."""
         chunk = Chunk.of(samples, options, held_out=held_out)
-        return Data([_Kept(chunk)], chunk, Serial())
+        return Data([chunk], chunk, Serial())
 
     @staticmethod
     def kept(logs: Sequence[MotionLog], how: Conditioning, options: Options) -> Data:
@@ -179,17 +173,17 @@ class Data:
                 first = int(chunk.blocks[-1]) + 1
         if not chunks:
             preprocess(logs, how, noise)  # says how long a run must be
-        return Data([_Kept(chunk) for chunk in chunks], _joined(chunks), Serial())
+        return Data(chunks, _joined(chunks), Serial())
 
     def nested(self) -> Data:
         """The same, in memory, with one more fold held out, which alone chooses the library."""
-        chunks = [part.chunk().nested() for part in self.parts if isinstance(part, _Kept)]
-        return Data([_Kept(chunk) for chunk in chunks], self.reference.nested(), self.workers)
+        chunks = [part.nested() for part in self.parts if isinstance(part, Chunk)]
+        return Data(chunks, self.reference.nested(), self.workers)
 
     @property
     def in_memory(self) -> bool:
         """Whether the reference is all there is."""
-        return all(isinstance(part, _Kept) for part in self.parts)
+        return all(isinstance(part, Chunk) for part in self.parts)
 
     @staticmethod
     def streamed(
@@ -234,7 +228,7 @@ class Data:
     def sampled(self, count: int) -> Data:
         """At most so many chunks, evenly; all samples in one where they are in memory."""
         if self.in_memory:
-            return replace(self, parts=[_Kept(self.reference)])
+            return replace(self, parts=[self.reference])
         return replace(self, parts=self.parts[:: max(1, -(-len(self.parts) // count))])
 
     def window(self, most: int) -> Chunk:
@@ -244,15 +238,8 @@ class Data:
         some = self.sampled(_STRETCHES).parts
         each = -(-_STRETCHES // len(some))
         length = max(1, most // (each * len(some)))
-        return _joined(
-            [
-                piece
-                for pieces in self.workers.map(
-                    partial(_on_chunk, partial(_stretches, count=each, length=length)), some
-                )
-                for piece in pieces
-            ]
-        )
+        cut = partial(_on_chunk, partial(_stretches, count=each, length=length))
+        return _joined(list(chain.from_iterable(self.workers.map(cut, some))))
 
     def map(self, function: Callable[[Chunk], Answer], what: str = "") -> Iterator[Answer]:
         """The function's answers for all chunks, in order; of a long pass over logs it is told how far it is.
@@ -298,7 +285,7 @@ def _near(rows: Mask, motion: Motion, seconds: float) -> Mask:
     return near
 
 
-def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | _Kept) -> Answer:
+def _on_chunk(function: Callable[[Chunk], Answer], part: _Conditioned | Chunk) -> Answer:
     chunk = part.chunk()
     assert chunk is not None, "a log changed between two passes"
     return function(chunk)

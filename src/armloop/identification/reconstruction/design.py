@@ -85,7 +85,9 @@ class Design:
         }
         margin = _BESIDE / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
         for part, core, start in overlapping(samples, _SAMPLES, margin):
-            shared = self._shared(part)
+            shared = self.library(part.motion)
+            if self.laws.chosen:
+                shared = np.concatenate([shared, self.laws.raw(self.arm, part.motion, part.period)], axis=2)
             load = None if self.load is None else shared @ self.load
             low, M = start - core.start, part.motion.samples
             for j, terms in enumerate(candidates):
@@ -98,9 +100,3 @@ class Design:
                 X = np.column_stack([shared[:, j, acting], *own])
                 where = np.concatenate([acting, self.size + np.arange(len(terms))]).astype(np.intp)
                 yield Columns(start, j, where, smooth(part, X)[core])
-
-    def _shared(self, part: Samples) -> Array:
-        columns = self.library(part.motion)
-        if not self.laws.chosen:
-            return columns
-        return np.concatenate([columns, self.laws.raw(self.arm, part.motion, part.period)], axis=2)

@@ -11,18 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.double_feature_set import Factors
 from armloop.laws.friction import FrictionTerm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Squared sine of the angle between two columns below which they are one function on the data: their difference
 #: is a thousandth of either.
 SAME = 1e-6
 
 
-def twins(factors: Factors, index: Index, friction: Sequence[FrictionTerm], joint: int) -> NDArray[np.bool_]:
+def twins(factors: Factors, index: Index, friction: Sequence[FrictionTerm], joint: int) -> Mask:
     """(T,) candidates that are the same function of the motion as a term of a joint's own friction.
 
     They must be known by what they mean: a friction column has passed the torque's filter and a candidate has not, so
@@ -38,7 +37,7 @@ def twins(factors: Factors, index: Index, friction: Sequence[FrictionTerm], join
     return np.array([tuple(int(e) for e in row if e) in known for row in index], dtype=bool)
 
 
-def repeated(G: Array, first: Index, others: Index) -> NDArray[np.bool_]:
+def repeated(G: Array, first: Index, others: Index) -> Mask:
     """(m,) which of the columns ``others`` span the function of one of ``first``, or of one before them in ``others``.
 
     Args:

@@ -20,7 +20,7 @@ import numpy as np
 from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
-from armloop.identification.reconstruction.bandwidth import Table, root_mean_square, table_at
+from armloop.identification.reconstruction.bandwidth import LEAST, Table, table_at
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -105,11 +105,9 @@ def encoder_zeros(
     period = table.stride * float(np.median([log.period for log in logs]))
     model = _Mixed.of(table, arm, base, max(1.0, correlation / period))
     left = {name: model.left_out(kind) for name, kind in _KINDS.items()}
-    scale = [root_mean_square(table.tau[own, j]) for j, own in enumerate(table.moving.T)]
+    scale, slide = table.sizes(table.tau, table.moving), [j for j, _ in model.judged]
     errors = {
-        name: float(
-            np.exp(np.mean([np.log(root_mean_square(x[own, j]) / scale[j]) for j, own in model.judged]))
-        )
+        name: float(np.exp(np.mean(np.log(table.sizes(x, table.moving)[slide] / scale[slide]))))
         for name, x in left.items()
     }
     plain, zeros, offsets = errors.values()
@@ -166,14 +164,12 @@ class _Mixed:
             slopes.append((sides[0] - sides[1]) / (2 * _STEP))
         log = np.searchsorted(motion.starts, np.arange(motion.samples), side="right").astype(np.intp) - 1
         judged = [(j, own) for j, own in enumerate(table.moving.T) if own.any()]
-        scale = np.array([root_mean_square(table.tau[own, j]) or 1.0 for j, own in enumerate(table.moving.T)])
+        sizes = table.sizes(table.tau, table.moving)
+        scale = np.where(sizes > 0, sizes, 1.0)
         found = _Mixed(table, np.array(slopes), log, len(motion.starts), repeats, scale, judged)
         for _ in range(2):  # joints weigh by their torques first, then by what is left of them
-            left = found.left_out("")
-            scale = scale.copy()
-            for j, own in judged:
-                scale[j] = max(root_mean_square(left[own, j]), 1e-12)
-            found = replace(found, scale=scale)
+            sizes = np.maximum(table.sizes(found.left_out(""), table.moving), LEAST)
+            found = replace(found, scale=np.where(table.moving.any(axis=0), sizes, scale))
         return found
 
     def left_out(self, kind: str) -> Array:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from armloop.data.motion import Motion
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.options import StepReport
-from armloop.laws.effects import Context
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import Component
@@ -56,15 +53,8 @@ class Found:
 
     def rigid(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far but friction."""
-        parts = [component.torque(self.arm, motion, 3) for component in self.components]
-        return np.sum(parts, axis=0) if parts else np.zeros_like(motion.q)
+        return self.model().rigid_body(motion)
 
     def torque(self, motion: Motion) -> Array:
         """(N, n) torque of everything found so far."""
-        rigid = load = self.rigid(motion)
-        context = Context(self.arm, motion)
-        for added in self.effects:
-            torque = added.torque(context)
-            rigid = rigid + torque
-            load = load + torque if added.effect.load else load
-        return rigid + self.law.torque(motion, load=load)
+        return self.model().predict(motion)

@@ -15,7 +15,7 @@ A user may restrict the ladder to some laws, by the names in :data:`armloop.laws
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -118,26 +118,23 @@ def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[E
         for unit, c in zip(units, creep, strict=True)
     ]
 
+    widths = [[unit * size for size in _WIDTHS] for unit in units]
+
     def same(law: str) -> list[list[FrictionTerm]]:
         return [[FrictionTerm(kind) for kind in FRICTION_LAWS[law]] for _ in units]
 
-    def scaled(kind: str, sizes: tuple[float, ...]) -> list[list[FrictionTerm]]:
-        return [[FrictionTerm(kind, parameter=float(unit * size)) for size in sizes] for unit in units]
+    def each(kind: str, sizes: Sequence[Iterable[float]]) -> list[list[FrictionTerm]]:
+        return [[FrictionTerm(kind, parameter=float(f"{v:.2g}")) for v in own] for own in sizes]
 
-    def fading(kind: str) -> list[list[FrictionTerm]]:
-        return [[FrictionTerm(kind, parameter=float(f"{v:.2g}")) for v in own] for own in fades]
-
-    coulomb = [[*own, FrictionTerm("viscous")] for own in fading("smooth_sign")]
-    falls = [[FrictionTerm("stribeck_peak", parameter=float(f"{v:.2g}")) for v in own] for own in stribeck]
     return [
-        Extension("Coulomb and viscous", coulomb),
+        Extension("Coulomb and viscous", [[*t, FrictionTerm("viscous")] for t in each("smooth_sign", fades)]),
         Extension("offset (levels by direction)", same("offset")),
-        Extension("Stribeck", falls),
+        Extension("Stribeck", each("stribeck_peak", stribeck)),
         Extension("nonlinear viscous", same("nonlinear_viscous")),
         Extension("viscous by direction", same("viscous_by_direction")),
-        Extension("Coulomb by load", fading("load_smooth_sign")),
-        Extension("presliding", scaled("hysteresis", _WIDTHS)),
-        Extension("presliding by load", scaled("load_hysteresis", _WIDTHS)),
+        Extension("Coulomb by load", each("load_smooth_sign", fades)),
+        Extension("presliding", each("hysteresis", widths)),
+        Extension("presliding by load", each("load_hysteresis", widths)),
     ]
 
 

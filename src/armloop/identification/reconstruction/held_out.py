@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, kept_instants
 from armloop.identification.reconstruction.options import Options
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 
 def held_out_intervals(
@@ -48,7 +47,7 @@ def held_out_intervals(
     return found
 
 
-def within(time: Array, intervals: Array, margin: float) -> NDArray[np.bool_]:
+def within(time: Array, intervals: Array, margin: float) -> Mask:
     """(N,) instants that lie in one of the intervals (B, 2), or within ``margin`` seconds of it."""
     covered = np.zeros(len(time) + 1, dtype=np.intp)
     np.add.at(covered, np.searchsorted(time, intervals[:, 0] - margin), 1)

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.design import Design
 from armloop.laws.friction import FrictionTerm
-from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, Index
+from armloop.regression.moments import Moments, Sums
+from armloop.util.arrays import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +26,12 @@ class Dealt:
 
     label: Index
     count: int
-    judges: NDArray[np.bool_]
+    judges: Mask
 
 
 @dataclass(frozen=True, eq=False)
-class JointSums:
-    """Moments by joint and label; they add over chunks.
+class JointSums(Sums):
+    """Moments by joint and label.
 
     Attributes:
         parts: of all samples.
@@ -41,9 +40,6 @@ class JointSums:
 
     parts: list[list[Moments]]
     judges: list[list[Moments]]
-
-    def __add__(self, other: JointSums) -> JointSums:
-        return JointSums(_added(self.parts, other.parts), _added(self.judges, other.judges))
 
     @staticmethod
     def of(
@@ -86,9 +82,3 @@ class _Running:
 
     def moments(self) -> Moments:
         return Moments(self._G, self._b, self._yy, self._count)
-
-
-def _added(one: list[list[Moments]], other: list[list[Moments]]) -> list[list[Moments]]:
-    return [
-        [a + b for a, b in zip(mine, theirs, strict=True)] for mine, theirs in zip(one, other, strict=True)
-    ]

@@ -46,7 +46,7 @@ from armloop.identification.reconstruction.shared import (
 )
 from armloop.identification.reconstruction.training import Survey, Training, fitted_rows
 from armloop.model.components import Lagrangian
-from armloop.regression.moments import Moments
+from armloop.regression.moments import Moments, Sums
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError
@@ -199,14 +199,11 @@ class _Problem:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problems:
-    """What is fitted, and what decides how many terms there are; they add over chunks."""
+class _Problems(Sums):
+    """What is fitted, and what decides how many terms there are."""
 
     fit: _Problem
     judge: _Problem
-
-    def __add__(self, other: _Problems) -> _Problems:
-        return _Problems(self.fit + other.fit, self.judge + other.judge)
 
     @staticmethod
     def of(chunk: Chunk, library: EnergyTerms) -> _Problems:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from armloop.data.motion import Motion
@@ -20,7 +19,7 @@ from armloop.dynamics.physics import lowest
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.constrained import Cuts, TooCostly, constrained_least_squares
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.errors import ExcitationError
 
 #: Postures of the motion, and more within the joint limits, at which M(q) is kept positive definite from the start.
@@ -61,7 +60,7 @@ class Body:
     seen: Array
     low: Array
     high: Array
-    positive: NDArray[np.bool_]
+    positive: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,6 @@ def physical_solution(
     laws: list[list[FrictionTerm]],
     insist: bool = False,
     memory: float = 1.0,
-    seed: int = 0,
 ) -> PhysicalSolution:
     """The coefficients that solve the normal equations as well as physics allows.
 
@@ -113,7 +111,7 @@ def physical_solution(
     Raises:
         ExcitationError: there are none.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     beyond = rng.uniform(body.low, body.high, (_BEYOND, len(body.low)))
     tried = ((LIMITS, np.concatenate([body.seen, beyond])), (TRAINED, body.seen))
     failed: ArithmeticError | None = None
@@ -236,7 +234,7 @@ def _cost(solution: Solution, theta: Array) -> float:
 
 
 def physical_cuts(
-    mass: Array, clear: Array, laws: list[list[FrictionTerm]], positive: NDArray[np.bool_] | None = None
+    mass: Array, clear: Array, laws: list[list[FrictionTerm]], positive: Mask | None = None
 ) -> Cuts:
     """What physics demands of the coefficients: M(q) positive definite, friction that never drives.
 

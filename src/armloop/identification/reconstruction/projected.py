@@ -12,11 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from armloop.data.blocks import block_sums
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 _RIDGE = 1e-7
 #: Directions of the model's columns that are weaker than this part of the strongest span nothing.
@@ -63,7 +62,7 @@ class Rows:
     weight: Array
     fold: Index
     block: Index
-    inside: NDArray[np.bool_]
+    inside: Mask
 
     def pieces(self) -> list[tuple[int, int, slice]]:
         """Joint and fold of every stretch of rows that share them."""
@@ -168,9 +167,8 @@ class Projected:
         for p, values in after:
             left[p] = values
         blocks = np.concatenate([rows.block[p] for _, p in pieces])
-        sums = np.stack([block_sums(column, blocks) for column in np.concatenate(scores).T])
-        bread = np.linalg.inv(S)
-        return self._judged(left, beta, bread @ (sums @ sums.T) @ bread)
+        covariance = block_covariance(np.linalg.inv(S), np.concatenate(scores), blocks)
+        return self._judged(left, beta, covariance)
 
     def _judged(self, after: Array, beta: Array, covariance: Array) -> Trial | None:
         """None where no row that was left out tells of the columns."""
@@ -184,17 +182,15 @@ class Projected:
         shares = (before - left) / np.maximum(before, TINY)
         most = int(np.argmax(before - left))
         here = joint == most
-        x, y = block_sums(a[here], block[here]), block_sums(b[here], block[here])
-        parts = (x - y) / np.maximum(x + y, TINY)
-        spread = float(parts.std(ddof=1)) * np.sqrt(len(parts)) if len(parts) > 1 else np.inf
+        score, blocks = block_score(a[here], b[here], block[here])
         gains = np.bincount(fold, weights=a) - np.bincount(fold, weights=b)
         return Trial(
             beta,
             covariance,
             float((a - b).sum()),
             float(shares[most]),
-            float(parts.sum()) / max(spread, 1e-12),
-            len(parts),
+            score,
+            blocks,
             bool(np.mean(gains[np.unique(fold)] > 0) >= _NEARLY_ALL),
         )
 
@@ -206,3 +202,17 @@ class Projected:
     def _solve(self, factor: tuple[Array, bool], b: Array) -> Array:
         scale = self._scale if b.ndim == 1 else self._scale[:, None]
         return np.asarray(scale * cho_solve(factor, scale * b))
+
+
+def block_covariance(bread: Array, scores: Array, block: Index) -> Array:
+    """(k, k) sandwich covariance of coefficients, by the sums of their scores (R, k) over blocks."""
+    sums = np.stack([block_sums(column, block) for column in scores.T])
+    return bread @ (sums @ sums.T) @ bread
+
+
+def block_score(before: Array, after: Array, block: Index) -> tuple[float, int]:
+    """By how many standard errors over blocks squared errors (R,) fall, each block by its part, and the number of blocks."""
+    x, y = block_sums(before, block), block_sums(after, block)
+    parts = (x - y) / np.maximum(x + y, TINY)
+    spread = float(parts.std(ddof=1)) * np.sqrt(len(parts)) if len(parts) > 1 else np.inf
+    return float(parts.sum()) / max(spread, 1e-12), len(parts)

@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from armloop.dynamics.consistent import barrier_factor, nearest_bodies, scales
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Mask
 
 #: What the prior weighs beside the cost in units of chi-square: in the end less than a standard error of anything, and
 #: the links keep clear of those that only just exist.
@@ -69,7 +68,7 @@ def realizable_solution(
     arm: Arm,
     base: BaseParameters,
     nominal: Array,
-    positive: NDArray[np.bool_],
+    positive: Mask,
     memory: float = 1.0,
 ) -> Realizable:
     """The coefficients of bodies that solve the normal equations best.

@@ -170,7 +170,11 @@ def reconstruct(
     refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
     refused = {} if library is not None else {one: why for one, why in refused.items() if why}
     left = [one for one in wanted if one not in refused]
-    few = len(left) > 1 and _are_few(kept, bandwidth.suited(usual[0]), settings)
+    # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
+    few = len(left) > 1 and bool(kept) and settings.folds > 2
+    if few:
+        held_out = held_out_intervals(kept, [bandwidth.suited(usual[0])], settings)
+        few = sum(map(len, held_out)) < 2 * FEWEST_BLOCKS
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(library.conditioning)
@@ -190,28 +194,16 @@ def reconstruct(
             found.notes += zeros.notes(arm)
         return Attempt(library, how, data, found, blocks.margin)
 
+    tried = [Contender(one, refused=why) for one, why in refused.items()]
     if len(left) == 1:
-        tried = [Contender(one, refused=refused.get(one, "")) for one in wanted]
-        tried = [
-            one if one.refused else replace(one, attempt=attempt(one.library), chosen=True) for one in tried
-        ]
-        return _finished(tried, "all", arm, method, logs, settings, progress, recorded, blocks)
-    tried = [
-        Contender(one, refused=refused[one])
-        if one in refused
-        else contender(one, partial(attempt, nested=few))
-        for one in wanted
-    ]
-    tried = choose(tried)
+        tried += [Contender(one, attempt(one), chosen=True) for one in left]
+    else:
+        tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
+    tried.sort(key=lambda one: wanted.index(one.library))
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
-    return _finished(tried, "all" if few else "test", arm, method, logs, settings, progress, recorded, blocks)
-
-
-def _are_few(logs: Sequence[LogSource], how: Conditioning, options: Options) -> bool:
-    """Whether half of the held-out blocks are too few to judge by; a fold of the others then chooses the library."""
-    count = sum(map(len, held_out_intervals(logs, [how], options)))
-    return bool(logs) and options.folds > 2 and count < 2 * FEWEST_BLOCKS
+    part: Part = "all" if few or len(left) == 1 else "test"
+    return _finished(tried, part, arm, method, logs, settings, progress, recorded, blocks)
 
 
 def filter_and_blocks(
@@ -302,15 +294,9 @@ def _finished(
     yardsticks = tried.yardsticks(found.sorter, Options().block_seconds)
     model = replace(model, baseline={**tally.baseline(), **yardsticks, "joints": merged(parts)})
     if found.final is not None:
-        history = {**model.history, **found.final.history}
-        last = found.final
-        model = replace(
-            model,
-            components=tuple(last.components),
-            friction=last.law,
-            effects=last.effects,
-            history=history,
-        )
+        last = found.final.model(history={**model.history, **found.final.history})
+        names = ("components", "friction", "effects", "history")
+        model = replace(model, **{name: getattr(last, name) for name in names})
     whole = partial(Tally.fitted, model=model, sorter=found.sorter, seconds=Options().block_seconds)
     model = replace(model, baseline=at_least(model.baseline, data.sum(whole)))
     checks = check_physics(model)

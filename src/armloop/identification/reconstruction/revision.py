@@ -25,6 +25,7 @@ from armloop.identification.reconstruction.sums import Choice
 from armloop.identification.scoring import residual
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
+from armloop.regression.moments import Sums
 from armloop.util.arrays import TINY, Array
 from armloop.util.progress import Progress
 
@@ -96,8 +97,8 @@ def _plan(revolute: tuple[bool, ...], found: Found, options: Options) -> StepPla
 
 
 @dataclass(frozen=True, eq=False)
-class Leftover:
-    """What a model leaves of the samples that may be fitted; it adds over chunks.
+class Leftover(Sums):
+    """What a model leaves of the samples that may be fitted.
 
     Attributes:
         products, squares, pairs: (3, n) per condition, over pairs of samples one period of the filter apart: sums of
@@ -110,9 +111,6 @@ class Leftover:
     pairs: Array
     total: Array
     count: Array
-
-    def __add__(self, other: Leftover) -> Leftover:
-        return Leftover(*(a + b for a, b in zip(vars(self).values(), vars(other).values(), strict=True)))
 
     @staticmethod
     def of(chunk: Chunk, model: ReconstructedModel, sorter: Sorter) -> Leftover:

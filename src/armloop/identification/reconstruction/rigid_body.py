@@ -105,11 +105,9 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
             physics["held"] = {base.names[k]: float(solution.theta[k]) for k in held}
             below = np.flatnonzero(base.positive & (theta[: base.count] < 0))
             physics["negative"] = {base.names[k]: float(theta[k]) for k in below}
-        values = theta[: base.count]
-        body = RigidBody(full, tuple(base.names), values)
-        inertial = body.parameters[: 10 * arm.n].tolist()
+        body = RigidBody(full, tuple(base.names), theta[: base.count])
         history = {
-            "inertial": inertial,
+            "inertial": full[: 10 * arm.n].tolist(),
             "friction_ladder": [one.to_dict() for one in ladder.comparisons],
             **physics,
         }
@@ -164,20 +162,16 @@ def _priors(arm: Arm, base: BaseParameters, nominal: Array) -> dict[str, Prior]:
 
 def mass_columns(arm: Arm, base: BaseParameters, q: Array) -> Array:
     """(P, n, n, r) mass matrices at postures q (P, n) per unit of each base parameter."""
-    repeated = np.repeat(q, arm.n, axis=0)
-    still, unit = np.zeros_like(repeated), np.tile(np.eye(arm.n), (len(q), 1))
     weightless = replace(arm, gravity=np.zeros(3))
-    accelerated = Motion(np.arange(float(len(repeated))), repeated, still, unit)
-    columns = base.columns(weightless, accelerated).reshape(len(q), arm.n, arm.n, base.count)
+    columns = base.columns(weightless, Motion.accelerated(q)).reshape(len(q), arm.n, arm.n, base.count)
     return columns.transpose(0, 2, 1, 3)
 
 
 def mass_matrix(arm: Arm, base: BaseParameters, values: Array, q: Array) -> Array:
     """(P, n, n) mass matrix at postures q (P, n) of given base parameters, much sooner than by its columns."""
-    n, full = arm.n, base.to_full(values)
-    repeated, unit = np.repeat(q, n, axis=0), np.tile(np.eye(n), (len(q), 1))
+    n, full, pushed = arm.n, base.to_full(values), Motion.accelerated(q)
     weightless = replace(arm, gravity=np.zeros(3))
-    torques = joint_torques(weightless, full[: 10 * n], repeated, np.zeros_like(repeated), unit)
+    torques = joint_torques(weightless, full[: 10 * n], pushed.q, pushed.v, pushed.vdot)
     return torques.reshape(len(q), n, n).transpose(0, 2, 1) + np.diag(full[10 * n :])
 
 

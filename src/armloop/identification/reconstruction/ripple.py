@@ -12,17 +12,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from armloop.data.blocks import block_numbers, block_sums
+from armloop.data.blocks import block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import Conditioning, ShortRunError, preprocess
+from armloop.identification.reconstruction.projected import block_covariance, block_score
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
 _BAND = 0.4
@@ -45,7 +45,7 @@ class Residual:
 
 
 def find_ripple(
-    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: Mask
 ) -> list[AddedEffect]:
     """Ripples of all joints that turn, strongest first at each.
 
@@ -91,15 +91,11 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
         for f in range(_FOLDS):
             mine = fold == f
             after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
-        a, b = block_sums(y**2, left.block), block_sums(after**2, left.block)
-        parts = (a - b) / np.maximum(a + b, TINY)
-        score = float(parts.sum()) / max(float(parts.std(ddof=1)) * np.sqrt(len(parts)), 1e-12)
-        if score > student.isf(_CHANCE / (len(orders) * joints), len(parts) - 1):
-            bread = np.linalg.inv(X.T @ X)
+        score, blocks = block_score(y**2, after**2, left.block)
+        if score > student.isf(_CHANCE / (len(orders) * joints), blocks - 1):
+            bread = np.asarray(np.linalg.inv(X.T @ X), dtype=float)
             x = bread @ (X.T @ y)
-            scores = X * (y - X @ x)[:, None]
-            sums = np.stack([block_sums(column, left.block) for column in scores.T])
-            return order, x, bread @ (sums @ sums.T) @ bread
+            return order, x, block_covariance(bread, X * np.asarray(y - X @ x)[:, None], left.block)
     return None
 
 
@@ -119,7 +115,7 @@ def _waves(q: Array, order: float) -> Array:
 
 
 def _residuals(
-    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: NDArray[np.bool_]
+    model: ReconstructedModel, logs: Sequence[MotionLog], samples: Samples, held_out: Mask
 ) -> tuple[list[Residual], float]:
     """Per joint, what the model leaves of the unfiltered torque where the joint moves; and the sample period, s."""
     fine = replace(model.conditioning, oversampling=1e9)

@@ -7,7 +7,6 @@ own is chosen.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from armloop.data.filters import at_least
@@ -17,7 +16,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.determined import combination, identifiable
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ExcitationError
 
 #: Friction with memory needs every sample.
@@ -44,17 +43,17 @@ _TAIL = 0.005
 _NOTHING = 1e-12
 
 
-def sliding_rows(samples: Samples) -> NDArray[np.bool_]:
+def sliding_rows(samples: Samples) -> Mask:
     """(N, n) samples in which a joint's torque is determined by its motion: it is fast, or it creeps steadily."""
     return fast_rows(samples) | (samples.moving & _steady(samples))
 
 
-def fast_rows(samples: Samples) -> NDArray[np.bool_]:
+def fast_rows(samples: Samples) -> Mask:
     """(N, n) samples so fast that a direction which fades in late (:data:`FRICTION`) is right all the same."""
     return samples.moving & (np.abs(samples.motion.v) > _SLIDING)
 
 
-def _steady(samples: Samples) -> NDArray[np.bool_]:
+def _steady(samples: Samples) -> Mask:
     """(N, n) samples around which a joint keeps its direction and about its speed."""
     v = samples.motion.v
     steady = np.zeros(v.shape, dtype=bool)

@@ -10,7 +10,6 @@ import warnings
 
 import numpy as np
 import pysindy
-from numpy.typing import NDArray
 
 from armloop.data.blocks import folds
 from armloop.data.motion import Samples
@@ -21,7 +20,7 @@ from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ExcitationError
 from armloop.util.progress import Progress
 
@@ -32,9 +31,7 @@ _MOST_SAMPLES = 4000
 _FEWEST_SAMPLES = 100
 
 
-def sindy(
-    arm: Arm, samples: Samples, held_out: NDArray[np.bool_], options: Options, progress: Progress
-) -> Found:
+def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress: Progress) -> Found:
     """Regress the one-shot library with pysindy's STLSQ; threshold and order N1 by held-out error.
 
     The joints' own friction columns, sign(v) and v, are offered to it as they are to the stepwise method.
@@ -52,8 +49,8 @@ def sindy(
         )
     rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
     validation = folds(samples, options.folds, options.block_seconds)[rows] == 1
-    fit, check = rows[~validation], rows[validation]
-    scale = np.sqrt(np.mean(samples.tau[rows] ** 2, axis=0))
+    tau = samples.tau[rows]
+    scale = np.sqrt(np.mean(tau**2, axis=0))
     trials: list[tuple[list[int], float]] = []
     best: tuple[float, DoubleFeatureSet, Array] | None = None
     for N1 in range(1, options.max_order + 1):
@@ -64,13 +61,11 @@ def sindy(
         X, signs = library.columns(samples.motion.take(rows)), np.sign(samples.motion.v[rows])
         X = np.hstack([X, signs])
         names = [*library.names, *(f"sign(v{j + 1})" for j in range(arm.n))]
-        inside, outside = np.isin(rows, fit), np.isin(rows, check)
         errors = []
         for threshold, ridge in _SETTINGS:
-            coefficients = (
-                _stlsq(X[inside], samples.tau[fit] / scale, names, threshold, ridge) * scale[:, None]
-            )
-            error = (samples.tau[check] - X[outside] @ coefficients.T) / scale
+            shares = _stlsq(X[~validation], tau[~validation] / scale, names, threshold, ridge)
+            coefficients = shares * scale[:, None]
+            error = (tau[validation] - X[validation] @ coefficients.T) / scale
             errors.append(float(np.sqrt(np.mean(error**2))))
             if best is None or errors[-1] < best[0]:
                 best = (errors[-1], library, coefficients)

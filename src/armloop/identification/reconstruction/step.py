@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.features.angle_sums import AngleSums
-from armloop.features.double_feature_set import DoubleFeatureSet, Factors
+from armloop.features.double_feature_set import DoubleFeatureSet, Factors, padded
 from armloop.features.wave_moments import WaveProducts
 from armloop.identification.reconstruction.attenuation import without_attenuation
 from armloop.identification.reconstruction.data import Data
@@ -27,7 +26,7 @@ from armloop.laws.friction import FrictionTerm
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import ExcitationError, InputError
 
 #: Sect. 4.3 lists v_s = 0.01 … 1; a geometric grid resolves the small ones as finely as the large ones.
@@ -121,10 +120,8 @@ def candidates_of(revolute: tuple[bool, ...], plan: StepPlan) -> Candidates:
             if part.step > 1 and (second == 0 or first > N1):
                 continue
             rows.setdefault(key, (part.step, int(first), second))
-    width = max(1, *(len(key) for key in rows))
-    index = np.array([[0] * (width - len(key)) + list(key) for key in rows], dtype=np.intp)
     step, first_order, second_order = np.array(list(rows.values()), dtype=np.intp).T
-    return Candidates(factors, index, step, first_order, second_order, plan.still)
+    return Candidates(factors, padded(list(rows)), step, first_order, second_order, plan.still)
 
 
 def _second_order(part: Part, N2: int) -> int:
@@ -146,7 +143,7 @@ class _Joint:
     fit: Moments
     all: Moments
     size: int
-    distinct: NDArray[np.bool_]
+    distinct: Mask
     fixed: Index
     profile: Index
     scale: float
@@ -279,7 +276,7 @@ def _fit(joint: _Joint, moments: Moments, library: Index, options: Options) -> F
 
 
 def _corrected(
-    fits: list[Fit], joints: Sequence[_Joint], gradients: Callable[[list[Fit]], tuple[Array, ...]]
+    fits: list[Fit], joints: Sequence[_Joint], gradients: Callable[[list[Fit]], list[Array]]
 ) -> list[Fit]:
     """The fits, refined on the samples themselves where so little is left that it may be round-off.
 

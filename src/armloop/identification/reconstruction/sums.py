@@ -22,7 +22,7 @@ from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.laws.friction import FrictionTerm
-from armloop.regression.moments import Moments
+from armloop.regression.moments import Moments, Sums
 from armloop.util.arrays import Array, Index, Mask
 
 #: Friction columns, dozens per joint, that exist at a time on all samples of a chunk.
@@ -147,8 +147,8 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class StepSums:
-    """Sums of a step's samples per cell; they add over chunks.
+class StepSums(Sums):
+    """Sums of a step's samples per cell.
 
     Attributes:
         cells: sums whose given columns are the remaining torques of all joints, then their friction.
@@ -157,13 +157,6 @@ class StepSums:
 
     cells: dict[Cell, WaveSums]
     power: dict[Cell, Array]
-
-    def __add__(self, other: StepSums) -> StepSums:
-        cells, power = dict(self.cells), dict(self.power)
-        for cell, sums in other.cells.items():
-            cells[cell] = cells[cell] + sums if cell in cells else sums
-            power[cell] = power[cell] + other.power[cell] if cell in power else other.power[cell]
-        return StepSums(cells, power)
 
     @staticmethod
     def of(chunk: Chunk, choice: Choice, columns: Columns) -> StepSums:

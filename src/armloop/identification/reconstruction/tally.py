@@ -13,8 +13,17 @@ from armloop.data.motion import Samples
 from armloop.data.reversals import at_reversals, turning
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.nearest_regime import Sorter
-from armloop.identification.scoring import Score, residual
+from armloop.identification.scoring import (
+    Score,
+    error_sums,
+    errors_of,
+    ratios,
+    residual,
+    root_mean,
+    score_of_sums,
+)
 from armloop.model import ReconstructedModel
+from armloop.regression.moments import added
 from armloop.util.arrays import Array, Mask
 
 #: Which held-out blocks judge: all of them, those that choose the library, or those that choose nothing at all.
@@ -48,12 +57,8 @@ class Tally:
     places: dict[str, Array]
 
     def __add__(self, other: Tally) -> Tally:
-        sums = dict(self.sums)
-        for label, values in other.sums.items():
-            sums[label] = sums[label] + values if label in sums else values
-        blocks = np.concatenate([self.blocks, other.blocks])
-        places = {key: own + other.places[key] for key, own in self.places.items()}
-        return Tally(sums, blocks, self.samples + other.samples, places)
+        blocks, samples = np.concatenate([self.blocks, other.blocks]), self.samples + other.samples
+        return Tally(added(self.sums, other.sums), blocks, samples, added(self.places, other.places))
 
     @staticmethod
     def of(
@@ -73,18 +78,12 @@ class Tally:
         """
         samples, held = chunk.samples, chunk.judging(part, margin)
         every = residual(model, samples) ** 2
-        squares = every[held]
-        torques, moving = samples.tau[held] ** 2, samples.moving[held]
+        squares, moving = every[held], samples.moving[held]
         labels = np.zeros(len(held), dtype=int) if sorter is None else sorter(samples)
         sums = {}
         for label in np.unique(labels[held]):
             rows = labels[held] == label
-            masks = (rows[:, None] & ~moving, rows[:, None] & moving)
-            parts = [
-                [(squares * m).sum(axis=0), (torques * m).sum(axis=0), m.sum(axis=0).astype(float)]
-                for m in masks
-            ]
-            sums[int(label)] = np.array(parts)
+            sums[int(label)] = error_sums(squares[rows], samples.tau[held][rows], moving[rows])
         n = squares.shape[1]
         blocks, places = np.zeros((0, 2, n)), dict.fromkeys(PLACES, np.zeros((2, n)))
         if samples.cutoff_hz > 0 and held.any():
@@ -108,9 +107,7 @@ class Tally:
 
     def score(self) -> Score:
         """Score of all held-out samples."""
-        rest, moving = np.sum(list(self.sums.values()), axis=0)
-        rms = [_root(t, c) for t, c in zip(moving[1], moving[2], strict=True)]
-        return Score(_errors(rest + moving), _errors(moving), _errors(rest), rms, self.samples)
+        return score_of_sums(np.sum(list(self.sums.values()), axis=0), self.samples)
 
     def baseline(self) -> dict[str, Any]:
         """What the model leaves, per joint: of the condition that it explains worst.
@@ -118,21 +115,26 @@ class Tally:
         A later run is one of motion; easy data (creeping, steady) must not make the model look better than
         it is on those.
         """
-        per_condition = [_errors(moving)["rmse"] for _, moving in self.sums.values()]
+        per_condition = [errors_of(moving)["rmse"] for _, moving in self.sums.values()]
         rmse = [
             max((x for x in joint if x is not None), default=None)
             for joint in zip(*per_condition, strict=True)
         ]
         rms = self.score().rms
-        nrmse = [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)]
-        return {"rmse": rmse, "nrmse": nrmse, "rms": rms, **self.yardsticks(), "samples": self.samples}
+        return {
+            "rmse": rmse,
+            "nrmse": ratios(rmse, rms),
+            "rms": rms,
+            **self.yardsticks(),
+            "samples": self.samples,
+        }
 
     def yardsticks(self) -> dict[str, list[float | None]]:
         """RMSE per joint that one block in ten exceeds (``worst``), and at the places that are apart."""
         sums = self.places.items()
         return {
             "worst": self.worst(),
-            **{key: [_root(e, c) for e, c in zip(*x, strict=True)] for key, x in sums},
+            **{key: root_mean(*x) for key, x in sums},
         }
 
     def relative_blocks(self) -> Array:
@@ -164,19 +166,6 @@ def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:
     speeds = np.zeros(samples.motion.joints) if ranges is None else np.asarray(ranges[1])
     places = at_reversals(samples, turns, samples.moving | turns), creeping(samples, speeds)
     return dict(zip(PLACES, places, strict=True))
-
-
-def _errors(sums: Array) -> dict[str, Any]:
-    rmse = [_root(e, c) for e, c in zip(sums[0], sums[2], strict=True)]
-    rms = [_root(t, c) for t, c in zip(sums[1], sums[2], strict=True)]
-    return {
-        "rmse": rmse,
-        "nrmse": [e / t if e is not None and t else None for e, t in zip(rmse, rms, strict=True)],
-    }
-
-
-def _root(total: float, count: float) -> float | None:
-    return float(np.sqrt(total / count)) if count else None
 
 
 def at_least(baseline: dict[str, Any], fitted: Tally) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Samples
 from armloop.identification.reconstruction.data import Chunk, Data
@@ -22,19 +21,20 @@ from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Pooled
 from armloop.identification.reconstruction.shared import PLAIN_FRICTION, fast_rows, sliding_rows
 from armloop.laws.friction import FrictionTerm
-from armloop.util.arrays import Array
+from armloop.regression.moments import Sums
+from armloop.util.arrays import Array, Mask
 
 #: Consecutive samples that tell laws of the catalogue apart as well as more do.
 _WINDOW = 150_000
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
-    """What a first pass finds; it adds over chunks.
+class Survey(Sums):
+    """What a first pass finds.
 
     Attributes:
         sums: of samples that are fitted: of those that slide fast, and of those that creep.
-        lengths: samples of every run in which some joint slides and that are fitted.
+        lengths: samples of every run in which some joint slides and that are fitted, one run after the other.
         fitted, sliding: (n,) samples of each joint that are fitted, and that slide at all.
     """
 
@@ -42,14 +42,6 @@ class Survey:
     lengths: tuple[int, ...]
     fitted: Array
     sliding: Array
-
-    def __add__(self, other: Survey) -> Survey:
-        return Survey(
-            self.sums + other.sums,
-            self.lengths + other.lengths,
-            self.fitted + other.fitted,
-            self.sliding + other.sliding,
-        )
 
     @staticmethod
     def of(chunk: Chunk, design: Design) -> Survey:
@@ -148,7 +140,7 @@ class Training:
         return Pooled(JointSums.of(self.window, design, laws, _at_once), laws, 1, self.repeats, passive)
 
 
-def fitted_rows(chunk: Chunk) -> NDArray[np.bool_]:
+def fitted_rows(chunk: Chunk) -> Mask:
     """(N, n) samples that slide and may be fitted."""
     return np.asarray(sliding_rows(chunk.samples) & ~chunk.held_out[:, None])
 

@@ -9,6 +9,7 @@ import numpy as np
 from armloop.data.blocks import block_sums
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.sums import Choice, Columns
+from armloop.regression.moments import Sums
 from armloop.util.arrays import Array, Index
 
 
@@ -26,8 +27,8 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
-    """Errors of K fits per joint on the samples that choose orders; they add over chunks of whole blocks.
+class HeldOut(Sums):
+    """Errors of K fits per joint on the samples that choose orders, in chunks of whole blocks.
 
     Attributes:
         errors: (K, n) weighted squared errors.
@@ -38,9 +39,6 @@ class HeldOut:
     errors: Array
     squares: Array
     blocks: int
-
-    def __add__(self, other: HeldOut) -> HeldOut:
-        return HeldOut(self.errors + other.errors, self.squares + other.squares, self.blocks + other.blocks)
 
     @staticmethod
     def of(chunk: Chunk, choice: Choice, columns: Columns, fits: list[list[Fit]], weights: Array) -> HeldOut:
@@ -79,25 +77,19 @@ class HeldOut:
 
 
 @dataclass(frozen=True, eq=False)
-class Correction:
-    """The gradient of every joint's fit on the samples, Xᵀ(y − Xβ); it adds over chunks."""
+class Correction(Sums):
+    """The gradient of every joint's fit on the samples, Xᵀ(y − Xβ)."""
 
-    gradients: tuple[Array, ...]
-
-    def __add__(self, other: Correction) -> Correction:
-        pairs = zip(self.gradients, other.gradients, strict=True)
-        return Correction(tuple(a + b for a, b in pairs))
+    gradients: list[Array]
 
     @staticmethod
     def of(chunk: Chunk, choice: Choice, columns: Columns, fits: list[Fit]) -> Correction:
         """Gradients of one fit per joint."""
         usable = choice(chunk)
-        gradients = []
+        gradients = [np.zeros(len(fit.support)) for fit in fits]
         for j, fit in enumerate(fits):
             part = usable.take(usable.moving[:, j])
-            if part.motion.samples == 0:
-                gradients.append(np.zeros(len(fit.support)))
-                continue
-            X = columns.chosen(part, j, fit.support)
-            gradients.append(X.T @ (part.rest[:, j] - X @ fit.beta))
-        return Correction(tuple(gradients))
+            if part.motion.samples:
+                X = columns.chosen(part, j, fit.support)
+                gradients[j] = X.T @ (part.rest[:, j] - X @ fit.beta)
+        return Correction(gradients)

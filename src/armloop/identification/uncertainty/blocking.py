@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
-from armloop.util.arrays import TINY, Array, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Blocks are so many correlation times long, and where data are short at least so many: what spills over their
 #: ends takes one part in twenty (in four) from the variance of an exponentially correlated residual.
@@ -71,7 +70,7 @@ def covered_time(time: Array, rows: Mask) -> float:
     return float(np.maximum(steps, 0.0)[steps <= 10 * np.median(steps)].sum()) if len(steps) else 0.0
 
 
-def independent_blocks(motion: Motion, seconds: float) -> NDArray[np.intp]:
+def independent_blocks(motion: Motion, seconds: float) -> Index:
     """(N,) number of each sample's block: runs in pieces of at most ``seconds``, neighbours joined if too many."""
     blocks = block_numbers(motion, seconds)
     return np.asarray(blocks // int(np.ceil((blocks[-1] + 1) / _MOST)), dtype=np.intp)

@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Speeds at which a law is compared with its line, and the quantiles of the fitted speeds that they lie between.
 _SPEEDS, _BETWEEN = 100, (0.1, 0.95)
@@ -32,7 +31,7 @@ def friction_line(
     covariance: Array,
     freedom: float,
     samples: Samples,
-    rows: NDArray[np.bool_],
+    rows: Mask,
 ) -> dict[str, Any]:
     """f_c, f_v of a joint (0-based) with standard errors, and the speeds between which they hold.
 
@@ -53,7 +52,8 @@ def friction_line(
     v = np.linspace(low, high, _SPEEDS)
     # Half the difference of both directions: what an offset adds to each is no friction.
     columns = np.column_stack([0.5 * (_column(t, v) - _column(t, -v)) for t in terms])
-    line = np.linalg.pinv(np.column_stack([np.ones_like(v), v])) @ columns
+    fit = np.linalg.pinv(np.column_stack([np.ones_like(v), v]))
+    line = fit @ columns
     places = {t.name(joint + 1): k for k, t in enumerate(terms)}
     weights = np.zeros((2, len(names)))
     for k, name in enumerate(names):
@@ -62,14 +62,17 @@ def friction_line(
         elif name == STRIBECK_VELOCITY:
             own = next(t for t in terms if t.kind == "stribeck")
             slope = -2 * v**2 / own.parameter**3 * stribeck_fall(v, own.parameter)
-            weights[:, k] = np.linalg.pinv(np.column_stack([np.ones_like(v), v])) @ (own.coefficient * slope)
+            weights[:, k] = fit @ (own.coefficient * slope)
     values = line @ [t.coefficient for t in terms]
     errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))
-    entry = {
-        key: {"value": float(x), "std_error": float(e), "degrees_of_freedom": round(float(freedom), 1)}
-        for key, x, e in zip(("coulomb", "viscous"), values, errors, strict=True)
-    }
-    return {**entry, "speeds": [float(low), float(high)]}
+    pairs = zip(("coulomb", "viscous"), values, errors, strict=True)
+    found = {key: {"value": float(x), **entry(e, freedom)} for key, x, e in pairs}
+    return {**found, "speeds": [float(low), float(high)]}
+
+
+def entry(error: float, freedom: float) -> dict[str, float]:
+    """A standard error as the model file keeps it."""
+    return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
 
 
 def _column(term: FrictionTerm, v: Array) -> Array:

@@ -3,10 +3,8 @@
 The coefficients solve estimating equations: for each step the sum over its samples of column times residual,
 where the residual contains what the steps before it found. Stacked, their Jacobian is block-triangular, and so
 the uncertainty of inherited steps reaches the later ones (Newey, "A method of moments interpretation of
-sequential estimators", Economics Letters 14, 1984). Blocks of samples are the independent units. The covariance
-is the delete-one-block jackknife, which is the sandwich of Liang and Zeger (1986) corrected for the leverage of
-every block (CV3 of MacKinnon, Nielsen and Webb, "Fast and reliable jackknife and bootstrap methods for
-cluster-robust inference", J. Applied Econometrics 38, 2023).
+sequential estimators", Economics Letters 14, 1984). Blocks of samples are the independent units of a delete-one
+jackknife (:mod:`armloop.regression.clustered`).
 """
 
 from __future__ import annotations
@@ -15,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import TINY, Array
+from armloop.regression.clustered import delete_one
+from armloop.util.arrays import TINY, Array, Index
 
 #: Relative ridge against columns that a block's removal leaves dependent; their errors come out huge, as they are.
 _RIDGE = 1e-10
@@ -39,7 +37,7 @@ class Equations:
     jacobian: Array
     score: Array
     count: Array
-    stage: NDArray[np.intp]
+    stage: Index
     variance: Array
 
     @property
@@ -50,38 +48,27 @@ class Equations:
     @cached_property
     def scale(self) -> Array:
         """(p,) factors that make the columns' squares sum to one."""
-        squares = np.diagonal(self.jacobian.sum(axis=0))
-        return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
+        return _scale(self.jacobian.sum(axis=0))
 
     @cached_property
     def _scaled(self) -> Array:
         return self.jacobian * np.multiply.outer(self.scale, self.scale)
 
-    def _ridged(self, products: Array) -> Array:
-        return products + _RIDGE * np.eye(len(self.scale))
-
     def step(self) -> Array:
         """(p,) Gauss-Newton step towards the root; where all columns are linear it ends there."""
-        total = self._ridged(self._scaled.sum(axis=0))
-        return np.asarray(self.scale * np.linalg.solve(total, self.scale * self.score.sum(axis=0)))
+        return gauss_newton_step(self.jacobian.sum(axis=0), self.score.sum(axis=0))
 
     def covariance(self) -> Array:
         """(p, p) covariance, blocks being independent and the errors within them anything."""
-        # Scores of least squares sum to zero; where a constraint or a correction for noise in the columns moved
-        # the solution they do not, and what all samples have in common is no error.
         share = self.count / np.maximum(self.count.sum(axis=0), TINY)
-        score = (self.score - share * self.score.sum(axis=0)) * self.scale
-        without = self._ridged(self._scaled.sum(axis=0) - self._scaled)
-        moved = np.linalg.solve(without, score[:, :, None])[:, :, 0]
-        moved = moved - moved.mean(axis=0)
-        inner = moved.T @ moved * (self.blocks - 1) / self.blocks
-        return np.asarray(inner * np.multiply.outer(self.scale, self.scale))
+        inner = delete_one(self._scaled, self.score * self.scale, share, _RIDGE)
+        return inner * np.multiply.outer(self.scale, self.scale)
 
     def independent_covariance(self) -> Array:
         """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""
         same = self.stage[:, None] == self.stage
         total = np.where(same, self._scaled.sum(axis=0), 0.0)
-        inverse = np.linalg.inv(self._ridged(total))
+        inverse = np.linalg.inv(_ridged(total))
         used = np.array([np.count_nonzero(self.stage == s) for s in self.stage])
         samples = np.maximum(self.count.sum(axis=0) - used, 1.0)
         spread = self.variance * self.count.sum(axis=0) / samples
@@ -94,8 +81,24 @@ class Equations:
         blocks is (Σ w)²/Σ w² (Satterthwaite; Carter, Schnepel and Steigerwald 2017).
         """
         total = self._scaled.sum(axis=0)
-        inverse = np.linalg.inv(self._ridged(total))
+        inverse = np.linalg.inv(_ridged(total))
         noise = np.where(self.stage[:, None] == self.stage, self._scaled, 0.0) * self.variance
         weight = np.einsum("bkm,km->bk", inverse @ noise, inverse)
         effective = weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), TINY)
         return np.maximum(effective - 1, 1.0)
+
+
+def gauss_newton_step(jacobian: Array, score: Array) -> Array:
+    """(p,) step towards the root of estimating equations with these sums (p, p), (p,) over all samples."""
+    scale = _scale(jacobian)
+    total = _ridged(jacobian * np.multiply.outer(scale, scale))
+    return np.asarray(scale * np.linalg.solve(total, scale * score))
+
+
+def _scale(jacobian: Array) -> Array:
+    squares = np.diagonal(jacobian)
+    return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
+
+
+def _ridged(products: Array) -> Array:
+    return products + _RIDGE * np.eye(len(products))

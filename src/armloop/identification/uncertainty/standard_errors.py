@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import overlapping
 from armloop.data.motion import Samples
@@ -23,13 +22,14 @@ from armloop.identification.uncertainty.blocking import (
     covered_time,
     independent_blocks,
 )
-from armloop.identification.uncertainty.friction_lines import friction_line
+from armloop.identification.uncertainty.friction_lines import entry, friction_line
 from armloop.identification.uncertainty.propagated import leading, to_dict
-from armloop.identification.uncertainty.sandwich import Equations
+from armloop.identification.uncertainty.sandwich import Equations, gauss_newton_step
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Problem, Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.regression.determined import combination, identifiable
-from armloop.util.arrays import TINY, Array
+from armloop.regression.moments import added
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: Samples whose columns are evaluated at once, and seconds beside them that filter and memory need.
 _PIECE, _MARGIN = 8192, 2.0
@@ -47,7 +47,7 @@ class Fitted:
     """
 
     steps: tuple[int, ...]
-    rows: NDArray[np.bool_]
+    rows: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,9 @@ class Errors:
     @property
     def gram(self) -> Array:
         """(p, p) products of the columns that were regressed together, in units of the residual's variance."""
-        return self._products / self.equations.variance[:, None]
+        variance = self.equations.variance
+        # what is met exactly has no errors, which weigh nothing in any unit
+        return self._products / np.where(variance > TINY, variance, 1.0)[:, None]
 
     def undetermined(self) -> list[dict[str, Any]]:
         """What the samples do not tell apart: the coefficients without a meaning of their own, and what has one.
@@ -136,8 +138,8 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
             where = place if unknown.joint is None else place[unknown.joint]
             # what the fitted samples do not determine has no error; it must not spoil the model's file
             if np.isfinite(error) and np.isfinite(freedom):
-                where[unknown.name] = _entry(error, freedom)
-    table["undetermined"] = [entry for part in parts for entry in part.undetermined()]
+                where[unknown.name] = entry(error, freedom)
+    table["undetermined"] = [one for part in parts for one in part.undetermined()]
     table["stribeck"] = [_stribeck(model, parts, joint) for joint in range(n)]
     rows = np.logical_or.reduce([one.rows for one in fitted])
     table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
@@ -203,6 +205,7 @@ class Assembled:
     score: list[Array]
     squares: Array
     power: Array
+    _SUMS: ClassVar = ("jacobian", "score", "squares", "power")
 
     @staticmethod
     def of(model: ReconstructedModel, samples: Samples, fitted: Sequence[Fitted]) -> Assembled:
@@ -222,24 +225,12 @@ class Assembled:
         )
 
     def __add__(self, other: Assembled) -> Assembled:
-        pairs = [
-            [a + b for a, b in zip(mine, theirs, strict=True)]
-            for mine, theirs in ((self.jacobian, other.jacobian), (self.score, other.score))
-        ]
-        return Assembled(
-            self.unknowns, pairs[0], pairs[1], self.squares + other.squares, self.power + other.power
-        )
+        sums = (added(getattr(self, name), getattr(other, name)) for name in self._SUMS)
+        return Assembled(self.unknowns, *sums)
 
     def steps(self) -> list[tuple[list[Unknown], Array]]:
         """Every problem's unknowns with the step (p,) that solves the linearised equations."""
-        found = []
-        for unknowns, jacobian, score in zip(self.unknowns, self.jacobian, self.score, strict=True):
-            p = len(unknowns)
-            whole = Equations(
-                jacobian[None], score[None], np.ones((1, p)), np.zeros(p, dtype=np.intp), np.ones(p)
-            )
-            found.append((unknowns, whole.step()))
-        return found
+        return list(zip(self.unknowns, map(gauss_newton_step, self.jacobian, self.score), strict=True))
 
     def misfit(self) -> float:
         """Sum over the joints of mean squared residual relative to mean squared torque."""
@@ -250,10 +241,10 @@ class Assembled:
 class _Portion:
     """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,)."""
 
-    index: NDArray[np.intp]
+    index: Index
     joint: int
     stage: int
-    where: NDArray[np.intp]
+    where: Index
     X: Array
     r: Array
 
@@ -274,7 +265,7 @@ def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Itera
                 yield _Portion(start + inside, design.joint, s, design.where, X, r)
 
 
-def _stages(problem: Problem, fitted: Sequence[Fitted]) -> NDArray[np.intp]:
+def _stages(problem: Problem, fitted: Sequence[Fitted]) -> Index:
     order = {step: s for s, one in enumerate(fitted) for step in one.steps}
     return np.array([order[unknown.step] for unknown in problem.unknowns], dtype=np.intp)
 
@@ -295,7 +286,7 @@ def _equations(
     problem: Problem,
     samples: Samples,
     fitted: Sequence[Fitted],
-    blocks: NDArray[np.intp],
+    blocks: Index,
     spread: Array,
     squares: Array | None = None,
 ) -> Equations:
@@ -323,10 +314,6 @@ def _equations(
     return Equations(jacobian[used], score[used], count[used], stages, variance)
 
 
-def _entry(error: float, freedom: float) -> dict[str, float]:
-    return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
-
-
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
     """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
     kinds = {term.kind: term.name(joint + 1) for term in model.friction.terms[joint]}
@@ -347,12 +334,12 @@ def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) ->
                 error = float(np.sqrt(max(chosen @ part.covariance @ chosen, 0.0)))
                 freedom = float(part.freedom[chosen > 0].min())
                 if np.isfinite(error) and np.isfinite(freedom):
-                    found[key] = {"value": float(value), **_entry(error, freedom)}
+                    found[key] = {"value": float(value), **entry(error, freedom)}
     return found
 
 
 def _line(
-    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: NDArray[np.bool_]
+    model: ReconstructedModel, parts: Sequence[Errors], joint: int, samples: Samples, rows: Mask
 ) -> dict[str, Any]:
     """:func:`friction_line` of a joint, whose friction is all in one problem."""
     for part in parts:

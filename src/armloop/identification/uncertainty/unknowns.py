@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
@@ -21,7 +20,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 
 #: Name of the unknown v_s beside the friction terms of a joint.
 STRIBECK_VELOCITY = "v_s"
@@ -53,7 +52,7 @@ class Design:
     """Columns of one joint: X (N, k) belong to the unknowns ``where`` (k,)."""
 
     joint: int
-    where: NDArray[np.intp]
+    where: Index
     X: Array
 
 

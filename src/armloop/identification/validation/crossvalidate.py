@@ -7,10 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
-from armloop.data.motion import Samples
 from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, preprocess
 from armloop.identification.reconstruction import Options, reconstruct
@@ -18,6 +16,7 @@ from armloop.identification.scoring import Score, residual, score_errors
 from armloop.identification.validation.splits import Split, by_blocks, by_file, judging_rows
 from armloop.model import ReconstructedModel, model_of
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array, Mask
 from armloop.util.checkpoints import Kept, digest
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, silent
@@ -162,18 +161,15 @@ def crossvalidate(
 
 
 #: (N, n) residual, measured torque, and which samples move, of the samples that judge.
-_Judged = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+_Judged = tuple[Array, Array, Mask]
 
 
 def _judge(split: Split, logs: Sequence[MotionLog], model: ReconstructedModel) -> list[tuple[int, _Judged]]:
     found = []
     for k, blocks in split.left_out.items():
         samples = preprocess([logs[k]], model.conditioning)
-        rows = judging_rows(_time(logs[k], samples), samples, blocks)
+        # unfiltered samples are numbered; where they lie in the log is its time
+        time = samples.motion.time if samples.cutoff_hz > 0 else logs[k].time
+        rows = judging_rows(time, samples, blocks)
         found.append((k, (residual(model, samples)[rows], samples.tau[rows], samples.moving[rows])))
     return found
-
-
-def _time(log: MotionLog, samples: Samples) -> NDArray[np.float64]:
-    """(N,) instants of the samples in the log's time: unfiltered samples are numbered instead."""
-    return samples.motion.time if samples.cutoff_hz > 0 else log.time

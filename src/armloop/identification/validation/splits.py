@@ -13,12 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.log import GAP_PERIODS, MotionLog
 from armloop.data.motion import Motion, Samples
-from armloop.util.arrays import Mask
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 
 #: Seconds since 1970 are known to 0.24 µs; no two samples are so near.
@@ -38,7 +37,7 @@ class Split:
 
     name: str
     training: list[MotionLog]
-    left_out: dict[int, NDArray[np.float64]]
+    left_out: dict[int, Array]
 
 
 def by_file(logs: Sequence[MotionLog]) -> list[Split]:
@@ -70,7 +69,10 @@ def by_blocks(logs: Sequence[MotionLog], seconds: float) -> list[Split]:
                 f"{log.name}: blocks of {seconds:g} s are too short at {1 / log.period:.4g} samples a second; give "
                 f"--block of at least {2 * GAP_PERIODS * log.period:.2g} s"
             )
-    numbers = [_blocks(log, seconds) for log in logs]
+    numbers = []
+    for log in logs:
+        starts = np.array([run.start for run in log.runs()])
+        numbers.append(block_numbers(Motion(log.time, log.q, log.v, log.q, starts), seconds))
     if all(len(np.unique(own)) < 2 for own in numbers):
         raise InputError(f"{logs[0].name}: shorter than two blocks of {seconds:g} s; give a smaller --block")
     splits = []
@@ -80,12 +82,13 @@ def by_blocks(logs: Sequence[MotionLog], seconds: float) -> list[Split]:
             kept = own % 2 != parity
             if kept.any():
                 training.append(log.select(kept))
-            left_out[k] = _intervals(log.time, own, ~kept)
+            ends = [log.time[own == number][[0, -1]] for number in np.unique(own[~kept])]
+            left_out[k] = np.array(ends).reshape(-1, 2)
         splits.append(Split(name, training, left_out))
     return splits
 
 
-def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np.float64]) -> Mask:
+def judging_rows(time: Array, samples: Samples, blocks: Array) -> Mask:
     """(N,) samples inside the blocks (R, 2), those left aside that the filter may have mixed with others.
 
     Args:
@@ -97,14 +100,3 @@ def judging_rows(time: NDArray[np.float64], samples: Samples, blocks: NDArray[np
         # a sample on the edge is inside, however its stamp is rounded
         rows |= (time >= start + margin - _ROUNDING) & (time <= end - margin + _ROUNDING)
     return rows
-
-
-def _blocks(log: MotionLog, seconds: float) -> NDArray[np.intp]:
-    starts = np.array([run.start for run in log.runs()])
-    return block_numbers(Motion(log.time, log.q, log.v, log.q, starts), seconds)
-
-
-def _intervals(time: NDArray[np.float64], numbers: NDArray[np.intp], rows: Mask) -> NDArray[np.float64]:
-    """(R, 2) first and last instant of the blocks that the rows make up."""
-    found = [time[numbers == number][[0, -1]] for number in np.unique(numbers[rows])]
-    return np.array(found).reshape(-1, 2)

@@ -18,7 +18,6 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.laws.friction import Acting, Direction
 from armloop.robot.arm import Arm
-from armloop.robot.kinematics import regressor
 from armloop.robot.newton_euler import inverse_dynamics
 from armloop.util.arrays import Array
 from armloop.util.functions import Functions
@@ -197,18 +196,22 @@ class Effect(ABC):
         return f"{self.name} at joint {self.joint}"
 
     @property
+    def index(self) -> int:
+        """Its joint, counted from 0."""
+        assert self.joint is not None
+        return self.joint - 1
+
+    @property
     def place(self) -> tuple[str, int | None, int | None]:
         """Name and joints: what makes two effects the same."""
         return self.name, self.joint, self.other_joint
 
     def shapes(self, context: Context) -> Sequence[float]:
         """Values of the nonlinear parameter to try; one dummy value where there is none."""
-        del context
         return (0.0,)
 
     def refined(self, x: Array, shape: float) -> float:
         """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
-        del x
         return shape
 
     @abstractmethod
@@ -229,7 +232,6 @@ class Effect(ABC):
 
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
         """The scalar parameters, in their order, of free parameters x (k,): these themselves by default."""
-        del shape
         return tuple(x.tolist())
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
@@ -253,25 +255,15 @@ class Effect(ABC):
 
     def placed(self, parameters: Mapping[str, Value]) -> Placed | None:
         """The law along its direction, where it has one written for every kind of number."""
-        del parameters
         return None
 
     def of_state(self, parameters: Mapping[str, Value]) -> StateLaw | None:
         """The torque as a function of q and v alone, written for every kind of number; None where it is none."""
-        del parameters
         return None
 
     def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body | None:
         """The bodies whose torque it is, where it is one of rigid bodies; ``inertial`` (10 n,) are the model's."""
-        del arm, parameters, inertial
         return None
-
-    def body_torque(self, context: Context, parameters: Mapping[str, Value]) -> Array:
-        """(N, n) torque of :meth:`body`."""
-        body, motion = self.body(context.arm, parameters, context.inertial), context.motion
-        assert body is not None
-        v, vdot = ((0 * x if body.weight_only else x) for x in (motion.v, motion.vdot))
-        return np.asarray(regressor(context.arm, motion.q, v, vdot, body.gravity) @ body.parameters)
 
     def pointwise(self, arm: Arm, parameters: dict[str, Value], inertial: Array | None) -> Pointwise:
         """The same torque for one sample at a time: (q, v, vdot), each (n,), -> (n,); none of an event."""
@@ -292,24 +284,20 @@ class Effect(ABC):
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
         """What is wrong with parameters beside each other, each of which is right; empty if nothing is."""
-        del parameters
         return ""
 
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array] | None:
         """What a sensor makes of one run's q and tau (N, n), recorded at ``time`` (N,); None where it cannot be told so."""
-        del time, q, tau, parameters
         return None
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         """Whether the parameters are physically possible."""
-        del arm
         return all(number(parameters[p.name].value) > 0 for p in self.parameters if p.positive)
 
     def resolved(self, parameters: dict[str, Estimate], tried: Sequence[float]) -> bool:
         """Whether the run can show the nonlinear parameter found; beyond what was tried it stands for another effect."""
-        del parameters, tried
         return True
 
     @abstractmethod
@@ -318,7 +306,6 @@ class Effect(ABC):
 
     def remedy(self, parameters: dict[str, Estimate]) -> str:
         """What the arm's owner should do, in words; empty for what acts on the arm itself."""
-        del parameters
         of = "" if self.joint is None else f" of joint {self.joint}"
         return (
             f"Correct the reading{of} before anything uses it. The feedforward stays as it is"
@@ -334,9 +321,8 @@ class Effect(ABC):
         """(N, n, p) of columns on the effect's own joint (N, p); others as they are."""
         if columns.ndim == 3:
             return columns
-        assert self.joint is not None
         full = np.zeros((len(columns), joints, columns.shape[1]))
-        full[:, self.joint - 1] = columns
+        full[:, self.index] = columns
         return full
 
 

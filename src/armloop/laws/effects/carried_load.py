@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Motion
-from armloop.laws.effects.base import Array, Context, Effect, Estimate, Value
+from armloop.laws.effects.base import Array, Context, Estimate, Value
 from armloop.laws.effects.events import during
 from armloop.laws.effects.payload import Payload, on_the_last_link
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Mask
-
-_LOAD = Payload()
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Interval:
     posture: tuple[float, ...]
 
 
-class CarriedLoad(Effect):
+class CarriedLoad(Payload):
     """tau += the torque of a :class:`Payload` in each interval from ``picked_up`` to ``put_down``, none outside of them.
 
     What is carried is a fact of one run, and when is known from its record alone: no controller supplies it. The
@@ -39,13 +37,8 @@ class CarriedLoad(Effect):
     """
 
     name = "carried_load"
-    scope = "arm"
     role = "event"
-    parameters = Payload.parameters
-    needs_model = False
-    complexity = Payload.complexity
     simulated = False
-    load = True
     memory = True
 
     def __init__(
@@ -59,17 +52,11 @@ class CarriedLoad(Effect):
         self.intervals, self.error = tuple(intervals), error
 
     def columns(self, context: Context, shape: float) -> Array:
-        return _LOAD.columns(context, shape) * _during(context.motion, self.intervals)[:, None, None]
-
-    def start(self, beta: Array) -> Array:
-        return _LOAD.start(beta)
-
-    def embed(self, x: Array) -> tuple[Array, Array]:
-        return _LOAD.embed(x)
+        return super().columns(context, shape) * _during(context.motion, self.intervals)[:, None, None]
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
         carried = _during(context.motion, _intervals(parameters, context.arm.n))
-        return _LOAD.torque(context, parameters) * carried[:, None]
+        return super().torque(context, parameters) * carried[:, None]
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
@@ -82,13 +69,10 @@ class CarriedLoad(Effect):
         posture = [q for i in self.intervals for q in i.posture]
         unit = arm.joints[0].position_unit if len({j.position_unit for j in arm.joints}) == 1 else "rad or m"
         return {
-            **_LOAD.estimates(arm, x, covariance, shape),
+            **super().estimates(arm, x, covariance, shape),
             **{key: Estimate(times, [self.error] * len(times), "s") for key, times in ends.items()},
             "posture": Estimate(posture, [0.0] * len(posture), unit),
         }
-
-    def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
-        return _LOAD.plausible(arm, parameters)
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         first, last = (np.atleast_1d(np.asarray(parameters[key].value)) for key in ("picked_up", "put_down"))

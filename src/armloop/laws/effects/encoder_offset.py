@@ -49,19 +49,18 @@ class EncoderOffset(Effect):
         return self._shifted(context, number(parameters["offset"])) - self._shifted(context, 0.0)
 
     def _shifted(self, context: Context, offset: float) -> Array:
-        assert self.joint is not None and context.predict is not None
+        assert context.predict is not None
         if offset == 0.0:
             return context.predict(context.motion)
         q = np.array(context.motion.q)
-        q[:, self.joint - 1] -= offset
+        q[:, self.index] -= offset
         return context.predict(replace(context.motion, q=q))
 
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array]:
-        assert self.joint is not None
         q = q.copy()
-        q[:, self.joint - 1] += number(parameters["offset"])
+        q[:, self.index] += number(parameters["offset"])
         return q, tau
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:

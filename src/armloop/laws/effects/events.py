@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.laws.effects.base import Estimate, Value, number
+from armloop.util.arrays import Array, Mask
 
 #: Two postures, rad or m, that are the same sample of the same log.
 _SAME = 1e-6
 
 
-def during(motion: Motion, parameters: dict[str, Value]) -> NDArray[np.bool_]:
+def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
     """(N,) samples within an event's interval.
 
     ``posture``, the joints' positions at ``start``, says which log it was: every log's clock passes the same
@@ -33,9 +36,13 @@ def during(motion: Motion, parameters: dict[str, Value]) -> NDArray[np.bool_]:
     return rows
 
 
-def interval(
-    start: float, end: float, error: float, posture: NDArray[np.float64], unit: str
-) -> dict[str, Estimate]:
+def ends_before_it_starts(parameters: Mapping[str, Any]) -> str:
+    """The fault of an event's interval; empty if it has none."""
+    late = number(parameters["end"]) <= number(parameters["start"])
+    return "end must come after start" if late else ""
+
+
+def interval(start: float, end: float, error: float, posture: Array, unit: str) -> dict[str, Estimate]:
     """The parameters by which :func:`during` knows an event."""
     still = [0.0] * len(posture)
     return {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armloop.laws.effects.base import Array, Body, Context, Effect, Estimate, Parameter, Value, number
-from armloop.laws.effects.events import during
+from armloop.laws.effects.events import during, ends_before_it_starts
 from armloop.laws.effects.payload import link_parameters
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import tool_jacobian
@@ -46,8 +46,7 @@ class ExternalContact(Effect):
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
-        late = number(parameters["end"]) <= number(parameters["start"])
-        return "end must come after start" if late else ""
+        return ends_before_it_starts(parameters)
 
     def body(self, arm: Arm, parameters: Mapping[str, Value], inertial: Array | None) -> Body:
         """-J^T force while it lasts: the weight of a unit mass at the tool whose gravity is the force."""

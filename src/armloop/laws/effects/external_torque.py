@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armloop.laws.effects.base import Array, Context, Effect, Estimate, Parameter, Value, number
-from armloop.laws.effects.events import during
+from armloop.laws.effects.events import during, ends_before_it_starts
 from armloop.robot.arm import Arm
 
 
@@ -32,9 +32,8 @@ class ExternalTorque(Effect):
     needs_model = False
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        assert self.joint is not None
         tau = np.zeros_like(context.motion.q)
-        tau[during(context.motion, parameters), self.joint - 1] = number(parameters["torque"])
+        tau[during(context.motion, parameters), self.index] = number(parameters["torque"])
         return tau
 
     def columns(self, context: Context, shape: float) -> Array:
@@ -42,13 +41,11 @@ class ExternalTorque(Effect):
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
-        late = number(parameters["end"]) <= number(parameters["start"])
-        return "end must come after start" if late else ""
+        return ends_before_it_starts(parameters)
 
     def estimates(self, arm: Arm, x: Array, covariance: Array, shape: float) -> dict[str, Estimate]:
-        assert self.joint is not None
         error = float(np.sqrt(max(covariance[0, 0], 0.0)))
-        return {"torque": Estimate(float(x[0]), error, arm.joints[self.joint - 1].torque_unit)}
+        return {"torque": Estimate(float(x[0]), error, arm.joints[self.index].torque_unit)}
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         start, end, torque = (parameters[key] for key in ("start", "end", "torque"))

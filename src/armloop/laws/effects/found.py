@@ -68,8 +68,6 @@ class FoundLaw(Effect):
         )
 
     def of_state(self, parameters: Mapping[str, Value]) -> StateLaw:
-        assert self.joint is not None
-        place = self.joint - 1
         terms = [(_factors(name), number(value)) for name, value in parameters.items() if name not in RANGE]
         within = _range(terms, parameters) if RANGE[0] in parameters else []
 
@@ -83,7 +81,7 @@ class FoundLaw(Effect):
             for kind, joint, middle, half in within:
                 total = total * _fading((q if kind == "q" else v)[joint], middle, half)
             tau: list[Any] = [0.0] * len(q)
-            tau[place] = total
+            tau[self.index] = total
             return tau
 
         return torque

@@ -25,6 +25,6 @@ class FrictionDrift(Law):
     elements = ("fading_sign",)
 
     def shapes(self, context: Context) -> Sequence[float]:
-        length = float(np.max(context.motion.elapsed()))
+        length = float(np.max(context.motion.elapsed))
         # Shorter than a few blocks it is no drift; longer than the run it is a constant level.
         return [] if length < 12.0 else [float(T) for T in np.geomspace(4.0, 1.5 * length, 10)]

@@ -72,7 +72,9 @@ class GravityTilt(Effect):
         return Body(inertial, tilted - arm.gravity, weight_only=True)
 
     def torque(self, context: Context, parameters: dict[str, Value]) -> Array:
-        return self.body_torque(context, parameters)
+        q, still = context.motion.q, np.zeros_like(context.motion.q)
+        links, gravity, _ = self.body(context.arm, parameters, context.inertial)
+        return np.asarray(regressor(context.arm, q, still, still, gravity) @ links)
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return all(abs(number(e.value)) < 0.6 for e in parameters.values())

@@ -50,8 +50,7 @@ class JointSpring(Law):
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # A spring pulls back; one that pushes away, or whose rest position the joint is nowhere near, is none.
-        assert self.joint is not None
-        reach = 2 * np.pi if arm.joints[self.joint - 1].kind == "revolute" else 2.0
+        reach = 2 * np.pi if arm.joints[self.index].kind == "revolute" else 2.0
         return super().plausible(arm, parameters) and abs(number(parameters["rest"].value)) < reach
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:

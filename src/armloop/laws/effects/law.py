@@ -89,10 +89,9 @@ class Law(Effect):
 
     def along(self, shape: float) -> Direction:
         """The direction that it acts along."""
-        assert self.joint is not None
         if self.other_joint is None:
-            return Direction(self.joint - 1)
-        return Direction(self.joint - 1, self.other_joint - 1, shape)
+            return Direction(self.index)
+        return Direction(self.index, self.other_joint - 1, shape)
 
     def _numbers(self, parameters: Mapping[str, Value]) -> tuple[tuple[float, ...], float]:
         """Coefficients and shape."""
@@ -194,8 +193,7 @@ class LinearJointEffect(Law):
         """(N,) torque per unit of the coefficient at joint ``joint`` (0-based); of a profiled effect at a shape."""
 
     def values(self, context: Context, shape: float) -> list[Array]:
-        assert self.joint is not None
-        return [self.column(context.motion, self.joint - 1, *((shape,) if self._profiled() else ()))]
+        return [self.column(context.motion, self.index, *((shape,) if self._profiled() else ()))]
 
 
 class ProfiledJointEffect(LinearJointEffect):

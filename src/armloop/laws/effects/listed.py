@@ -12,23 +12,21 @@ from armloop.laws.effects.base import Effect
 _PACKAGE = __package__ or "armloop.laws.effects"
 
 
-def _defined(module: str) -> list[type[Effect]]:
-    """The named effects of a module, but not those that it imports."""
-    members = vars(import_module(f"{_PACKAGE}.{module}")).values()
-    return [
-        kind
-        for kind in members
-        if inspect.isclass(kind)
-        and issubclass(kind, Effect)
-        and kind.__module__ == f"{_PACKAGE}.{module}"
-        and hasattr(kind, "name")
-    ]
-
-
-_FOLDER = str(Path(__file__).parent)
-_FILES = sorted(
-    {module.name for module in iter_modules([_FOLDER])} - {"base", "events", "found", "law", "listed", "own"}
-)
+_FILES = {module.name for module in iter_modules([str(Path(__file__).parent)])}
+_MODULES = [
+    import_module(f"{_PACKAGE}.{name}")
+    for name in sorted(_FILES - {"base", "events", "found", "law", "listed", "own"})
+]
+#: The named effects of each file, but not those that it imports.
+_DEFINED = [
+    kind
+    for module in _MODULES
+    for kind in vars(module).values()
+    if inspect.isclass(kind)
+    and issubclass(kind, Effect)
+    and kind.__module__ == module.__name__
+    and hasattr(kind, "name")
+]
 
 #: Every listed effect by its name in ``diagnosis.json``. Of two that do equally well with as many numbers a search names
 #: the first: what looks like another comes after it, what leans on the known model after what the motion tells alone, and
@@ -36,8 +34,7 @@ _FILES = sorted(
 EFFECTS: dict[str, type[Effect]] = {
     kind.name: kind
     for kind in sorted(
-        (k for file in _FILES for k in _defined(file)),
-        key=lambda k: (bool(k.looks_like), k.needs_model, k.sensor, k.name),
+        _DEFINED, key=lambda kind: (bool(kind.looks_like), kind.needs_model, kind.sensor, kind.name)
     )
 }
 

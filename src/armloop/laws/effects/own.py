@@ -24,7 +24,10 @@ def _check(kind: Any, where: str) -> None:
     """Raise ``InputError`` unless ``kind`` is a complete effect."""
     if not (isinstance(kind, type) and issubclass(kind, Effect)):
         raise InputError(f"{where}: is {kind!r}; it must be a subclass of armloop.laws.effects.Effect")
-    missing = [*_undefined(kind), *sorted(kind.__abstractmethods__)]
+    # class attributes that a base class asks for and nobody has given
+    asked = [pair for base in kind.__mro__ for pair in inspect.get_annotations(base).items()]
+    missing = [key for key, hint in asked if "ClassVar" in str(hint) and not hasattr(kind, key)]
+    missing += sorted(kind.__abstractmethods__)
     if not missing and not kind.parameters and kind.estimates is Effect.estimates:
         missing = ["parameters"]
     if not missing and issubclass(kind, Law) and not kind.elements and kind.values is Law.values:
@@ -35,16 +38,6 @@ def _check(kind: Any, where: str) -> None:
         raise InputError(f"{where}: the name {kind.name!r} is that of a listed effect; choose another")
     if kind.pair_wise and not kind.joint_wise:
         raise InputError(f"{where}: an effect of a pair of joints has one at its first: set joint_wise")
-
-
-def _undefined(kind: type[Effect]) -> list[str]:
-    """Class attributes that a base class asks for and nobody has given."""
-    return [
-        key
-        for base in kind.__mro__
-        for key, hint in inspect.get_annotations(base).items()
-        if "ClassVar" in str(hint) and not hasattr(kind, key)
-    ]
 
 
 #: All effects by name.

@@ -28,6 +28,5 @@ class PreslidingHysteresis(Law):
     elements = ("hysteresis", "sign")
 
     def shapes(self, context: Context) -> Sequence[float]:
-        assert self.joint is not None
-        travel = float(np.ptp(context.motion.q[:, self.joint - 1]))
+        travel = float(np.ptp(context.motion.q[:, self.index]))
         return [] if travel <= 0 else [float(w) for w in np.geomspace(2e-4 * travel, 5e-2 * travel, 16)]

@@ -22,8 +22,7 @@ class StribeckFriction(Law):
     elements = ("stribeck_peak",)
 
     def shapes(self, context: Context) -> Sequence[float]:
-        assert self.joint is not None
-        speed = np.abs(context.motion.v[:, self.joint - 1])
+        speed = np.abs(context.motion.v[:, self.index])
         slowest, fastest = np.quantile(speed, 0.02), np.quantile(speed, 0.98)
         # Below the slowest speeds an exponential cannot be seen, beyond the fastest it is a level with drag.
         low, high = max(float(slowest), 1e-3 * float(fastest)), float(fastest)

@@ -45,7 +45,7 @@ class TorqueDrift(Law):
     }
 
     def shapes(self, context: Context) -> Sequence[float]:
-        length = float(np.max(context.motion.elapsed()))
+        length = float(np.max(context.motion.elapsed))
         # shorter than a few blocks it is no drift
         return [] if length < 12.0 else [float(T) for T in np.geomspace(4.0, _STRAIGHT * length, 10)]
 
@@ -56,10 +56,9 @@ class TorqueDrift(Law):
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array]:
-        assert self.joint is not None
         tau, T = tau.copy(), number(parameters["time_constant"])
         drift = number(parameters["rate"]) * T * -np.expm1(-(time - time[0]) / T)
-        tau[:, self.joint - 1] += number(parameters["offset"]) + drift
+        tau[:, self.index] += number(parameters["offset"]) + drift
         return q, tau
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:

@@ -23,8 +23,8 @@ class TorqueGain(Effect):
     }
 
     def columns(self, context: Context, shape: float) -> Array:
-        assert self.joint is not None and context.predicted is not None
-        return context.predicted[:, [self.joint - 1]]
+        assert context.predicted is not None
+        return context.predicted[:, [self.index]]
 
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
         return (1 + float(x[0]),)
@@ -35,9 +35,8 @@ class TorqueGain(Effect):
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array]:
-        assert self.joint is not None
         tau = tau.copy()
-        tau[:, self.joint - 1] *= number(parameters["gain"])
+        tau[:, self.index] *= number(parameters["gain"])
         return q, tau
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:

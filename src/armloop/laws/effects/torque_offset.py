@@ -42,9 +42,8 @@ class TorqueOffset(Law):
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array]:
-        assert self.joint is not None
         tau = tau.copy()
-        tau[:, self.joint - 1] += number(parameters["offset"])
+        tau[:, self.index] += number(parameters["offset"])
         return q, tau
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:

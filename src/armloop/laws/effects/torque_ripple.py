@@ -38,10 +38,9 @@ class TorqueRipple(Law):
         return float(np.hypot(*x)), shape, float(np.arctan2(x[1], x[0]))
 
     def shapes(self, context: Context) -> Sequence[float]:
-        assert self.joint is not None
-        if context.arm.joints[self.joint - 1].kind != "revolute":
+        if context.arm.joints[self.index].kind != "revolute":
             return ()
-        speed = float(np.quantile(np.abs(context.motion.v[:, self.joint - 1]), 0.7))
+        speed = float(np.quantile(np.abs(context.motion.v[:, self.index]), 0.7))
         top = 2 * np.pi * self.band / context.period / max(speed, 1e-3)
         return [float(order) for order in range(self.lowest_order, int(min(max(top, 24), 240)) + 1)]
 

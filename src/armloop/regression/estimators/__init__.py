@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armloop.regression.estimators.adaptive_lasso import adaptive_lasso
 from armloop.regression.estimators.debiased_lasso import debiased_lasso
 from armloop.regression.estimators.estimator import Estimator, check_estimator
@@ -21,12 +18,13 @@ from armloop.regression.estimators.sr3 import sr3
 from armloop.regression.estimators.stability import stability
 from armloop.regression.estimators.stlsq import stlsq
 from armloop.regression.estimators.thresholded import thresholded
+from armloop.util.arrays import Array
 from armloop.util.registry import Registry
 
 __all__ = ["LISTED", "REGISTRY", "Estimator", "Problem", "Reduction", "register_estimator"]
 
 
-def _listed(choose: Callable[[Problem], NDArray[np.float64]], **flags: bool) -> type[Estimator]:
+def _listed(choose: Callable[[Problem], Array], **flags: bool) -> type[Estimator]:
     body = {"name": choose.__name__, "choose": staticmethod(choose), "__doc__": choose.__doc__, **flags}
     return type(choose.__name__, (Estimator,), body)
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armloop.regression.estimators.problem import Problem
+from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 
 
@@ -29,7 +27,7 @@ class Estimator:
     needs_parts: ClassVar[bool] = True
     keeps_all: ClassVar[bool] = False
 
-    def choose(self, problem: Problem) -> NDArray[np.float64]:
+    def choose(self, problem: Problem) -> Array:
         """(p,) coefficients of the problem's columns, zero where a term is left out.
 
         Raises:

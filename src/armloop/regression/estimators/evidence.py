@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
+from operator import itemgetter
 
 import numpy as np
 
@@ -135,11 +136,11 @@ class _Search:
         for betas in path(self.moments, 2 * self.max_terms)[1].T:
             last = np.flatnonzero(betas).astype(np.intp)
             if len(last) <= self.max_terms:
-                best = min(best, (self.problem.score(last), last), key=_score)
+                best = min(best, (self.problem.score(last), last), key=itemgetter(0))
         starts = {
             tuple(np.sort(support)): (score, support) for score, support in (best, self._eliminated(last))
         }
-        return min((self._improved(start) for start in starts.values()), key=_score)[1]
+        return min((self._improved(start) for start in starts.values()), key=itemgetter(0))[1]
 
     def _eliminated(self, support: Index) -> Move:
         """The best support on the way when the weakest term is dropped again and again."""
@@ -165,7 +166,7 @@ class _Search:
 
     def _moves(self, fit: _Fit) -> Iterator[Move]:
         """The best move of each kind, cheap kinds first."""
-        yield min(self._drop(fit), self._add(fit), key=_score)
+        yield min(self._drop(fit), self._add(fit), key=itemgetter(0))
         yield self._exchange(fit, 1, 1)
         yield self._exchange(fit, 2, 2)
         yield self._exchange(fit, 3, 2)
@@ -193,7 +194,7 @@ class _Search:
             return np.inf, fit.support
         some = np.array(list(combinations(weakest, removed)), dtype=np.intp)
         parts = [self._best(fit, some[k : k + _AT_ONCE], added) for k in range(0, len(some), _AT_ONCE)]
-        return min(parts, key=_score)
+        return min(parts, key=itemgetter(0))
 
     def _best(self, fit: _Fit, some: Index, added: int) -> Move:
         """The best exchange among K choices (K, d) of terms that go."""
@@ -224,7 +225,3 @@ class _Search:
         rest = np.delete(fit.support, some[k])
         score = self.problem.criterion(rss[k] - gain[k], len(rest) + added)
         return float(score), np.concatenate([rest, chosen[k]])
-
-
-def _score(move: Move) -> float:
-    return move[0]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from armloop.regression.moments import DEPENDENT, Moments, total, unit_length
+from armloop.regression.moments import DEPENDENT, Moments, equilibrated, total
 from armloop.util.arrays import TINY, Array, Index
 
 
@@ -56,9 +56,7 @@ class Problem:
 
     def refitted(self, support: Index) -> Array:
         """(p,) least-squares coefficients on a support, zero elsewhere."""
-        beta = np.zeros(self.size)
-        beta[support] = self.moments.solve(support)
-        return beta
+        return self.moments.refitted(support)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +88,8 @@ class Reduction:
         G, b, yy = moments.G[np.ix_(free, free)], moments.b[free], moments.yy
         size, onto = np.diag(G).copy(), np.zeros((len(forced), len(free)))
         if len(forced):
-            F = moments.G[np.ix_(forced, forced)]
-            d = unit_length(np.diag(F))
-            L = np.linalg.cholesky(F * np.outer(d, d) + 1e-12 * np.eye(len(F)))
+            d, S = equilibrated(moments.G[np.ix_(forced, forced)], 1e-12)
+            L = np.linalg.cholesky(S)
             H = solve_triangular(L, d[:, None] * moments.G[np.ix_(forced, free)], lower=True)
             h = solve_triangular(L, d * moments.b[forced], lower=True)
             G, b, yy = G - H.T @ H, b - H.T @ h, yy - float(h @ h)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Callable
 
 import numpy as np
 
 from armloop.regression.estimators.problem import Problem
-from armloop.regression.estimators.rooted import rooted
-from armloop.regression.estimators.thresholded import THRESHOLDS
+from armloop.regression.estimators.rooted import converged, rooted
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
@@ -26,35 +25,27 @@ def sr3(problem: Problem) -> Array:
         ArithmeticError: pysindy does not converge at any threshold.
     """
     import pysindy  # takes seconds to load, and only this estimator and its sister need it
-    from sklearn.exceptions import ConvergenceWarning
 
-    made: list[tuple[Moments, Array, Array]] = []
+    def relaxed(moments: Moments) -> Callable[[float], Array]:
+        X, y = rooted(moments)
 
-    def fit(moments: Moments, threshold: float) -> Array:
-        if not made or made[-1][0] is not moments:
-            made.append((moments, *rooted(moments)))
-        _, X, y = made[-1]
-        solver = pysindy.SR3(
-            reg_weight_lam=pysindy.SR3.calculate_l0_weight(threshold, _RELAXATION),
-            regularizer="l0",
-            relax_coeff_nu=_RELAXATION,
-            tol=_TOLERANCE,
-            max_iter=_MOST_ITERATIONS,
-            # From least squares, pysindy's own start, it would have to come down from the huge coefficients that
-            # collinear columns have there; it stays with most of them.
-            initial_guess=np.zeros((1, len(y))),
-            copy_X=False,
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", ConvergenceWarning)
-            try:
-                solver.fit(X, y)
-            except ConvergenceWarning as warning:
-                raise ArithmeticError(f"sr3 at threshold {threshold:g}: {warning}") from warning
-        # pysindy's own refit would turn what is zero into round-off on an empty support.
-        kept = np.flatnonzero(solver.coef_[0]).astype(np.intp)
-        beta = np.zeros(len(moments.b))
-        beta[kept] = moments.solve(kept)
-        return beta
+        def fit(threshold: float) -> Array:
+            solver = pysindy.SR3(
+                reg_weight_lam=pysindy.SR3.calculate_l0_weight(threshold, _RELAXATION),
+                regularizer="l0",
+                relax_coeff_nu=_RELAXATION,
+                tol=_TOLERANCE,
+                max_iter=_MOST_ITERATIONS,
+                # From least squares, pysindy's own start, it would have to come down from the huge coefficients that
+                # collinear columns have there; it stays with most of them.
+                initial_guess=np.zeros((1, len(y))),
+                copy_X=False,
+            )
+            # pysindy's own refit would turn what is zero into round-off on an empty support.
+            return moments.refitted(
+                np.flatnonzero(converged(solver, X, y, f"sr3 at threshold {threshold:g}"))
+            )
 
-    return tuned(problem, fit, THRESHOLDS)
+        return fit
+
+    return tuned(problem, relaxed)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
-
-import numpy as np
+from collections.abc import Callable
 
 from armloop.regression.estimators.problem import Problem
-from armloop.regression.estimators.rooted import rooted
-from armloop.regression.estimators.thresholded import THRESHOLDS
+from armloop.regression.estimators.rooted import converged, rooted
 from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
@@ -24,26 +21,18 @@ def stlsq(problem: Problem) -> Array:
         ArithmeticError: pysindy does not converge at any threshold.
     """
     import pysindy  # takes seconds to load, and only this estimator and its sister need it
-    from sklearn.exceptions import ConvergenceWarning
 
-    made: list[tuple[Moments, Array, Array, Array]] = []
-
-    def fit(moments: Moments, threshold: float) -> Array:
-        if not made or made[-1][0] is not moments:
-            made.append((moments, *rooted(moments), moments.solve()[None, :]))
-        _, X, y, start = made[-1]
+    def sequential(moments: Moments) -> Callable[[float], Array]:
+        X, y = rooted(moments)
         # Without the first guess pysindy computes it by an SVD of the whole library, to throw it away.
-        solver = pysindy.STLSQ(
-            threshold, _RIDGE, max_iter=_MOST_ITERATIONS, initial_guess=start, unbias=False, copy_X=False
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", ConvergenceWarning)
-            # A threshold that removes every term is an answer; the held-out error judges it.
-            warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
-            try:
-                solver.fit(X, y)
-            except ConvergenceWarning as warning:
-                raise ArithmeticError(f"stlsq at threshold {threshold:g}: {warning}") from warning
-        return np.array(solver.coef_[0])
+        start = moments.solve()[None, :]
 
-    return tuned(problem, fit, THRESHOLDS)
+        def fit(threshold: float) -> Array:
+            solver = pysindy.STLSQ(
+                threshold, _RIDGE, max_iter=_MOST_ITERATIONS, initial_guess=start, unbias=False, copy_X=False
+            )
+            return converged(solver, X, y, f"stlsq at threshold {threshold:g}")
+
+        return fit
+
+    return tuned(problem, sequential)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from armloop.regression.estimators.problem import Problem
@@ -9,20 +11,12 @@ from armloop.regression.estimators.tuning import tuned
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
 
-#: Thresholds tried, as shares of the signal's root mean square.
-THRESHOLDS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2)
-
 
 def thresholded(problem: Problem) -> Array:
     """(p,) coefficients: those of least squares above the threshold, refitted."""
-    solved: list[tuple[Moments, Array]] = []
 
-    def fit(moments: Moments, threshold: float) -> Array:
-        if not solved or solved[-1][0] is not moments:
-            solved.append((moments, moments.solve()))
-        kept = np.flatnonzero(np.abs(solved[-1][1]) >= threshold).astype(np.intp)
-        beta = np.zeros(len(moments.b))
-        beta[kept] = moments.solve(kept)
-        return beta
+    def cut(moments: Moments) -> Callable[[float], Array]:
+        size = np.abs(moments.solve())
+        return lambda threshold: moments.refitted(np.flatnonzero(size >= threshold))
 
-    return tuned(problem, fit, THRESHOLDS)
+    return tuned(problem, cut)

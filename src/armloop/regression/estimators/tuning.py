@@ -10,11 +10,13 @@ from armloop.regression.estimators.problem import Problem, halves
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array
 
-#: Coefficients (p,) of moments at one value of the penalty; ArithmeticError where the solver finds none.
-Fit = Callable[[Moments, float], Array]
+#: Thresholds tried, as shares of the signal's root mean square.
+THRESHOLDS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2)
+#: Of moments, the coefficients (p,) at a value of the penalty; ArithmeticError where the solver finds none.
+Fits = Callable[[Moments], Callable[[float], Array]]
 
 
-def tuned(problem: Problem, fit: Fit, grid: Sequence[float]) -> Array:
+def tuned(problem: Problem, fits: Fits, grid: Sequence[float] = THRESHOLDS) -> Array:
     """Coefficients at the problem's penalty, or at the best one of the grid.
 
     With at least two parts of the data, the penalty is the one whose fit to four fifths of them predicts the rest
@@ -24,14 +26,13 @@ def tuned(problem: Problem, fit: Fit, grid: Sequence[float]) -> Array:
         ArithmeticError: the solver converges at no penalty.
     """
     if problem.penalty is not None:
-        return fit(problem.moments, problem.penalty)
+        return fits(problem.moments)(problem.penalty)
     held_out = len(problem.parts) >= 2
     train, check = halves(problem.parts) if held_out else (problem.moments, problem.moments)
-    found: list[tuple[float, float, Array]] = []
-    trouble: list[str] = []
+    fit, found, trouble = fits(train), list[tuple[float, float, Array]](), list[str]()
     for penalty in grid:
         try:
-            beta = fit(train, penalty)
+            beta = fit(penalty)
         except ArithmeticError as error:
             trouble.append(str(error))
             continue
@@ -41,4 +42,4 @@ def tuned(problem: Problem, fit: Fit, grid: Sequence[float]) -> Array:
     if not found:
         raise ArithmeticError(trouble[0])
     _, penalty, beta = min(found, key=lambda trial: trial[0])
-    return fit(problem.moments, penalty) if held_out else beta
+    return fits(problem.moments)(penalty) if held_out else beta
