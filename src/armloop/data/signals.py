@@ -71,6 +71,11 @@ class Conditioning:
         """Seconds to either side over which the low-pass smears a step."""
         return filter_reach(self.cutoff_hz)
 
+    @property
+    def shortest(self) -> float:
+        """Seconds that a run must last at least."""
+        return _SHORTEST * self.reach
+
 
 class ShortRunError(LogError):
     """No run of a log is long enough for the filter."""
@@ -125,7 +130,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
         raise ShortRunError(
             f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
-            f"{how.cutoff_hz:g} Hz a run must last at least {_SHORTEST * how.reach:.3g} s"
+            f"{how.cutoff_hz:g} Hz a run must last at least {how.shortest:.3g} s"
         )
     # All at the period of the coarsest, on cubic splines: they have passed the filter, and even the coarsest keeps what has.
     coarsest = max(_period(part[0]) for part in parts)
@@ -159,6 +164,13 @@ def kept_instants(log: MotionLog, how: Conditioning) -> tuple[list[Array], Array
             kept.append(time[0] + grid[keep])
             spans.append(time[[0, -1]])
     return kept, np.array(spans).reshape(-1, 2)
+
+
+def too_short(log: MotionLog, how: Conditioning) -> int:
+    """Samples in runs that are too short for the filter: :func:`preprocess` leaves them out."""
+    if how.cutoff_hz <= 0:
+        return 0
+    return sum(run.stop - run.start for run in log.runs() if _grid(log.time[run], how)[0] is None)
 
 
 def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:

@@ -20,7 +20,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, smooth
+from armloop.data.signals import Conditioning, ShortRunError, as_torque, preprocess, smooth, too_short
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
@@ -39,6 +39,8 @@ _BELOW = 0.9
 _OF_RATE = 0.4
 #: Samples read, rows regressed (one a joint and instant), length of the blocks, s, and rows from which on a joint counts.
 _SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
+#: A corner may leave out such a part of the samples more than the highest does.
+_MISSED = 0.05
 #: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
 _SLIDES, _FADES = 0.05, 0.01
 #: Ridge beside columns of unit length, and the least that a joint weighs by.
@@ -95,6 +97,9 @@ def choose_bandwidth(
         return Bandwidth(how.cutoff_hz)
     highest = highest_corner(chosen, how)
     corners = [highest, *(round(part * highest, 3) for part in _PARTS)]
+    # a low corner has a long reach: what it leaves out may be all there is of slow or steady motion
+    most = left_out(logs, how, highest) + _MISSED
+    corners = [corner for corner in corners if left_out(logs, how, corner) <= most]
     # every corner must see the same logs: those that are long enough for the lowest
     long = [log.time[-1] - log.time[0] > 4 / min(corners) for log in chosen]
     if not any(long):
@@ -119,6 +124,12 @@ def choose_bandwidth(
         errors.append(float(np.exp(np.mean(np.log(np.maximum(relative, LEAST))))))
     good = [corner for corner, error in zip(corners, errors, strict=True) if error <= _AS_GOOD * min(errors)]
     return Bandwidth(max(good), tuple(zip(corners, errors, strict=True)))
+
+
+def left_out(logs: Sequence[LogSource], how: Conditioning, corner: float) -> float:
+    """Part of the samples, of some of the logs, in runs too short for the filter that a library has at this corner."""
+    some, suited = [logs[k].read() for k in _selected(logs)], Bandwidth(corner).suited(how)
+    return sum(too_short(log, suited) for log in some) / sum(log.samples for log in some)
 
 
 def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+from armloop.data.log import MotionLog
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
-from armloop.data.signals import Conditioning
+from armloop.data.signals import Conditioning, too_short
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged
 from armloop.identification.reconstruction.bandwidth import (
@@ -188,7 +189,7 @@ def reconstruct(
         found = library.methods[method](arm, data, settings, progress)
         if bandwidth.trials:
             found.history["bandwidth"] = bandwidth.to_dict()
-        found.notes += bandwidth.notes()
+        found.notes += bandwidth.notes() + _too_short(kept, how)
         if zeros is not None and zeros.found:
             found.history["encoder_zeros"] = zeros.to_dict(kept)
             found.notes += zeros.notes(arm)
@@ -204,6 +205,18 @@ def reconstruct(
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
     part: Part = "all" if few or len(left) == 1 else "test"
     return _finished(tried, part, arm, method, logs, settings, progress, recorded, blocks)
+
+
+def _too_short(logs: Sequence[MotionLog], how: Conditioning) -> list[str]:
+    """A line on runs that are too short for the filter: what only they show, the model does not know."""
+    lost = {log.name: count for log in logs if (count := too_short(log, how))}
+    if not lost:
+        return []
+    part = sum(lost.values()) / sum(log.samples for log in logs)
+    return [
+        f"{part:.0%} of the samples lie in runs of less than {how.shortest:.3g} s, too short for a low-pass of "
+        f"{how.cutoff_hz:.3g} Hz, and are left out ({', '.join(lost)}); a higher --cutoff would use them"
+    ]
 
 
 def filter_and_blocks(
