@@ -19,7 +19,7 @@ from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import residual
-from armloop.identification.uncertainty import torque_errors
+from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
@@ -58,7 +58,8 @@ class Evidence:
 
     Attributes:
         samples: the run, conditioned like the model's training logs.
-        scale: (n,) the model's residual on its own held-out baseline data, N·m (N).
+        scale: (n,) the model's residual on its own held-out baseline data, and by how much friction differs between the
+            training logs, N·m (N).
         variation: (n,) how much more than that, as energy, it leaves on the worst tenth of those data.
         rows: (N, n) samples that count: the joint slides. Of samples that lie closer than the filter can
             tell apart, only some.
@@ -87,6 +88,9 @@ class Evidence:
         # A model without a baseline (written by hand, or noise-free) is weighed by the torque itself.
         own = 0.01 * np.sqrt(np.mean(samples.tau**2, axis=0)) + 1e-9
         scale = np.where(np.isfinite(scale), np.maximum(scale, 1e-3 * own), own)
+        # what no run of its own shows: friction that differs between the training logs
+        between = (friction_spread(model, samples) ** 2).sum(axis=2)
+        scale = np.hypot(scale, np.sqrt(np.mean(between, axis=0)))
         worst = np.array([float(x or 0.0) for x in model.baseline.get("worst", [])] or [0.0])
         variation = np.maximum(np.resize(worst, samples.motion.joints) / scale, 1.0) ** 2
         blocks = block_numbers(samples.motion, _block_seconds(samples.motion))

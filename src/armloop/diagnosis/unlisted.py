@@ -297,5 +297,8 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
         return _Law([], y, after.stacked.block[mine])
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
+    errors = np.sqrt(np.diag(spread))
+    if (np.abs(beta) < SIGNIFICANCE * errors).all():
+        return _Law([], y, after.stacked.block[mine])  # as an effect of which no coefficient is clear
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, after.stacked.block[mine], np.sqrt(np.diag(spread)))
+    return _Law(terms, error, after.stacked.block[mine], errors)

@@ -211,6 +211,19 @@ class UncertaintyData(Struct):
     shared: Annotated[dict[Text, ErrorData], _Terms] = {}
     stribeck: Annotated[list[dict[Name, Any]], Meta(max_length=MOST_JOINTS)] = []
     torque: Annotated[list[TorqueErrorsData], Meta(max_length=MOST_JOINTS)] = []
+    between_logs: Annotated[
+        list[
+            Annotated[
+                list[Annotated[list[Finite], Meta(min_length=2, max_length=2)]],
+                Meta(min_length=2, max_length=2),
+            ]
+            | None
+        ],
+        Meta(
+            max_length=MOST_JOINTS,
+            description="per joint the covariance of dry level and viscous coefficient",
+        ),
+    ] = []
 
 
 class ModelData(Struct):

@@ -10,7 +10,9 @@ from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.shared import sliding_rows
-from armloop.identification.uncertainty import Fitted, standard_errors
+from armloop.identification.scoring import residual
+from armloop.identification.uncertainty import Fitted, between_logs, standard_errors
+from armloop.identification.uncertainty.blocking import independent_blocks
 from armloop.model import ReconstructedModel
 
 #: Consecutive samples whose errors stand for those of all, where these are not in memory.
@@ -39,7 +41,12 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         # taken as given, like the terms: their own errors stand beside their parameters
         bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
         samples = replace(samples, tau=samples.tau - smooth(samples, bare))
-    return standard_errors(model, samples, fitted_rows(chunk, found, shared))
+    errors = standard_errors(model, samples, fitted_rows(chunk, found, shared))
+    if samples.cutoff_hz <= 0 or not data.in_memory:
+        return errors
+    left = residual(replace(model, effects=()), samples)
+    blocks = independent_blocks(samples.motion, errors["block_seconds"])
+    return {**errors, "between_logs": between_logs(left, sliding_rows(samples), samples.motion, blocks)}
 
 
 def fitted_rows(chunk: Chunk, found: Found, shared: bool) -> list[Fitted]:

@@ -45,6 +45,7 @@ from armloop.identification.reconstruction.shared import motion_range, slowest_s
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
 from armloop.identification.scoring import Score
+from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.robot.plausibility import say_beyond_limits
@@ -321,4 +322,6 @@ def _finished(
     if options.standard_errors:
         progress("standard errors of the coefficients")
         model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
+        notes += between_logs_notes(model)
+        model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)

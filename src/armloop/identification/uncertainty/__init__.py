@@ -1,6 +1,15 @@
 """Uncertainty of a reconstructed model's coefficients: standard errors and covariances."""
 
+from armloop.identification.uncertainty.between_logs import between_logs, friction_spread
 from armloop.identification.uncertainty.propagated import torque_errors
 from armloop.identification.uncertainty.standard_errors import Errors, Fitted, covariances, standard_errors
 
-__all__ = ["Errors", "Fitted", "covariances", "standard_errors", "torque_errors"]
+__all__ = [
+    "Errors",
+    "Fitted",
+    "between_logs",
+    "covariances",
+    "friction_spread",
+    "standard_errors",
+    "torque_errors",
+]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Samples
+from armloop.identification.uncertainty.between_logs import friction_spread
 from armloop.identification.uncertainty.unknowns import Unknown, problems
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
@@ -56,6 +57,7 @@ def _directions(rows: Sequence[str]) -> Array:
 def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, r) torque of independent errors of the model, one standard deviation each, through the samples' filter.
 
+    Of its coefficients, and of friction where it differs between logs.
     None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
@@ -69,6 +71,8 @@ def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
         for design in problem.designs(samples):
             torque[:, design.joint] += design.X @ directions[design.where]
         parts.append(torque)
+    spread = friction_spread(model, samples)
+    parts += [spread] if spread.any() else []
     return np.concatenate(parts, axis=2) if parts else np.zeros((*samples.motion.q.shape, 0))
 
 

@@ -1,0 +1,113 @@
+"""Random effects of a joint's friction: by how much its dry level and its viscous coefficient differ from log to log.
+
+A drive that warms up, another load of grease: within a log nothing shows it, and so no held-out block and no standard error
+does. Of what the model leaves, each log tells a level and a slope along its joint's direction, with the covariance of its
+own blocks; how far those lie apart beyond that is the variance between logs, by maximum likelihood (EM; Laird and Ware,
+Biometrics 38, 1982). Where logs do not differ by more than chance (Cochran's Q) it is zero.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.stats import chi2
+
+from armloop.data.motion import Motion, Samples
+from armloop.data.signals import smooth
+from armloop.model import ReconstructedModel
+from armloop.regression.clustered import clustered_covariance
+from armloop.util.arrays import Array, Index, Mask
+
+#: Where a run begins earlier than the one before it ended, or more than so many s later, another log does.
+_PAUSE = 60.0
+#: Fewest logs, and blocks with samples of a joint in each, that tell anything of the variance.
+_LOGS, _BLOCKS = 3, 8
+#: Probability that logs which do not differ are taken to.
+_CHANCE = 0.001
+_ITERATIONS = 200
+
+
+def log_numbers(motion: Motion) -> Index:
+    """(N,) number of the log that each sample lies in, by the clocks of the runs."""
+    runs = list(motion.runs())
+    gaps = [motion.time[late.start] - motion.time[early.stop - 1] for early, late in pairwise(runs)]
+    numbers = np.cumsum([0, *(gap <= 0 or gap > _PAUSE for gap in gaps)])
+    return np.repeat(numbers, [run.stop - run.start for run in runs]).astype(np.intp)
+
+
+def between_logs(
+    residual: Array, rows: Mask, motion: Motion, blocks: Index
+) -> list[list[list[float]] | None]:
+    """Per joint the (2, 2) covariance of dry level, N·m (N), and viscous coefficient, SI, between logs; None for none.
+
+    Args:
+        residual: (N, n) what the model leaves, N·m (N).
+        rows: (N, n) samples in which a joint slides.
+        blocks: (N,) block of each sample, longer than the residual remembers.
+    """
+    logs = log_numbers(motion)
+    return [
+        _variance(residual[mine, j], motion.v[mine, j], blocks[mine], logs[mine])
+        for j, mine in enumerate(rows.T)
+    ]
+
+
+def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[float]] | None:
+    found = []
+    for log in np.unique(logs):
+        own = logs == log
+        if len(np.unique(blocks[own])) >= _BLOCKS:
+            X = np.column_stack([np.sign(v[own]), v[own]])
+            b = np.linalg.lstsq(X, left[own], rcond=None)[0]
+            found.append((b, clustered_covariance(X, left[own] - X @ b, blocks[own])))
+    if len(found) < _LOGS:
+        return None
+    b, S = (np.array(each) for each in zip(*found, strict=True))
+    precise = np.linalg.pinv(S)
+    mean = np.linalg.pinv(precise.sum(axis=0)) @ np.einsum("gij,gj->i", precise, b)
+    d = b - mean
+    if chi2.sf(np.einsum("gi,gij,gj->", d, precise, d), 2 * (len(b) - 1)) > _CHANCE:
+        return None
+    T = d.T @ d / len(b)
+    for _ in range(_ITERATIONS):
+        gain = T @ np.linalg.pinv(T + S)
+        m = np.einsum("gij,gj->gi", gain, d)
+        T = np.mean(m[:, :, None] * m[:, None, :] + T - gain @ T, axis=0)
+    # the model was fitted to the logs themselves: their mean is theirs
+    T = 0.5 * (T + T.T) * len(b) / (len(b) - 1)
+    return [[float(x) for x in row] for row in T]
+
+
+def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:
+    """(N, n, 2) torque of two independent errors of friction, one standard deviation between logs each.
+
+    Through the samples' filter; zero where the training logs agree. The drives of an arm warm up together: it is one error
+    that all joints share, each in its direction in which friction grows.
+    """
+    v = samples.motion.v
+    torque = np.zeros((*v.shape, 2))
+    kept = model.uncertainty.get("between_logs") or []
+    columns = smooth(samples, np.stack([np.sign(v), v], axis=2)) if any(kept) else torque
+    for j, T in enumerate(kept):
+        if T is not None:
+            values, vectors = np.linalg.eigh(np.array(T))
+            vectors *= np.where([1.0, np.mean(np.abs(v[:, j]))] @ vectors < 0, -1.0, 1.0)
+            torque[:, j] = columns[:, j] @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    return torque
+
+
+def notes(model: ReconstructedModel) -> list[str]:
+    """A line on each joint whose friction differs from log to log."""
+    found = []
+    for j, T in enumerate(model.uncertainty.get("between_logs") or []):
+        if T is not None:
+            joint = model.arm.joints[j]
+            unit, slope_unit = joint.torque_unit, f"{joint.torque_unit}*s/{joint.position_unit}"
+            level, slope = np.sqrt(np.maximum(np.diag(T), 0.0))
+            found.append(
+                f"joint {j + 1}: friction differs between the logs by more than chance, by a standard deviation of "
+                f"{level:.2g} {unit} (dry) and {slope:.2g} {slope_unit} (viscous), as it does where a drive warms up: "
+                "what a later run shows of it is weighed by that"
+            )
+    return found
