@@ -64,19 +64,25 @@ def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[fl
     if len(found) < _LOGS:
         return None
     b, S = (np.array(each) for each in zip(*found, strict=True))
-    precise = np.linalg.pinv(S)
-    mean = np.linalg.pinv(precise.sum(axis=0)) @ np.einsum("gij,gj->i", precise, b)
-    d = b - mean
+    d, precise = _apart(b, S)
     if chi2.sf(np.einsum("gi,gij,gj->", d, precise, d), 2 * (len(b) - 1)) > _CHANCE:
         return None
     T = d.T @ d / len(b)
     for _ in range(_ITERATIONS):
-        gain = T @ np.linalg.pinv(T + S)
+        d, precise = _apart(b, T + S)
+        gain = T @ precise
         m = np.einsum("gij,gj->gi", gain, d)
         T = np.mean(m[:, :, None] * m[:, None, :] + T - gain @ T, axis=0)
     # the model was fitted to the logs themselves: their mean is theirs
     T = 0.5 * (T + T.T) * len(b) / (len(b) - 1)
     return [[float(x) for x in row] for row in T]
+
+
+def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:
+    """(G, 2) how far each of G estimates lies from their weighted mean, and (G, 2, 2) their precisions."""
+    precise = np.linalg.pinv(covariance)
+    mean = np.linalg.pinv(precise.sum(axis=0)) @ np.einsum("gij,gj->i", precise, b)
+    return b - mean, precise
 
 
 def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:

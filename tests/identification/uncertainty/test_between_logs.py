@@ -1,0 +1,99 @@
+"""Friction that differs from log to log: its variance, what it changes of a run's torque, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic import fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.data.motion import Motion, Samples
+from armloop.diagnosis import diagnose
+from armloop.identification.reconstruction import Options, reconstruct
+from armloop.identification.uncertainty.between_logs import between_logs, friction_spread, log_numbers, notes
+
+
+def sines(logs: int, seconds: float = 40.0, rate: float = 25.0) -> Motion:
+    """A joint that slides back and forth, at another speed in each log."""
+    t = np.arange(0.0, seconds, 1 / rate)
+    v = np.concatenate([(1 + 0.2 * k) * np.cos((0.7 + 0.1 * k) * t) for k in range(logs)])[:, None]
+    time, starts = np.tile(t, logs), len(t) * np.arange(logs)
+    return Motion(time, np.zeros_like(v), v, np.zeros_like(v), starts)
+
+
+def test_a_log_begins_where_the_clock_starts_anew_or_after_a_pause() -> None:
+    t = np.concatenate([np.arange(5.0), 6.0 + np.arange(4.0), np.arange(3.0), 65.0 + np.arange(2.0)])
+    still = np.zeros((len(t), 1))
+    motion = Motion(t, still, still, still, np.array([0, 5, 9, 12]))
+    assert log_numbers(motion).tolist() == [0] * 9 + [1] * 3 + [2] * 2
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_the_variance_between_logs_is_found_where_there_is_one(seed: int) -> None:
+    rng, motion = np.random.default_rng(seed), sines(12)
+    logs, v = log_numbers(motion), motion.v[:, 0]
+    blocks = np.arange(len(v)) // 50
+    noise = 0.05 * rng.normal(size=len(v))
+    rows = np.ones((len(v), 1), dtype=bool)
+    assert between_logs(noise[:, None], rows, motion, blocks) == [None]
+    level, slope = 0.3 * rng.normal(size=12), 0.1 * rng.normal(size=12)
+    left = noise + (level - level.mean())[logs] * np.sign(v) + (slope - slope.mean())[logs] * v
+    (found,) = between_logs(left[:, None], rows, motion, blocks)
+    assert found is not None
+    T = np.cov(np.stack([level, slope]))
+    # what twelve logs hold, but for the noise of each: 0.05 N·m over some 20 blocks of 50 samples
+    np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(T)), rtol=0.15)
+    assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks) == [None]
+
+
+def worn(seed: int, dry: float) -> MotionLog:
+    """A log in which joint 2 has so much more dry friction."""
+    motion = fourier_motion(40.0, 100.0, seed)
+    more = dry * np.array([0.0, 1.0, 0.0]) * np.sign(motion.v)
+    return measured(
+        motion, rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v) + more, seed
+    )
+
+
+@pytest.fixture(scope="module")
+def models() -> tuple[Any, Any]:
+    """Of four logs whose dry friction differs, and of four alike."""
+    made = []
+    for levels in ((-0.4, -0.1, 0.15, 0.35), (0.0,) * 4):
+        logs = [replace(worn(k + 1, x), name=f"day_{k + 1}") for k, x in enumerate(levels)]
+        made.append(reconstruct(logs, three_axis(), library="rigid-body", options=Options(parts=False)).model)
+    return made[0], made[1]
+
+
+def test_a_model_says_of_which_joint_and_by_how_much(models: tuple[Any, Any]) -> None:
+    differing, alike = models
+    first, second, third = differing.uncertainty["between_logs"]
+    assert first is None and third is None
+    assert np.sqrt(second[0][0]) == pytest.approx(np.std([-0.4, -0.1, 0.15, 0.35], ddof=1), rel=0.3)
+    (line,) = notes(differing)
+    assert line.startswith("joint 2: friction differs between the logs") and "N*m*s/rad (viscous)" in line
+    assert line in differing.history["notes"]
+    assert alike.uncertainty["between_logs"] == [None] * 3 and notes(alike) == []
+
+
+def test_what_differs_from_log_to_log_is_no_change_of_the_next(models: tuple[Any, Any]) -> None:
+    """0.5 N·m more at joint 2 are one and a half of its standard deviations, and plain beside logs that are alike."""
+    differing, alike = models
+    assert diagnose(differing, [worn(9, 0.5)], jobs=1).named == []
+    assert diagnose(alike, [worn(9, 0.5)], jobs=1).named == [("coulomb_friction", 2)]
+    assert diagnose(differing, [worn(9, 3.0)], jobs=1).named == [("coulomb_friction", 2)]
+
+
+def test_the_torque_of_one_standard_deviation_grows_with_friction(models: tuple[Any, Any]) -> None:
+    differing, alike = models
+    motion = fourier_motion(20.0, 100.0, 5)
+    none = np.zeros_like(motion.q)
+    samples = Samples(motion, none, none == 0, 0.01, 10.0, motion.time[[0, -1]][None])
+    spread = friction_spread(differing, samples)
+    assert spread.shape == (*motion.q.shape, 2) and not spread[:, [0, 2]].any()
+    # both errors are friction that grows, as it is where all drives cool down together
+    assert (np.einsum("nk,n->k", spread[:, 1], motion.v[:, 1]) >= 0).all()
+    assert not friction_spread(alike, samples).any()
