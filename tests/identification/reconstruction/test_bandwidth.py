@@ -45,6 +45,38 @@ def test_clean_data_keep_the_bandwidth_and_noisy_ones_do_not(seed: int) -> None:
     assert f"low-pass of {noisy.cutoff_hz:.3g} Hz, chosen by cross-validation" in note
 
 
+def pieces(log: MotionLog, seconds: float) -> MotionLog:
+    """The log in runs of so many seconds, with gaps between them."""
+    return replace(log, time=log.time + np.floor(log.time / seconds))
+
+
+def test_a_corner_that_leaves_out_short_runs_is_not_tried() -> None:
+    """A filter of a corner f needs runs of 3/f, and what is regressed has 0.9 of the corner: 0.4 s hold 8.3 Hz and more."""
+    noisy, short = run(noise=0.3), pieces(run(2, seconds=20.0), 0.4)
+    assert bandwidth.left_out([noisy, short], TEN_HZ, 7.1) == pytest.approx(1 / 3, abs=0.01)
+    assert bandwidth.left_out([noisy, short], TEN_HZ, 10.0) == 0.0
+    assert choose_bandwidth([noisy], three_axis(), TEN_HZ).cutoff_hz <= 5.0
+    found = choose_bandwidth([noisy, short], three_axis(), TEN_HZ)
+    assert found.cutoff_hz == 10.0 and [corner for corner, _ in found.trials] == [10.0]
+    # a twentieth of the samples does not decide
+    few = pieces(run(2, seconds=2.0), 0.4)
+    assert choose_bandwidth([noisy, few], three_axis(), TEN_HZ).cutoff_hz <= 5.0
+
+
+def test_runs_that_are_left_out_are_said() -> None:
+    logs = [replace(run(), name="long"), replace(pieces(run(2, seconds=20.0), 0.4), name="short")]
+    how = Conditioning(cutoff_hz=5.0)
+    options = Options(parts=False, standard_errors=False)
+    made = reconstruct(logs, three_axis(), library="rigid-body", conditioning=how, options=options)
+    (line,) = [note for note in made.notes if "left out (" in note]
+    assert line.startswith(
+        "33% of the samples lie in runs of less than 0.6 s, too short for a low-pass of 5 Hz"
+    )
+    assert "(short)" in line
+    made = reconstruct(logs[:1], three_axis(), library="rigid-body", conditioning=how, options=options)
+    assert not any("left out (" in note for note in made.notes)
+
+
 def test_smoothing_the_torque_alone_gains_nothing() -> None:
     """White noise on the torque is the same for every corner: it must not favour a low one."""
     log = run()
@@ -264,7 +296,7 @@ class TestPieces:
     ) -> None:
         """Of three logs that begin at 100 s the second is shorter; without a table at one corner the highest stands."""
         asked: list[Any] = []
-        logs = [run(seed, seconds=seconds) for seed, seconds in ((0, 8.0), (1, 1.0), (2, 8.0))]
+        logs = [run(seed, seconds=seconds) for seed, seconds in ((0, 12.0), (1, 1.0), (2, 12.0))]
         logs = [replace(log, time=log.time + 100.0) for log in logs]
 
         def table_at(own: Any, arm: Any, base: Any, how: Any, corner: float, *rest: Any) -> Any:
