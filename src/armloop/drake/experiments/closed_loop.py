@@ -91,6 +91,9 @@ def add_arm_with_controller(
     `"computed_torque"`: `ReferenceSource` -> `ComputedTorque` -> `ArmPlant` -> back; it needs a model that
     predicts at velocities of the caller's choice, such as one of `armloop.model.load_model`.
 
+    The systems are named as the arm, `reference` and as the controller (`drives`, with a `torque_rate`). Where one of these
+    names is taken, as by an arm that was added before, all have the same number behind them: `reference_2`, `pid_2`.
+
     The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
 
     arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, then with the
@@ -173,18 +176,27 @@ def add_arm_under(
             f"{name}: has a period of {law.period:g} s, the plant {period:g} s; give both the same"
         )
     source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
-    body = builder.AddSystem(ArmPlant(plant.arm, config.friction, effects=effects, time_step=period))
-    builder.AddNamedSystem("reference", source)
-    builder.AddNamedSystem(name, law)
+    body = ArmPlant(plant.arm, config.friction, effects=effects, time_step=period)
+    suffix = _suffix(builder, [body.get_name(), "reference", name, "drives"])
+    builder.AddNamedSystem(body.get_name() + suffix, body)
+    builder.AddNamedSystem(f"reference{suffix}", source)
+    builder.AddNamedSystem(f"{name}{suffix}", law)
     for port in wanted:
         builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
     builder.Connect(body.GetOutputPort("state"), law.GetInputPort("state"))
     drives = law
     if torque_rate is not None:
-        drives = builder.AddNamedSystem("drives", RateLimiter(plant.arm.effort, torque_rate, period))
+        limiter = RateLimiter(plant.arm.effort, torque_rate, period)
+        drives = builder.AddNamedSystem(f"drives{suffix}", limiter)
         builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
     builder.Connect(drives.GetOutputPort("tau"), body.GetInputPort("tau"))
     return ControlledArm(body, source, law, drives if drives is not law else None, reference)
+
+
+def _suffix(builder: DiagramBuilder, names: Sequence[str]) -> str:
+    """What makes all names new to the diagram, whose building ends the process where two are the same."""
+    suffixes = ("", *(f"_{k}" for k in range(2, len(builder.GetSystems()) + 3)))
+    return next(s for s in suffixes if not any(builder.HasSubsystemNamed(name + s) for name in names))
 
 
 def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
