@@ -10,7 +10,7 @@ from armloop.api.reading import require_model
 from armloop.api.shown import displayed, page
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import eta_table
-from armloop.reports.tracking_tables import metrics_table
+from armloop.reports.tracking_tables import metrics_table, not_run
 from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
 from armloop.util.given import path_of, require
@@ -63,7 +63,8 @@ class Tracking:
         return f"<armloop.Tracking η: {', '.join(parts)}>"
 
     def __str__(self) -> str:
-        return f"{eta_table(self.results, paper=self._paper)}\n\n{metrics_table(self.results)}"
+        tables = [eta_table(self.results, paper=self._paper), metrics_table(self.results)]
+        return "\n\n".join(map(str, [*tables, *not_run(self._answer)]))
 
     def _repr_html_(self) -> str:
         return page(str(self), self.plot())
@@ -88,7 +89,7 @@ def track(
 
     Raises:
         InputError: the scenario is wrong or of another kind (payload_pickup, friction_wear: use the command), or the
-            model is of another arm.
+            model is of another arm, or serves no controller.
     """
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.workflows import run_scenario

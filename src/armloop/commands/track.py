@@ -74,7 +74,7 @@ def run(options: Track) -> None:
     models = {name: load_model(path) for name, path in paths.items()}
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.reports.tables import eta_table
-    from armloop.reports.tracking_tables import metrics_table, phases_table, spread_table
+    from armloop.reports.tracking_tables import metrics_table, not_run, phases_table, spread_table
     from armloop.workflows import run_pickup_scenario, run_scenario, run_wear_scenario
 
     scenario = load_tracking(options.scenario, options.arm)
@@ -99,7 +99,7 @@ def run(options: Track) -> None:
     if options.json:
         print_json(answer)
         return
-    print("\n\n".join(map(str, tables)))
+    print("\n\n".join(map(str, [*tables, *not_run(answer)])))
     if scenario.pickup is not None:
         found = [f"{effect['words']}" for effect in answer["diagnosis"]["effects"] if "words" in effect]
         print(f"\nverdict from the log since the grasp: {answer['diagnosis']['verdict']}; {'; '.join(found)}")
