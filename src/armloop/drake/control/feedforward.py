@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
-from armloop.drake.given import require_joints, require_predicts, require_step
+from armloop.drake.given import require_joints, require_model, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, with_signature
 from armloop.dynamics import ModelEquations
@@ -70,11 +70,7 @@ def Feedforward_(T: type) -> Any:
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             self._arguments, self._n, self._stacked = (model, step), n, stacked
-            if T is float:
-                self._drive = (_stacked_drive if stacked else _drive)(model, step)
-            else:
-                assert isinstance(model, ReconstructedModel)
-                self._equations = ModelEquations(model, functions_of(T), step=step)
+            self._take(model)
             names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
             self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
             calc = self._calc_symbolic_tau_ff
@@ -84,11 +80,24 @@ def Feedforward_(T: type) -> Any:
             self.DeclareVectorOutputPort("tau_ff", n, calc, {self.all_input_ports_ticket()})
 
         def set_model(self, model: FeedforwardModel) -> None:
-            """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            """Take another model of the same arm from the next step on, between two `AdvanceTo`.
+
+            Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
+            `ReconstructedModel`.
+            """
             require_predicts(model)
             require_joints(model, self._n, "this feedforward is for")
+            self._take(model)
             self._arguments = model, *self._arguments[1:]
-            self._drive = (_stacked_drive if self._stacked else _drive)(model, self._arguments[1])
+
+        def _take(self, model: FeedforwardModel) -> None:
+            step = self._arguments[1]
+            if T is float:
+                self._drive = (_stacked_drive if self._stacked else _drive)(model, step)
+            else:
+                require_model(model)
+                assert isinstance(model, ReconstructedModel)
+                self._equations = ModelEquations(model, functions_of(T), step=step)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, *other._arguments, n=other._n, stacked=other._stacked, converter=converter)
