@@ -74,7 +74,7 @@ def track(
     scenario: str | Path,
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
-    arm: str | Path | None = None,
+    arm: str | Path | Arm | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:
@@ -84,7 +84,7 @@ def track(
         scenario: a built-in name, a YAML file, or FILE:NAME.
         model: serves all controllers of the scenario; or several by name, as ``--model NAME=…``. Without any, one is
             reconstructed first from data collected on the scenario's arm, if a controller needs one.
-        arm: the URDF of a scenario that leaves its arm open.
+        arm: the URDF of a scenario that leaves its arm open, or an arm of ``load_arm``, such as with ``tip``.
         out: folder for tracking.json, tracking.png and replay.html.
 
     Raises:
@@ -94,8 +94,6 @@ def track(
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.workflows import run_scenario
 
-    if isinstance(arm, Arm):
-        raise InputError("track: arm must be the path of a URDF; the scenario reads it itself")
     require("a function", progress=progress)
     plan = load_tracking(scenario, arm)
     if plan.pickup is not None or plan.wear is not None:

@@ -16,13 +16,14 @@ from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceSource
-from armloop.drake.experiments.scenarios import Plant, plant_for, plant_names
+from armloop.drake.experiments.scenarios import Plant, built_in, plant_for
 from armloop.drake.given import require_of, require_predicts, require_reference, require_step
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
+from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
@@ -74,7 +75,7 @@ class ControlledArm:
 
 def add_arm_with_controller(
     builder: DiagramBuilder,
-    arm: str | Path | Plant,
+    arm: str | Path | Arm | Plant,
     gains: PidGains | AccelerationGains,
     reference: Reference,
     model: FeedforwardModel | None = None,
@@ -96,8 +97,9 @@ def add_arm_with_controller(
 
     The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
 
-    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, then with the
-        friction of a reconstructed `model` (`nearest_friction`), without one that of `scenarios.plant_for`
+    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, or an arm of
+        `load_arm` (with `lock` or `tip` where it has a gripper), then with the friction of a reconstructed `model`
+        (`nearest_friction`), without one that of `scenarios.plant_for`
     gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
     model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
@@ -199,10 +201,10 @@ def _suffix(builder: DiagramBuilder, names: Sequence[str]) -> str:
     return next(s for s in suffixes if not any(builder.HasSubsystemNamed(name + s) for name in names))
 
 
-def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
+def _plant(spec: str | Path | Arm, model: FeedforwardModel | None) -> Plant:
     """The plant of an arm; one of a URDF, which says nothing of dry friction, has that of its model."""
     plant = plant_for(spec)
-    if str(spec) in plant_names() or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
+    if built_in(spec) or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
         return plant
     return replace(plant, config=replace(plant.config, friction=nearest_friction(model)))
 
