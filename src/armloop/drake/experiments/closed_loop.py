@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -202,11 +202,10 @@ def _suffix(builder: DiagramBuilder, names: Sequence[str]) -> str:
 
 
 def _plant(spec: str | Path | Arm, model: FeedforwardModel | None) -> Plant:
-    """The plant of an arm; one of a URDF, which says nothing of dry friction, has that of its model."""
-    plant = plant_for(spec)
-    if built_in(spec) or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
-        return plant
-    return replace(plant, config=replace(plant.config, friction=nearest_friction(model)))
+    """The plant of an arm; one of a URDF, in which what sticks has no place, has the friction of its model."""
+    if built_in(spec) or not isinstance(model, ReconstructedModel):
+        return plant_for(spec)
+    return plant_for(spec, nearest_friction(model))
 
 
 def _check_controller(

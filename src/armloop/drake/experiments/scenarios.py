@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from msgspec.structs import asdict, replace
@@ -30,6 +31,7 @@ from armloop.schemas.scenarios import (
     PlantData,
     TrackingData,
 )
+from armloop.util.doubts import warn
 from armloop.util.errors import ArmError, ScenarioError
 from armloop.util.given import path_of
 from armloop.util.resources import scenario_path, urdf_names, urdf_path
@@ -71,18 +73,38 @@ def built_in(spec: str | Path | Arm) -> bool:
     )
 
 
-def plant_for(spec: str | Path | Arm) -> Plant:
+def plant_for(spec: str | Path | Arm, friction: tuple[JointFriction, ...] | None = None) -> Plant:
     """Return the plant of an arm by its built-in name, of any URDF by its path, or of an arm that is loaded.
 
-    A URDF says nothing of dry friction; its joints get f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for
-    prismatic ones) and the ranges that its limits allow.
+    The joints of a URDF get the friction given, else f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for prismatic ones),
+    and the ranges that its limits allow. Damping and friction of its `<dynamics>` are not used, which is said where
+    they are above zero: most URDFs have dummies there, and none has what sticks.
     """
     if built_in(spec):
         return load_plant(spec.name if isinstance(spec, Arm) else str(spec))
     arm = spec if isinstance(spec, Arm) else load_arm(spec)
-    turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
-    friction = tuple(turning if turns else sliding for turns in arm.revolute)
+    if friction is None:
+        _say_unused(arm)
+        turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
+        friction = tuple(turning if turns else sliding for turns in arm.revolute)
     return Plant(arm.name, arm, PlantConfig(friction, MotionRanges.of(arm)))
+
+
+def _say_unused(arm: Arm) -> None:
+    """Say which joints of a URDF have a damping or a friction that the generic one takes the place of."""
+    joints = ElementTree.fromstring(arm.urdf).iter("joint") if arm.urdf else ()
+    stated = {
+        joint.get("name")
+        for joint in joints
+        for dynamics in joint.findall("dynamics")
+        if any(float(dynamics.get(key) or 0.0) > 0 for key in ("damping", "friction"))
+    }
+    unused = [name for name in arm.joint_names if name in stated]
+    if unused:
+        warn(
+            f"{arm.name}: damping and friction in the URDF's <dynamics> of {', '.join(unused)} are not used: the simulated "
+            "joints have friction of a usual size; state theirs as `friction` of a scenario's own_plant"
+        )
 
 
 def plan_names() -> list[str]:
