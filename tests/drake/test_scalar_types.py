@@ -33,7 +33,7 @@ from armloop.drake.plant.plant import add_links
 from armloop.drake.scalars import within
 from armloop.dynamics import Dynamics, effect_law
 from armloop.laws.effects import EFFECTS, Context
-from armloop.laws.friction import Sliding, torque_along
+from armloop.laws.friction import FrictionTerm, Sliding, torque_along
 from armloop.robot.arm import load_arm
 from armloop.util.errors import ModelError
 from armloop.util.functions import MATH
@@ -158,6 +158,41 @@ def test_a_diagram_with_it_can_be_cloned(name):
     first, second = Answer(diagram), Answer(diagram.Clone())
     x = np.random.default_rng(8).uniform(0.1, 0.9, first.ends[-1])
     assert_allclose(second(x), first(x), rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["ToAutoDiffXd", "ToSymbolic"])
+@pytest.mark.parametrize(
+    "make",
+    [
+        Feedforward,
+        lambda m: Feedforward(m, 2),
+        lambda m: Feedforward(m, stacked=True),
+        lambda m: ComputedTorque(m, AccelerationGains.critical(3)),
+    ],
+    ids=["feedforward", "of step 2", "of one port", "computed torque"],
+)
+def test_a_converted_system_takes_another_model(make, kind):
+    one, other = model_of(ARM), model_of(ARM, friction=(FrictionTerm("viscous", 3.0),), effects=LOADED)
+    system, expected = getattr(make(one), kind)(), Answer(make(other))
+    x = np.random.default_rng(9).uniform(0.1, 0.9, expected.ends[-1])
+    T = type(system.CreateDefaultContext().get_time())
+    with pytest.raises(ModelError, match="must be a ReconstructedModel"):
+        system.set_model(Numbers())
+
+    def torque():
+        found = Answer(system)(np.array([T(y) for y in x]))
+        return [y.value() if T is AutoDiffXd else y.Evaluate() for y in found]
+
+    assert np.abs(torque() - expected(x)).max() > 0.01
+    system.set_model(other)
+    assert_allclose(torque(), expected(x), rtol=1e-9)
+
+
+class Numbers:
+    """A model of one's own, known for numbers alone."""
+
+    def feedforward(self, q, v, vdot, step=3, sliding=None):
+        return q
 
 
 def test_every_effect_but_the_sensors_has_a_system():

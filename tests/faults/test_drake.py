@@ -165,6 +165,44 @@ WRONG: dict[str, tuple[Make, str]] = {
         lambda m: EffectTorque(m.arm, "torque_offset", 2, 1.0),
         "parameters must be Mapping",
     ),
+    "an effect at joint 0": (
+        lambda m: EffectTorque(m.arm, "viscous_friction", 0, {"coefficient": 1.0}),
+        "viscous_friction: joint 0; three_axis has joints 1 to 3",
+    ),
+    "an effect counted from the tip": (
+        lambda m: EffectTorque(m.arm, "viscous_friction", -1, {"coefficient": 1.0}),
+        "joint -1; three_axis has joints 1 to 3",
+    ),
+    "an effect beyond the tip": (
+        lambda m: EffectTorque(
+            m.arm,
+            "transmission_coupling",
+            2,
+            {"inertia": 0.1, "viscous": 0.1, "coulomb": 0.1},
+            other_joint=4,
+        ),
+        "joint 4; three_axis has joints 1 to 3",
+    ),
+    "an effect of nan": (
+        lambda m: EffectTorque(m.arm, "viscous_friction", 2, {"coefficient": NAN}),
+        "coefficient is nan; it must be one finite number",
+    ),
+    "an effect in text": (
+        lambda m: EffectTorque(m.arm, "viscous_friction", 2, {"coefficient": "a"}),
+        "coefficient is 'a'; it must be a number",
+    ),
+    "an effect without its number": (
+        lambda m: EffectTorque(m.arm, "viscous_friction", 2, {}),
+        "parameters are none; they must be coefficient",
+    ),
+    "a curve without width": (
+        lambda m: EffectTorque(m.arm, "stribeck_friction", 2, {"static_excess": 1.0, "velocity": 0.0}),
+        "velocity is 0.0; it must be above 0",
+    ),
+    "an unlisted law of nan": (
+        lambda m: EffectTorque(m.arm, "unlisted", 2, {"v2": NAN}),
+        "v2 is nan; it must be finite numbers",
+    ),
     "no motion": (lambda m: ReferenceSource(m, 1e-3), "the reference must have evaluate"),
     "a period beyond the motion": (
         lambda m: ReferenceSource(MOTION, 1e3),

@@ -126,6 +126,10 @@ WRONG: dict[str, tuple[str, str]] = {
     "an unknown item": ("reproduce fig99 --out r", "unknown item 'fig99'"),
     "a model without a name": ("track scenario.yaml --model model.json", "write NAME=MODEL.json"),
     "a model twice": ("track scenario.yaml --model a=model.json --model a=model.json", "'a' is given twice"),
+    "a model for nobody": (
+        "track scenario.yaml --model model=model.json",
+        "model .model.: no controller of scenario .pid. would run with it",
+    ),
     "the exact model": ("track scenario.yaml --model exact=model.json", "choose another name"),
     "a pace without a view": ("track scenario.yaml --rate 2", "--rate is the pace of --meshcat"),
     "a lock without an arm": (f"{DIAGNOSE} --lock joint_1=0", "--lock is of the URDF that --arm names"),

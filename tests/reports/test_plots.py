@@ -14,7 +14,7 @@ from synthetic import friction
 from armloop.data.motion import Motion
 from armloop.data.signals import smooth
 from armloop.diagnosis import Diagnosis, close
-from armloop.reports import plots
+from armloop.reports import plots, words
 from armloop.reports.html import Picture, svg
 from armloop.reports.plots import style
 from armloop.reports.plots.narrow import stack
@@ -110,6 +110,36 @@ def test_friction_laws_tried_are_drawn_with_what_they_led_to() -> None:
     axes = drawn(plots.ladder_figure(rungs)).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["Coulomb and viscous", "Stribeck"]
     assert [text.get_text() for text in axes.texts] == ["2.0 %   joints 1, 2", "2.1 %"]
+
+
+@pytest.mark.parametrize("taken", [[1, 2, 3, 4, 5, 6, 7], [1, 3, 5, 7, 9, 11, 13, 15]])
+def test_what_stands_beside_a_friction_law_lies_within_the_panel(taken: list[int]) -> None:
+    rungs = [{"rung": "Coulomb and viscous", "before": 0.7, "after": 0.03, "refused": None, "joints": taken}]
+    figure = drawn(plots.ladder_figure(rungs))
+    (axes,) = figure.axes
+    (text,) = axes.texts
+    assert text.get_text() == f"3.0 %   {words.joints(taken)}"
+    assert text.get_window_extent().x1 < axes.get_window_extent().x1 + 1
+    sizes = {t.label1.get_fontsize() for t in axes.xaxis.get_major_ticks() + axes.xaxis.get_minor_ticks()}
+    assert len(sizes) == 1
+
+
+def test_errors_that_are_far_apart_are_drawn_over_decades(loop: SimpleNamespace) -> None:
+    run = next(iter(loop.tracking.values()))
+    near = replace(run, eta=run.eta / 10, q=run.q_ref + (run.q - run.q_ref) / 10)
+    far = replace(run, eta=run.eta / 1000, q=run.q_ref + (run.q - run.q_ref) / 1000)
+    linear, decades = (drawn(plots.tracking_figure({"pid": run, "exact": x})).axes for x in (near, far))
+    for axes in linear[3:]:
+        assert axes.get_yscale() == "linear" and axes.get_ylabel() == "error [deg]"
+    for axes in decades[3:]:
+        assert axes.get_yscale() == "log" and axes.get_ylabel() == "|error| [deg]"
+        low, high = axes.get_ylim()
+        pid, exact = (np.asarray(line.get_ydata(), dtype=float) for line in axes.lines)
+        seen = exact > 2e-6
+        np.testing.assert_allclose(pid[seen] / exact[seen], 1000.0, rtol=1e-6)
+        assert pid.max() <= high and (exact >= low).mean() > 0.9
+    scored = np.abs(run.q_ref - run.q)[run.scored, 0]
+    assert np.max(decades[3].lines[0].get_ydata()) == pytest.approx(np.rad2deg(scored.max()))
 
 
 def test_a_residual_lies_under_every_torque(loop: SimpleNamespace) -> None:

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from armloop.reports.words import controller, effect_name, listed, number, percent, place, unit, with_error
+from armloop.reports.words import (
+    controller,
+    effect_name,
+    joints,
+    listed,
+    number,
+    percent,
+    place,
+    unit,
+    with_error,
+)
 
 
 @pytest.mark.parametrize(
@@ -42,6 +52,8 @@ def test_names() -> None:
     ]
     assert effect_name("joint_spring", 2) == "joint spring, joint 2"
     assert unit("kg*m^2") == "kg·m²"
+    told = [joints(x) for x in ([2], [1, 2], [1, 2, 3, 4, 5, 6, 7], [1, 3, 4, 5, 7])]
+    assert told == ["joint 2", "joints 1, 2", "joints 1–7", "joints 1, 3–5, 7"]
     assert listed(["a", "b", "c"]) == "a, b and c"
     assert [percent(x) for x in (0.004271, 0.0985, 0.9996)] == ["0.43 %", "9.8 %", "100 %"]
     assert [percent(x) for x in (0.0, 7.2e-10, 1.2e-5)] == ["0 %", "< 0.001 %", "0.0012 %"]

@@ -10,7 +10,7 @@ from armloop.api.reading import require_model
 from armloop.api.shown import displayed, page
 from armloop.model import ReconstructedModel
 from armloop.reports.tables import eta_table
-from armloop.reports.tracking_tables import metrics_table
+from armloop.reports.tracking_tables import metrics_table, not_run
 from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
 from armloop.util.given import path_of, require
@@ -63,7 +63,8 @@ class Tracking:
         return f"<armloop.Tracking η: {', '.join(parts)}>"
 
     def __str__(self) -> str:
-        return f"{eta_table(self.results, paper=self._paper)}\n\n{metrics_table(self.results)}"
+        tables = [eta_table(self.results, paper=self._paper), metrics_table(self.results)]
+        return "\n\n".join(map(str, [*tables, *not_run(self._answer)]))
 
     def _repr_html_(self) -> str:
         return page(str(self), self.plot())
@@ -73,7 +74,7 @@ def track(
     scenario: str | Path,
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
-    arm: str | Path | None = None,
+    arm: str | Path | Arm | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:
@@ -83,18 +84,16 @@ def track(
         scenario: a built-in name, a YAML file, or FILE:NAME.
         model: serves all controllers of the scenario; or several by name, as ``--model NAME=…``. Without any, one is
             reconstructed first from data collected on the scenario's arm, if a controller needs one.
-        arm: the URDF of a scenario that leaves its arm open.
+        arm: the URDF of a scenario that leaves its arm open, or an arm of ``load_arm``, such as with ``tip``.
         out: folder for tracking.json, tracking.png and replay.html.
 
     Raises:
         InputError: the scenario is wrong or of another kind (payload_pickup, friction_wear: use the command), or the
-            model is of another arm.
+            model is of another arm, or serves no controller.
     """
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.workflows import run_scenario
 
-    if isinstance(arm, Arm):
-        raise InputError("track: arm must be the path of a URDF; the scenario reads it itself")
     require("a function", progress=progress)
     plan = load_tracking(scenario, arm)
     if plan.pickup is not None or plan.wear is not None:

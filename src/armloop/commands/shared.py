@@ -65,6 +65,15 @@ def arm_of(options: Chain) -> Arm:
     return load_arm(options.arm, lock, options.tip)
 
 
+def simulated_arm(options: Chain) -> Any:
+    """The arm of ``--arm`` (or ARM) for a simulation; its name, where ``--lock`` and ``--tip`` do not change it.
+
+    By its name a built-in arm has its own plant, and a scenario may say what of its arm is locked. None if it is left out.
+    """
+    arm = stated_arm(options) if options.lock or options.tip else None
+    return arm or options.arm
+
+
 def stated_arm(options: Chain) -> Arm | None:
     """:func:`arm_of` where ``--arm`` is given, else None; raises ``InputError``."""
     if options.arm:

@@ -6,7 +6,7 @@ import sys
 from math import inf
 from typing import TYPE_CHECKING
 
-from armloop.commands.arguments import Json
+from armloop.commands.arguments import Chain, Json
 from armloop.commands.options import Check, argument, flag, option, several
 from armloop.util.errors import InputError
 from armloop.util.outputs import take_folder
@@ -34,7 +34,7 @@ _FILES = (
 _PATIENCE = 30.0  # s that are waited for a browser
 
 
-class Track(Json):
+class Track(Chain, Json):
     """The options."""
 
     scenario: str = argument(
@@ -63,7 +63,7 @@ class Track(Json):
 def run(options: Track) -> None:
     """Compare controllers in closed loop."""
     # Whatever can be wrong is told before Drake is imported, which takes a second.
-    from armloop.commands.shared import print_json, progress
+    from armloop.commands.shared import print_json, progress, simulated_arm
     from armloop.model import load_model
     from armloop.util.resources import find_scenario
 
@@ -75,10 +75,10 @@ def run(options: Track) -> None:
     models = {name: load_model(path) for name, path in paths.items()}
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.reports.tables import eta_table
-    from armloop.reports.tracking_tables import metrics_table, phases_table, spread_table
+    from armloop.reports.tracking_tables import metrics_table, not_run, phases_table, spread_table
     from armloop.workflows import run_pickup_scenario, run_scenario, run_wear_scenario
 
-    scenario = load_tracking(options.scenario, options.arm)
+    scenario = load_tracking(options.scenario, simulated_arm(options))
     for name, model in models.items():
         model.arm.require_same(scenario.plant.arm, paths[name])
     view = _view(options, scenario) if options.meshcat else None
@@ -100,7 +100,7 @@ def run(options: Track) -> None:
     if options.json:
         print_json(answer)
         return
-    print("\n\n".join(map(str, tables)))
+    print("\n\n".join(map(str, [*tables, *not_run(answer)])))
     if scenario.pickup is not None:
         found = [f"{effect['words']}" for effect in answer["diagnosis"]["effects"] if "words" in effect]
         print(f"\nverdict from the log since the grasp: {answer['diagnosis']['verdict']}; {'; '.join(found)}")

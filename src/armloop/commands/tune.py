@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armloop.commands.arguments import Json
+from armloop.commands.arguments import Chain, Json
 from armloop.commands.options import argument, option
 from armloop.util.outputs import take_folder
 
@@ -10,7 +10,7 @@ HELP = "margins of a tracking scenario's PID gains, and gains for a wanted bandw
 EXAMPLE = "armloop tune three_axis_tracking --bandwidth 5 --margin 60 --out out/tune"
 
 
-class Tune(Json):
+class Tune(Chain, Json):
     """The options."""
 
     scenario: str = argument("SCENARIO", "as for `armloop track`")
@@ -28,7 +28,7 @@ def run(options: Tune) -> None:
     """Analyse the gains of a scenario and propose others."""
     from math import pi
 
-    from armloop.commands.shared import print_json, progress
+    from armloop.commands.shared import print_json, progress, simulated_arm
     from armloop.util.resources import find_scenario
 
     folder = (
@@ -42,7 +42,7 @@ def run(options: Tune) -> None:
     from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
     from armloop.workflows import tune_scenario
 
-    scenario = load_tracking(options.scenario, options.arm)
+    scenario = load_tracking(options.scenario, simulated_arm(options))
     model = load_model(options.model, scenario.plant.arm) if options.model else None
     answer, tuning = tune_scenario(
         scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress(options)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,6 +43,12 @@ def spread_table(result: WearResult) -> Table:
         rows,
         "Tracking error η over all draws",
     )
+
+
+def not_run(answer: Mapping[str, Any]) -> list[str]:
+    """A line on the controllers that had no model, of the content of ``tracking.json``; empty if all ran."""
+    names = answer.get("not_run", [])
+    return [f"not run: {', '.join(names)}, for want of a model"] if names else []
 
 
 def metrics_table(results: Mapping[str, TrackingResult]) -> Table:

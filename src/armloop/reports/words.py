@@ -121,6 +121,18 @@ def listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else ""
 
 
+def joints(numbers: Sequence[int]) -> str:
+    """Joints by their numbers, in rising order: "joint 2", "joints 1, 2", "joints 1–5, 7"."""
+    runs: list[list[int]] = []
+    for j in numbers:
+        if runs and j == runs[-1][-1] + 1:
+            runs[-1].append(j)
+        else:
+            runs.append([j])
+    parts = [f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
+    return f"joint{'s' if len(numbers) > 1 else ''} {', '.join(parts)}"
+
+
 def parameters(values: Mapping[str, object]) -> str:
     """Plain parameters as ``mass 0.45, com (0.03, 0, 0.02)``."""
     plain = {key.replace("_", " "): np.asarray(value, dtype=float).tolist() for key, value in values.items()}

@@ -95,6 +95,7 @@ class TrackingData(Struct):
     arm: Name = ""
     scored_s: list[Seconds] = []
     unit: list[Name] = []
+    not_run: Annotated[list[Name], Meta(description="controllers without a model")] = []
     written_by: Name = ""
 
 

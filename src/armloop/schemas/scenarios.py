@@ -39,6 +39,10 @@ class PlantData(Struct, forbid_unknown_fields=True):
     """A simulated arm."""
 
     arm: Name = ""  # built-in name, or the path of a URDF, from the scenario's folder; `--arm` replaces it
+    lock: dict[
+        str, Finite
+    ] = {}  # positions, rad (m), of moving joints that are fixed there, such as a gripper's
+    tip: Name = ""  # the arm's last link; moving joints off the way to it are fixed at zero
     friction: Annotated[list[FrictionData], Meta(max_length=MOST_JOINTS)] = []  # one per joint, base to tip
     ranges: RangesData | None = None  # from the limits when absent
     time_step: Annotated[float, Meta(ge=1e-4, le=5e-3)] = 0.001  # s, of the plant and of the controllers

@@ -6,6 +6,7 @@ from armloop.data.log import MotionLog
 from armloop.drake.experiments.collection import collect
 from armloop.drake.experiments.scenarios import load_plan, plan_names, plant_for
 from armloop.experiment.sampling import inverse_dynamics_samples
+from armloop.robot.arm import Arm
 from armloop.util.errors import InputError, ScenarioError
 from armloop.util.progress import Progress
 
@@ -14,11 +15,11 @@ SIMULATION = "simulation"
 _COUNTS = {4: (2000, 4000, 4000), 3: (1000, 10000, 10000)}
 
 
-def collect_logs(arm: str, plan: str, seed: int, progress: Progress) -> dict[str, MotionLog]:
+def collect_logs(arm: str | Arm, plan: str, seed: int, progress: Progress) -> dict[str, MotionLog]:
     """Collect the logs of a plan from an arm.
 
     Args:
-        arm: built-in name or path of a URDF.
+        arm: built-in name, path of a URDF, or an arm that is loaded.
         plan: a plan of ``scenarios/collection.yaml``, or ``"simulation"``: friction-free inverse dynamics
             at random states, with the paper's numbers of samples.
 

@@ -13,8 +13,10 @@ from armloop.drake.experiments.tracking import (
     MAIN_MODEL,
     TrackingResult,
     needs_model,
+    require_use,
     run_tracking,
     track_in_view,
+    without_model,
 )
 from armloop.drake.tuning.loop_analysis import loop_margins
 from armloop.drake.view.live import LiveView
@@ -42,11 +44,15 @@ def run_scenario(
 
     Returns:
         The content of ``tracking.json`` and the results by controller.
+
+    Raises:
+        InputError: a model is given that no controller would run with.
     """
     chosen = models_for(scenario, models, progress)
+    require_use(scenario, chosen)
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
-    answer = tracking_answer(scenario, results)
+    answer = tracking_answer(scenario, results) | {"not_run": without_model(scenario, chosen)}
     if folder is not None:
         from armloop.drake.view.replay import write_replay
         from armloop.reports.plots import tracking_figure

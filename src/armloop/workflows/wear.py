@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from armloop.drake.experiments.scenarios import TrackingScenario
+from armloop.drake.experiments.tracking import require_use, without_model
 from armloop.drake.experiments.wear import WearResult, run_wear
 from armloop.model import ReconstructedModel
 from armloop.util.checkpoints import Kept, digest
@@ -29,6 +30,7 @@ def run_wear_scenario(
         The content of ``tracking.json``, ``eta_deg`` the mean over the draws, and the errors of every draw.
     """
     chosen = models_for(scenario, models, progress)
+    require_use(scenario, chosen)
     assert scenario.wear is not None
     progress(f"tracking {scenario.wear.samples} times with each controller, on all cores")
     kept = Kept(folder, _depends(scenario, chosen))
@@ -38,6 +40,7 @@ def run_wear_scenario(
         **heading(scenario, result.unit),
         "wear": {"samples": scenario.wear.samples, "spread": scenario.wear.spread, "seed": scenario.seed},
         "controllers": {name: _spread(eta) for name, eta in result.eta.items()},
+        "not_run": without_model(scenario, chosen),
     }
     if folder is not None:
         from armloop.reports.plots.spread import spread_figure

@@ -14,6 +14,11 @@ from armloop.model.components import RigidBody
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters
 
+MOTIONS = {
+    3: paper_reference(),
+    4: FourierReference(np.zeros(4), np.full((4, 1), 0.02), np.zeros((4, 1)), np.ones((4, 1)), 1.0),
+}
+
 
 def test_an_arm_under_pid_in_a_diagram_of_ones_own():
     reference = paper_reference()
@@ -58,6 +63,35 @@ def test_a_model_file_takes_the_place_of_nothing(tmp_path):
         )
         largest[model is None] = np.abs(state[:3] - loop.reference.tables[0][500]).max()
     assert largest[False] < 0.01 * largest[True]
+
+
+@pytest.mark.parametrize("arms", [("three_axis", "three_axis", "three_axis"), ("three_axis", "scara")])
+def test_several_arms_in_one_diagram_move_as_each_alone(arms):
+    """Names are asked before `Build`, which ends the process where two are the same."""
+
+    def moved(which):
+        builder = DiagramBuilder()
+        loops = [
+            add_arm_with_controller(builder, arm, PidGains.paper(n), MOTIONS[n], torque_rate=np.full(n, 1e3))
+            for arm, n in ((arm, {"three_axis": 3, "scara": 4}[arm]) for arm in which)
+        ]
+        names = [system.get_name() for system in builder.GetSystems()]
+        assert len(set(names)) == len(names) == 4 * len(which)
+        simulator = Simulator(builder.Build())
+        context = simulator.get_mutable_context()
+        for loop in loops:
+            loop.start_on_reference(context)
+        simulator.AdvanceTo(0.1)
+        return names, [
+            loop.plant.GetOutputPort("state").Eval(loop.plant.GetMyContextFromRoot(context)) for loop in loops
+        ]
+
+    names, together = moved(arms)
+    assert {"three_axis", "reference", "pid", "drives", "reference_2", "pid_2", "drives_2"} <= set(names)
+    for arm, state in zip(arms, together, strict=True):
+        alone = moved([arm])[1][0]
+        assert np.abs(alone).max() > 1e-3
+        np.testing.assert_allclose(state, alone, atol=1e-9)
 
 
 def test_reference_and_gains_must_fit_the_arm():

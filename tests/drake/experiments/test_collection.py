@@ -1,6 +1,7 @@
 """Collected data against the plant's own mechanics and friction: settled, sliding, as noisy as stated."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -13,9 +14,13 @@ from armloop.drake.experiments.scenarios import load_plan, load_plant, plant_for
 from armloop.drake.experiments.speed_mode import Recording
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.friction import JointFriction
 from armloop.experiment.design import Limits, Series, nominal_torque
 from armloop.experiment.excitation import fourier_reference
+from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.util.errors import InputWarning
+from armloop.util.resources import urdf_path
 
 TINY = dataclasses.replace(
     load_plan("quick"), static_poses=4, velocity_segments=8, trajectories=1, trajectory_duration=5.0
@@ -130,6 +135,28 @@ def test_any_urdf_has_a_plant(tmp_path):
             plant, part.q, np.sign(part.v.mean(axis=0)) * [np.deg2rad(0.1), 1e-4] + 0 * part.v, 0 * part.v
         )
         assert_allclose(part.tau.mean(axis=0), expected.mean(axis=0), rtol=0.02, atol=0.03)
+
+
+def test_friction_of_a_urdf_that_is_not_used_is_said(tmp_path):
+    path, text = tmp_path / "own.urdf", urdf_path("three_axis").read_text()
+    for dynamics, names in (
+        ('<dynamics damping="0.0" friction="0.0"/>', None),
+        ('<dynamics damping="0.0" friction="0.7"/>', "joint_1, joint_2, joint_3"),
+        ('<dynamics damping="0.4"/>', "joint_1, joint_2, joint_3"),
+    ):
+        path.write_text(text.replace("</joint>", f"{dynamics}</joint>"))
+        for arm in (path, load_arm(path)):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                friction = plant_for(arm).config.friction
+            assert friction == (JointFriction(0.65, 0.5, 0.1, 1.0),) * 3
+            said = [str(one.message) for one in caught if issubclass(one.category, InputWarning)]
+            assert len(said) == (names is not None)
+            assert not said or f"<dynamics> of {names} are not used" in said[0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        own = (JointFriction(1.0, 1.0),) * 3
+        assert plant_for(path, own).config.friction == own
 
 
 def test_a_motion_of_the_designed_family_is_followed():

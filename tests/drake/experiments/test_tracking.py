@@ -13,7 +13,14 @@ from pydrake.systems.framework import DiagramBuilder
 from armloop.drake.control.controllers import LISTED, Pid, controller_named
 from armloop.drake.experiments import tracking
 from armloop.drake.experiments.scenarios import load_tracking
-from armloop.drake.experiments.tracking import add_controlled_arm, controllers_for, run_tracking, track
+from armloop.drake.experiments.tracking import (
+    add_controlled_arm,
+    controllers_for,
+    require_use,
+    run_tracking,
+    track,
+    without_model,
+)
 from armloop.drake.plant.exact import exact_model
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.experiment.excitation import FourierReference
@@ -127,6 +134,38 @@ def test_an_undeclared_payload_costs_and_knowing_it_pays(short, exact):
 )
 def test_controllers_that_have_a_model_run(short, given, expected):
     assert controllers_for(short, dict.fromkeys(given.split())) == expected.split()
+
+
+@pytest.mark.parametrize(
+    ("given", "missing", "idle"),
+    [
+        ("", "pid_step1 pid_step3", None),
+        ("step1", "pid_step3", None),
+        ("mine", "pid_step1 pid_step3", None),
+        ("model", "", None),
+        ("step1 step3 model", "", "model"),
+    ],
+)
+def test_who_has_no_model_and_which_model_has_nobody(short, given, missing, idle):
+    models = dict.fromkeys(given.split())
+    assert without_model(short, models) == missing.split()
+    if idle is None:
+        require_use(short, models)
+    else:
+        with pytest.raises(InputError, match=f"model {idle!r}: no controller of .* would run with it"):
+            require_use(short, models)
+
+
+def test_a_model_for_controllers_that_need_none_is_refused(short):
+    scenario = dataclasses.replace(short, controllers=("pid", "exact"))
+    with pytest.raises(InputError, match=r"model .model.: no controller of .* \(pid, exact\) would run"):
+        require_use(scenario, {"model": None})
+
+
+def test_a_scenario_of_which_nothing_can_run_is_refused(short):
+    scenario = dataclasses.replace(short, controllers=("pid_step1",))
+    with pytest.raises(InputError, match=r"no controller of it \(pid_step1\) has a model"):
+        require_use(scenario, {})
 
 
 def test_a_model_asked_for_runs_even_if_the_scenario_does_not_list_its_controller(short):

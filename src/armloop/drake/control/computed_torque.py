@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
 from armloop.drake.control.pid import check_gains
-from armloop.drake.given import require_joints, require_of, require_predicts
+from armloop.drake.given import require_joints, require_model, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
@@ -114,10 +114,8 @@ def ComputedTorque_(T: type) -> Any:
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             n = self._n = len(gains.kp)
-            self._drive, self._friction_at = _drive(model), friction_at
-            if T is not float:
-                assert isinstance(model, ReconstructedModel)
-                self._equations = ModelEquations(model, functions_of(T))
+            self._friction_at = friction_at
+            self._take(model)
             assert gains.ki is not None
             self._gains = [gain.tolist() for gain in (gains.kp, gains.kd, gains.ki)]
             self._integrates = bool(gains.ki.any())
@@ -136,11 +134,23 @@ def ComputedTorque_(T: type) -> Any:
             self.DeclareVectorOutputPort("tau", n, self._calc_tau, sources)
 
         def set_model(self, model: InverseDynamicsModel) -> None:
-            """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            """Take another model of the same arm from the next step on, between two `AdvanceTo`.
+
+            Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
+            `ReconstructedModel`.
+            """
             require_predicts(model)
             require_joints(model, self._n, "this controller is for")
-            self._drive = _drive(model)
+            self._take(model)
             self._given["model"] = model
+
+        def _take(self, model: InverseDynamicsModel) -> None:
+            if T is float:
+                self._drive = _drive(model)
+            else:
+                require_model(model)
+                assert isinstance(model, ReconstructedModel)
+                self._equations = ModelEquations(model, functions_of(T))
 
         def _calc_tau(self, context: Any, output: Any) -> None:
             n = self._n

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 
-from armloop.drake.given import require_joints, require_predicts, require_step
+from armloop.drake.given import require_joints, require_model, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics import ModelEquations
@@ -74,22 +74,30 @@ def Feedforward_(T: type) -> Any:
                 converter = SystemScalarConverter()
             LeafSystem_[T].__init__(self, converter=converter)
             self._n, self._step = n, step
-            if T is float:
-                self._drive = _drive(model, step)
-            else:
-                assert isinstance(model, ReconstructedModel)
-                self._equations = ModelEquations(model, functions_of(T), step=step)
+            self._take(model)
             names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
             self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
             # Named, or Drake would find out by writing all the formulas out.
             self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, {self.all_input_ports_ticket()})
 
         def set_model(self, model: FeedforwardModel) -> None:
-            """Take another model of the same arm from the next step on; float only, between two `AdvanceTo`."""
+            """Take another model of the same arm from the next step on, between two `AdvanceTo`.
+
+            Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
+            `ReconstructedModel`.
+            """
             require_predicts(model)
             require_joints(model, self._n, "this feedforward is for")
+            self._take(model)
             self._given["model"] = model
-            self._drive = _drive(model, self._step)
+
+        def _take(self, model: FeedforwardModel) -> None:
+            if T is float:
+                self._drive = _drive(model, self._step)
+            else:
+                require_model(model)
+                assert isinstance(model, ReconstructedModel)
+                self._equations = ModelEquations(model, functions_of(T), step=self._step)
 
         def _calc_tau_ff(self, context: Any, output: Any) -> None:
             x = np.concatenate([port.Eval(context) for port in self._inputs])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,14 @@ from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
 from armloop.drake.control.reference import ReferenceSource
-from armloop.drake.experiments.scenarios import Plant, plant_for, plant_names
+from armloop.drake.experiments.scenarios import Plant, built_in, plant_for
 from armloop.drake.given import require_of, require_predicts, require_reference, require_step
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
 from armloop.experiment.excitation import Reference
 from armloop.model import ReconstructedModel
+from armloop.robot.arm import Arm
 from armloop.util.errors import InputError
 
 CONTROLLERS = ("pid", "computed_torque")
@@ -73,7 +75,7 @@ class ControlledArm:
 
 def add_arm_with_controller(
     builder: DiagramBuilder,
-    arm: str | Path | Plant,
+    arm: str | Path | Arm | Plant,
     gains: PidGains | AccelerationGains,
     reference: Reference,
     model: FeedforwardModel | None = None,
@@ -90,10 +92,14 @@ def add_arm_with_controller(
     `"computed_torque"`: `ReferenceSource` -> `ComputedTorque` -> `ArmPlant` -> back; it needs a model that
     predicts at velocities of the caller's choice, such as one of `armloop.model.load_model`.
 
+    The systems are named as the arm, `reference` and as the controller (`drives`, with a `torque_rate`). Where one of these
+    names is taken, as by an arm that was added before, all have the same number behind them: `reference_2`, `pid_2`.
+
     The arm starts at its zero position, unless `ControlledArm.start_on_reference` or `ArmPlant.set_state` is called.
 
-    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, then with the
-        friction of a reconstructed `model` (`nearest_friction`), without one that of `scenarios.plant_for`
+    arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, or an arm of
+        `load_arm` (with `lock` or `tip` where it has a gripper), then with the friction of a reconstructed `model`
+        (`nearest_friction`), without one that of `scenarios.plant_for`
     gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
     model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
@@ -172,26 +178,34 @@ def add_arm_under(
             f"{name}: has a period of {law.period:g} s, the plant {period:g} s; give both the same"
         )
     source = ReferenceSource(reference, period, model if "tau_ff" in wanted else None, step)
-    body = builder.AddSystem(ArmPlant(plant.arm, config.friction, effects=effects, time_step=period))
-    builder.AddNamedSystem("reference", source)
-    builder.AddNamedSystem(name, law)
+    body = ArmPlant(plant.arm, config.friction, effects=effects, time_step=period)
+    suffix = _suffix(builder, [body.get_name(), "reference", name, "drives"])
+    builder.AddNamedSystem(body.get_name() + suffix, body)
+    builder.AddNamedSystem(f"reference{suffix}", source)
+    builder.AddNamedSystem(f"{name}{suffix}", law)
     for port in wanted:
         builder.Connect(source.GetOutputPort(port), law.GetInputPort(port))
     builder.Connect(body.GetOutputPort("state"), law.GetInputPort("state"))
     drives = law
     if torque_rate is not None:
-        drives = builder.AddNamedSystem("drives", RateLimiter(plant.arm.effort, torque_rate, period))
+        limiter = RateLimiter(plant.arm.effort, torque_rate, period)
+        drives = builder.AddNamedSystem(f"drives{suffix}", limiter)
         builder.Connect(law.GetOutputPort("tau"), drives.GetInputPort("u"))
     builder.Connect(drives.GetOutputPort("tau"), body.GetInputPort("tau"))
     return ControlledArm(body, source, law, drives if drives is not law else None, reference)
 
 
-def _plant(spec: str | Path, model: FeedforwardModel | None) -> Plant:
-    """The plant of an arm; one of a URDF, which says nothing of dry friction, has that of its model."""
-    plant = plant_for(spec)
-    if str(spec) in plant_names() or not isinstance(model, ReconstructedModel) or model.arm.n != plant.arm.n:
-        return plant
-    return replace(plant, config=replace(plant.config, friction=nearest_friction(model)))
+def _suffix(builder: DiagramBuilder, names: Sequence[str]) -> str:
+    """What makes all names new to the diagram, whose building ends the process where two are the same."""
+    suffixes = ("", *(f"_{k}" for k in range(2, len(builder.GetSystems()) + 3)))
+    return next(s for s in suffixes if not any(builder.HasSubsystemNamed(name + s) for name in names))
+
+
+def _plant(spec: str | Path | Arm, model: FeedforwardModel | None) -> Plant:
+    """The plant of an arm; one of a URDF, in which what sticks has no place, has the friction of its model."""
+    if built_in(spec) or not isinstance(model, ReconstructedModel):
+        return plant_for(spec)
+    return plant_for(spec, nearest_friction(model))
 
 
 def _check_controller(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from msgspec.structs import asdict, replace
@@ -30,8 +31,10 @@ from armloop.schemas.scenarios import (
     PlantData,
     TrackingData,
 )
+from armloop.util.doubts import warn
 from armloop.util.errors import ArmError, ScenarioError
-from armloop.util.resources import scenario_path, urdf_names
+from armloop.util.given import path_of
+from armloop.util.resources import scenario_path, urdf_names, urdf_path
 
 __all__ = [
     "Pickup",
@@ -61,18 +64,47 @@ def load_plant(name: str) -> Plant:
     return _plant(name, entry(path, name, PlantData), f"{path}: {name}")
 
 
-def plant_for(spec: str | Path) -> Plant:
-    """Return the plant of an arm by its built-in name, or of any URDF by its path.
+def built_in(spec: str | Path | Arm) -> bool:
+    """Tell whether an arm is one of those in plants.yaml: by its name, or loaded by it and left as it was."""
+    if not isinstance(spec, Arm):
+        return str(spec) in plant_names()
+    return spec.name in {*plant_names()} & {*urdf_names()} and spec.urdf == urdf_path(spec.name).read_text(
+        encoding="utf-8"
+    )
 
-    A URDF says nothing of dry friction; its joints get f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for
-    prismatic ones) and the ranges that its limits allow.
+
+def plant_for(spec: str | Path | Arm, friction: tuple[JointFriction, ...] | None = None) -> Plant:
+    """Return the plant of an arm by its built-in name, of any URDF by its path, or of an arm that is loaded.
+
+    The joints of a URDF get the friction given, else f_s 0.65, f_c 0.5, f_v 1 N*m (5, 6.5 N, 20 N*s/m for prismatic ones),
+    and the ranges that its limits allow. Damping and friction of its `<dynamics>` are not used, which is said where
+    they are above zero: most URDFs have dummies there, and none has what sticks.
     """
-    if str(spec) in plant_names():
-        return load_plant(str(spec))
-    arm = load_arm(spec)
-    turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
-    friction = tuple(turning if turns else sliding for turns in arm.revolute)
+    if built_in(spec):
+        return load_plant(spec.name if isinstance(spec, Arm) else str(spec))
+    arm = spec if isinstance(spec, Arm) else load_arm(spec)
+    if friction is None:
+        _say_unused(arm)
+        turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
+        friction = tuple(turning if turns else sliding for turns in arm.revolute)
     return Plant(arm.name, arm, PlantConfig(friction, MotionRanges.of(arm)))
+
+
+def _say_unused(arm: Arm) -> None:
+    """Say which joints of a URDF have a damping or a friction that the generic one takes the place of."""
+    joints = ElementTree.fromstring(arm.urdf).iter("joint") if arm.urdf else ()
+    stated = {
+        joint.get("name")
+        for joint in joints
+        for dynamics in joint.findall("dynamics")
+        if any(float(dynamics.get(key) or 0.0) > 0 for key in ("damping", "friction"))
+    }
+    unused = [name for name in arm.joint_names if name in stated]
+    if unused:
+        warn(
+            f"{arm.name}: damping and friction in the URDF's <dynamics> of {', '.join(unused)} are not used: the simulated "
+            "joints have friction of a usual size; state theirs as `friction` of a scenario's own_plant"
+        )
 
 
 def plan_names() -> list[str]:
@@ -91,11 +123,12 @@ def load_plan(name: str) -> CollectionPlan:
     return CollectionPlan(**asdict(data))
 
 
-def load_tracking(spec: str | Path, arm: str | Path | None = None) -> TrackingScenario:
+def load_tracking(spec: str | Path, arm: str | Path | Arm | None = None) -> TrackingScenario:
     """Return a tracking scenario by its built-in name or the path of its YAML file.
 
     spec : of a file with several scenarios, FILE:NAME, or FILE for the first or the one named as the file
-    arm : in place of the arm of the scenario's own plant: a built-in name or the path of a URDF
+    arm : in place of the arm of the scenario's own plant: a built-in name or the path of a URDF, with the scenario's
+        `lock` and `tip`; or an arm that is loaded, as it is
 
     Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
     """
@@ -174,7 +207,7 @@ def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str)
     return Pickup(data.at, data.diagnose_at, payload)
 
 
-def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | Path | None) -> Plant:
+def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | Path | Arm | None) -> Plant:
     if bool(data.plant) == (data.own_plant is not None):
         raise ScenarioError(f"{where}: plant: give either the name of a plant in plants.yaml or own_plant")
     if data.own_plant is None:
@@ -188,20 +221,20 @@ def _plant_of(data: TrackingData, name: str, path: Path, where: str, arm: str | 
     own = data.own_plant
     if arm is None and own.arm and own.arm not in urdf_names():
         own = replace(own, arm=str(beside(path, own.arm, f"{where}: own_plant: arm")))
-    if arm is not None:
+    if arm is not None and not isinstance(arm, Arm):
         # a path from where the user stands, not from the scenario's folder
-        given = Path(arm)
+        given = path_of(arm, "the arm", ArmError)
         own = replace(own, arm=str(given.resolve() if given.exists() else arm))
-    return _plant(name, own, f"{where}: own_plant")
+    return _plant(name, own, f"{where}: own_plant", arm if isinstance(arm, Arm) else None)
 
 
-def _plant(name: str, data: PlantData, where: str) -> Plant:
-    if not data.arm:
+def _plant(name: str, data: PlantData, where: str, loaded: Arm | None = None) -> Plant:
+    if loaded is None and not data.arm:
         raise ScenarioError(
             f"{where}: arm is missing; give a built-in name or the path of a URDF here, or by --arm"
         )
     try:
-        arm = load_arm(data.arm)
+        arm = loaded or load_arm(data.arm, data.lock, data.tip or None)
     except ArmError as error:
         raise ScenarioError(f"{where}: arm: {error}") from error
     if len(data.friction) != arm.n:

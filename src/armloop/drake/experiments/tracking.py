@@ -62,6 +62,30 @@ def controllers_for(scenario: TrackingScenario, models: Models) -> list[str]:
     return list(dict.fromkeys([*names, *own]))
 
 
+def without_model(scenario: TrackingScenario, models: Models) -> list[str]:
+    """Return the controllers of a scenario that `run_tracking` leaves out, for want of a model."""
+    return [name for name in scenario.controllers if not controller_named(name).served_by(models)]
+
+
+def require_use(scenario: TrackingScenario, models: Models) -> None:
+    """Raise `InputError` for a model that no controller would run with, and where no controller could run."""
+    running = controllers_for(scenario, models)
+    kinds = [controller_named(name) for name in running]
+    used = {
+        next(name for name in (kind.name, *kind.models) if name in models) for kind in kinds if kind.models
+    }
+    for name in models:
+        if name not in used:
+            raise InputError(
+                f"model {name!r}: no controller of {scenario.name} ({', '.join(scenario.controllers)}) would run with it; "
+                "list one that needs it, or name it as what it is for, such as step3 (adds pid_step3)"
+            )
+    if not running:
+        raise InputError(
+            f"{scenario.name}: no controller of it ({', '.join(scenario.controllers)}) has a model; give one"
+        )
+
+
 def run_tracking(
     scenario: TrackingScenario, models: Models, effects: Effects = (), *, processes: int = 2
 ) -> dict[str, TrackingResult]:

@@ -14,7 +14,7 @@ from armloop.drake.given import require_of, require_order, require_plant
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
-from armloop.laws.effects import Value, effect_kind
+from armloop.laws.effects import Value, effect, misplaced, misstated
 from armloop.laws.effects.base import number
 from armloop.laws.friction import Sliding, torque_along
 from armloop.robot.arm import Arm
@@ -61,7 +61,7 @@ def EffectTorque_(T: type) -> Any:
             """arm : of n joints; name, joint, other_joint (from 1), parameters : as in `diagnosis.json`, SI units;
             inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.inertial_parameters()`).
 
-            Raises `ModelError` for an effect without such a law.
+            Raises `ModelError` for an effect without such a law, a joint that the arm does not have, wrong parameters.
             """
             require("a number above 0", smoothing=smoothing)
             require_of(Arm, arm=arm)
@@ -70,10 +70,14 @@ def EffectTorque_(T: type) -> Any:
             self.arm = arm
             self._given["parameters"] = dict(parameters)
             self._smoothing = smoothing
-            if not effect_kind(name).simulated:
+            kind = effect(name, joint, other_joint)
+            if not kind.simulated:
                 raise ModelError(f"effect {name} is found in logs alone; no system can have it")
+            fault = misplaced(arm, kind) or misstated(type(kind), parameters, whole=False)
+            if fault:
+                raise ModelError(f"effect {name}: {fault}")
             self._law = effect_law(arm, name, joint, parameters, functions_of(T), inertial, other_joint)
-            event = effect_kind(name).role == "event"
+            event = kind.role == "event"
             self._interval = (number(parameters["start"]), number(parameters["end"])) if event else None
             n = self._n = arm.n
             self._state = self.DeclareVectorInputPort("state", 2 * n)

@@ -16,7 +16,7 @@ import numpy as np
 
 from armloop.drake.plant.own_effects import Law, own_law
 from armloop.laws.effects import EFFECTS as LISTED
-from armloop.laws.effects import REGISTRY, Effect, effect, effect_kind
+from armloop.laws.effects import REGISTRY, Effect, effect, effect_kind, misplaced, misstated
 from armloop.laws.effects.base import Placed, number
 from armloop.laws.effects.external_contact import ExternalContact
 from armloop.laws.effects.gravity_tilt import GravityTilt, base_rotation
@@ -89,22 +89,7 @@ def _fault(kind: type[Effect], given: UndeclaredEffect) -> str:
         return "falsifies the record; the plant takes effects that are torques of q and v"
     if kind.memory and kind.name not in LISTED and not getattr(kind, "elements", ()):
         return "depends on the past; the plant takes effects that are torques of q and v"
-    if kind.name not in LISTED and not getattr(kind, "elements", ()):
-        return kind.fault(given.parameters)  # the parameters themselves are tried by its law
-    return _wrong_parameters(kind, given.parameters)
-
-
-def _wrong_parameters(kind: type[Effect], parameters: Mapping[str, Any]) -> str:
-    names = {p.name: p for p in kind.parameters}
-    needed = {name for name, p in names.items() if p.default is None}
-    if not needed <= set(parameters) <= set(names):
-        given = ", ".join(parameters) or "none"
-        return f"parameters are {given}; they must be {', '.join(p for p in names if p in needed)}"
-    for name, value in parameters.items():
-        fault = names[name].fault(value)
-        if fault:
-            return f"{name} is {value!r}; it {fault}"
-    return kind.fault(parameters)
+    return misstated(kind, given.parameters)
 
 
 @dataclass(eq=False)
@@ -137,10 +122,9 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
     """
     made = Realisation(np.zeros(arm.n), np.zeros(arm.n))
     for given in sorted(effects, key=lambda each: effect_kind(each.name).fault_order):
-        for joint in (given.joint, given.other_joint):
-            if joint is not None and not 1 <= joint <= arm.n:
-                raise ScenarioError(f"effect {given.name}: joint {joint}; {arm.name} has joints 1 to {arm.n}")
         kind, p = given.build(), given.parameters
+        if fault := misplaced(arm, kind):
+            raise ScenarioError(f"effect {given.name}: {fault}")
         law = None if kind.sensor else kind.placed(p)
         if kind.sensor:
             made.faults.append(partial(_falsified, kind, p))

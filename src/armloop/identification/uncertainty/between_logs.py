@@ -82,7 +82,7 @@ def _apart(b: Array, covariance: Array) -> tuple[Array, Array]:
     """(G, 2) how far each of G estimates lies from their weighted mean, and (G, 2, 2) their precisions."""
     precise = np.linalg.pinv(covariance)
     mean = np.linalg.pinv(precise.sum(axis=0)) @ np.einsum("gij,gj->i", precise, b)
-    return b - mean, precise
+    return np.asarray(b - mean), np.asarray(precise)
 
 
 def friction_spread(model: ReconstructedModel, samples: Samples) -> Array:

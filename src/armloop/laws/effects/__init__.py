@@ -5,7 +5,10 @@ Users add their own by :func:`register` or as entry points (see :mod:`armloop.la
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from armloop.laws.effects.base import Context, Effect, Estimate, Parameter, Value
 from armloop.laws.effects.found import FoundLaw, found_law
@@ -34,6 +37,8 @@ __all__ = [
     "effect_kind",
     "found_law",
     "hypotheses",
+    "misplaced",
+    "misstated",
     "register",
 ]
 
@@ -74,6 +79,39 @@ def effect(name: Any, joint: Any, other_joint: Any = None) -> Effect:
     if kind.pair_wise and joint == other_joint:
         raise ModelError(f"effect {name!r}: joint and other_joint must differ, both are {joint}")
     return kind(joint, other_joint)
+
+
+def misplaced(arm: Arm, effect: Effect) -> str:
+    """What is wrong with the place of an effect on an arm; empty if nothing is."""
+    for joint in (effect.joint, effect.other_joint):
+        if joint is not None and not 1 <= joint <= arm.n:
+            return f"joint {joint}; {arm.name} has joints 1 to {arm.n}"
+    return ""
+
+
+def misstated(kind: type[Effect], parameters: Mapping[str, Any], *, whole: bool = True) -> str:
+    """What is wrong with the parameters given for an effect; empty if nothing is.
+
+    Args:
+        whole: whether it is all that a joint or an arm has of it; what is found in addition to a model may be negative.
+    """
+    if kind.name not in EFFECTS and not getattr(kind, "elements", ()):
+        # whether they are all there, its law tells
+        for name, value in parameters.items():
+            fault = Parameter(name, size=np.size(value)).fault(value)
+            if fault:
+                return f"{name} is {value!r:.60}; it must be finite numbers"
+        return kind.fault(parameters)
+    named = {p.name: p for p in kind.parameters}
+    needed = [name for name, p in named.items() if p.default is None]
+    if not set(needed) <= set(parameters) <= set(named):
+        given = ", ".join(map(str, parameters)) or "none"
+        return f"parameters are {given}; they must be {', '.join(needed)}"
+    for name, value in parameters.items():
+        fault = named[name].fault(value, whole=whole)
+        if fault:
+            return f"{name} is {value!r}; it {fault}"
+    return kind.fault(parameters)
 
 
 def hypotheses(arm: Arm) -> list[Effect]:

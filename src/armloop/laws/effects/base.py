@@ -51,8 +51,8 @@ class Parameter:
     default: Value | None = None
     shape: str = ""
 
-    def fault(self, value: Any) -> str:
-        """What is wrong with a value given for it, as "must be ..."; empty if nothing is."""
+    def fault(self, value: Any, *, whole: bool = True) -> str:
+        """What is wrong with a value given for it, or (not ``whole``) for a part of it, as "must be ..."; else empty."""
         try:
             number = np.asarray(value, dtype=float)
         except (TypeError, ValueError):
@@ -61,7 +61,7 @@ class Parameter:
             return "must be one finite number" if self.size == 1 else "must be three finite numbers"
         if (number <= self.above).any():
             return f"must be above {self.above:g}"
-        if (number < self.least).any():
+        if whole and (number < self.least).any():
             return f"must not be {'negative' if self.least == 0 else f'below {self.least:g}'}"
         return ""
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from armloop.identification.reconstruction import StepReport
-from armloop.reports.plots.style import BLUE, INK, MUTED, figure, log_percent, panels, percent_tick, polish
+from armloop.reports.plots.style import BLUE, INK, figure, log_percent, panels, percent_tick, polish
 from armloop.reports.words import percent
 
 # Labels that stand level below a panel; more of them stand upright.
@@ -48,7 +48,6 @@ def orders_figure(reports: Sequence[StepReport], reference: Sequence[StepReport]
         polish(axes, "orders (N1, N2)", "held-out error / RMS torque" if axes is row[0] else "", name)
         axes.yaxis.set_major_formatter(FuncFormatter(percent_tick))
         axes.yaxis.set_minor_formatter(log_percent(min(errors), max(errors)))
-        axes.tick_params(which="minor", colors=MUTED, labelsize=8, length=0)
         axes.margins(x=0.22)
         axes.set_ylim(0.75 * min(errors), 1.25 * max(errors))
     return made

@@ -143,7 +143,7 @@ def _by_columns(count: int, columns: int) -> list[int]:
 
 def _fitting(labels: Sequence[str], columns: int, width: float) -> int:
     """How many columns, at most ``columns``, fit into ``width`` inches; each is as wide as its longest label."""
-    wide = [_width(label) for label in labels]
+    wide = [text_width(label) for label in labels]
     for count in range(min(columns, len(labels)), 1, -1):
         longest = [max(wide[first::count]) for first in range(count)]
         if (
@@ -154,7 +154,7 @@ def _fitting(labels: Sequence[str], columns: int, width: float) -> int:
 
 
 @lru_cache(maxsize=256)
-def _width(label: str) -> float:
+def text_width(label: str) -> float:
     """Width of a label, inches; letters fitted to pixels are a little wider than their outlines."""
     return 1.07 * float(TextPath((0, 0), label, size=_LETTERS).get_extents().width) / 72
 

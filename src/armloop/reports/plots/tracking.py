@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 from armloop.reports import paper as published
 from armloop.reports.plots.style import (
@@ -27,12 +28,17 @@ from armloop.reports.plots.style import (
     trace,
 )
 from armloop.reports.words import controller, number
+from armloop.util.arrays import Array
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.tracking import TrackingResult
 
 #: From so many joints on, joints are rows instead of columns.
 _MANY_JOINTS = 5
+#: Mean errors of two controllers that are so many times each other lie on a line and on zero.
+_FAR_APART = 20.0
+_LEAST = 1e-6  # deg (mm), which no encoder sees
+_PIECES = 100  # of the interval scored
 
 
 def tracking_figure(
@@ -41,6 +47,9 @@ def tracking_figure(
     colors: Mapping[str, str] | None = None,
 ) -> Figure:
     """Reference and controllers per joint over the scored interval, and below it the tracking error.
+
+    Where one controller's mean error is 20 times another's, the largest error without sign, piece by piece, is drawn over
+    decades: on an axis from zero the smaller ones would lie on one line.
 
     Args:
         names: what to call the controllers; by default after their keys.
@@ -55,6 +64,8 @@ def tracking_figure(
     else:
         made = figure(10.5, 1.7 * n)
         grid = panels(made, n, 2, sharex=True).T
+    etas = np.array([result.eta for result in results.values()])
+    decades = bool((etas.max(axis=0) > _FAR_APART * etas.min(axis=0)).any())
     for j, unit in enumerate(first.unit):
         scale = np.rad2deg(1.0) if unit == "deg" else 1e3
         follow, error = grid[0, j], grid[1, j]
@@ -67,14 +78,39 @@ def tracking_figure(
             label = (names or {}).get(name) or controller(name)
             line = {"color": colors[name], "linewidth": 1.3, "label": label, "linestyle": dash}
             trace(follow, result.time[rows], scale * result.q[rows, j], **line)
-            trace(error, result.time[rows], scale * (result.q_ref[rows, j] - result.q[rows, j]), **line)
+            deviation = scale * (result.q_ref[rows, j] - result.q[rows, j])
+            if decades:
+                error.plot(*_largest(result.time[rows], deviation), **line)
+            else:
+                trace(error, result.time[rows], deviation, **line)
         polish(follow, "", f"position [{unit}]", f"Joint {j + 1}")
-        polish(error, "time [s]" if n < _MANY_JOINTS or j == n - 1 else "", f"error [{unit}]")
+        what = f"{'|error|' if decades else 'error'} [{unit}]"
+        polish(error, "time [s]" if n < _MANY_JOINTS or j == n - 1 else "", what)
         if n >= _MANY_JOINTS and j == n - 1:
             follow.set_xlabel("time [s]", color=MUTED, fontsize=9.5)
-        error.axhline(0, color=GRID, linewidth=1)
+        if decades:
+            _decades(error)
+        else:
+            error.axhline(0, color=GRID, linewidth=1)
     legend(made, 5)
     return made
+
+
+def _largest(time: Array, deviation: Array) -> tuple[Array, Array]:
+    """The largest error of each piece, without sign, over the pieces' middles; zero crossings are not shown."""
+    pieces = [p for p in np.array_split(np.arange(len(time)), _PIECES) if len(p)]
+    values = np.array([np.abs(deviation[p]).max() for p in pieces])
+    return np.array([time[p].mean() for p in pieces]), np.maximum(values, _LEAST)
+
+
+def _decades(axes: Axes) -> None:
+    """Make an axis logarithmic from the decade above which nearly all of the lines lie to that of the largest."""
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
+    axes.set_yscale("log")
+    ends = np.floor(np.log10(np.quantile(values, 0.02))), np.ceil(np.log10(values.max()))
+    axes.set_ylim(10.0 ** ends[0], 10.0 ** max(ends[1], ends[0] + 1))
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def eta_figure(
