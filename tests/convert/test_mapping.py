@@ -82,6 +82,28 @@ def test_suggest_writes_a_map_with_questions_that_must_be_answered(tmp_path, log
     assert_same(read_log(out), log)
 
 
+@pytest.mark.parametrize("numbers", [(0, 1, 2), (1, 2, 4)])
+def test_joints_numbered_otherwise_than_from_one_do_not_get_lost(tmp_path, log, capsys, numbers):
+    names = {kind: [f"{kind}{j}" for j in numbers] for kind in ("q", "v", "tau")}
+    table, place, out = tmp_path / "table.csv", tmp_path / "map.yaml", tmp_path / "log.csv"
+    cells = np.column_stack([log.time, log.q, log.v, log.tau])
+    np.savetxt(
+        table, cells, delimiter=",", header=",".join(["time", *sum(names.values(), [])]), comments=""
+    )
+    refused(["convert", str(table), "--out", str(out)], capsys)
+    assert not out.exists()
+    assert main(["convert", str(table), "--suggest", "--map", str(place)]) == 0
+    assert "unsure of joints" in capsys.readouterr().out
+    units = {"time": "s", "q": "rad", "v": "rad/s", "tau": "N*m"}
+    text = place.read_text()
+    for unit in units.values():
+        text = text.replace("unit: '?'", f"unit: {unit}", 1)
+    place.write_text(text)
+    assert {kind: list(found.names()) for kind, found in read_map(place).quantities().items()} == names
+    assert main(["convert", str(table), "--map", str(place), "--out", str(out)]) == 0
+    assert_same(read_log(out, joints=3), log)
+
+
 HEADERS = {
     "t,pos0,pos1,vel0,vel1,effort0,effort1": "pos0 pos1 effort0 effort1",
     "time,joint_1_q,joint_2_q,joint_1_dq,joint_2_dq,joint_1_tau,joint_2_tau": "joint_1_q joint_2_q joint_1_tau joint_2_tau",
