@@ -88,7 +88,11 @@ def test_joints_numbered_otherwise_than_from_one_do_not_get_lost(tmp_path, log, 
     table, place, out = tmp_path / "table.csv", tmp_path / "map.yaml", tmp_path / "log.csv"
     cells = np.column_stack([log.time, log.q, log.v, log.tau])
     np.savetxt(
-        table, cells, delimiter=",", header=",".join(["time", *sum(names.values(), [])]), comments=""
+        table,
+        cells,
+        delimiter=",",
+        header=",".join(["time", *(name for each in names.values() for name in each)]),
+        comments="",
     )
     refused(["convert", str(table), "--out", str(out)], capsys)
     assert not out.exists()

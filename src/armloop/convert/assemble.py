@@ -93,7 +93,9 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         if name not in recording.columns:
             raise LogError(f"{where}: no column {name} to keep; {_there_are(recording)}")
         if name not in used:
-            extra[f"source.{name}" if name == "time" or JOINT_COLUMN.fullmatch(name) else name] = recording.columns[name][keep]
+            extra[f"source.{name}" if name == "time" or JOINT_COLUMN.fullmatch(name) else name] = (
+                recording.columns[name][keep]
+            )
     if len(keep) < N:
         notes.append(f"{N - len(keep)} of {N} {recording.rows}s repeat the time of the last; left out")
     joints = mapping.joints or [str(j + 1) for j in range(n)]

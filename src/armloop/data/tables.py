@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armloop.data.clock import likely_unit, sample_rate
 from armloop.data.csv_rows import index_rows
 from armloop.util.errors import LogError
 from armloop.util.files import replacing
@@ -88,10 +89,12 @@ def read_columns(
         name = min(faults, key=lambda key: faults[key])
         value, row = table[name][faults[name]], faults[name] + (rows[0] if rows else 0)
         cell = _csv_cell(path, name, row) if kind_of(path) == CSV else str(value)
-        wrong = "too large a number" if np.isfinite(value) else "not a finite number"
-        raise LogError(
-            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
-        )
+        wrong, right = "not a finite number", "correct it or drop the row"
+        if np.isfinite(value):
+            wrong = "too large a number"
+            likely = likely_unit(sample_rate(table[name])) if name == "time" else None
+            right = right if likely is None else f"time must be in s, and looks like {likely[0]}"
+        raise LogError(f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; {right}")
     return table
 
 
