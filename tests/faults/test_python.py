@@ -183,6 +183,10 @@ WRONG: dict[str, tuple[Call, str]] = {
         "q2 of the motion is -inf at sample 3",
     ),
     "a step of a motion that is none": (lambda x: x.model.predict(x.motion, step=4), "step is 4; it must be"),
+    "a motion of nothing": (
+        lambda x: x.model.predict(x.motion.take(slice(0, 0))),
+        "the motion has no samples",
+    ),
     "two joints": (
         lambda x: x.model.feedforward([0, 0], np.zeros(3), np.zeros(3)),
         "q must be 3 finite numbers",
