@@ -145,10 +145,10 @@ class MotionLog:
         if joints is not None and n != joints:
             raise LogError(f"{name}: the columns are those of {n} joints; the arm has {joints}")
         kinds = [kind for kind in ("q", "v", "tau", "vdot") if f"{kind}1" in header]
-        seconds = _numbers(frame["time"], "time", name)
+        seconds = _numbers(_column(frame, "time", name), "time", name)
         columns: dict[str, NDArray[np.float64]] = {}
         for key in (f"{kind}{j}" for kind in kinds for j in range(1, n + 1)):
-            columns[key] = _numbers(frame[key], key, name)
+            columns[key] = _numbers(_column(frame, key, name), key, name)
             if columns[key].shape != seconds.shape or seconds.ndim != 1:
                 raise LogError(
                     f"{name}: {key} has the shape {columns[key].shape}, time {seconds.shape}; each column must be (N,)"
@@ -344,6 +344,17 @@ def differentiated(time: NDArray[np.float64], q: NDArray[np.float64], name: str)
     return v
 
 
+def _column(frame: Any, key: str, name: str) -> Any:
+    """A column of a data frame; raises `LogError` where the frame does not give it, as a lazy one does not."""
+    try:
+        return frame[key]
+    except (TypeError, KeyError) as error:
+        raise LogError(
+            f"{name}: the {type(frame).__name__} gives no column by its name, {key!r}; give a data frame in memory: of a "
+            "lazy one what its collect() returns"
+        ) from error
+
+
 def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
     """The values as an array of floating-point numbers; raises `LogError` where they are none."""
     try:
@@ -354,7 +365,10 @@ def _numbers(values: Any, label: str, name: str) -> NDArray[np.float64]:
             raise ValueError("some are masked")
         return np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]})") from error
+        right = "give real numbers in SI units, none of them missing"
+        if label == "time":
+            right = "give seconds as numbers, of dates such as (time - time[0]) / numpy.timedelta64(1, 's')"
+        raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]}); {right}") from error
 
 
 def unchecked_log(**values: Any) -> MotionLog:

@@ -51,7 +51,7 @@ def require(kind: str, **given: Any) -> None:
     alone = kind.removesuffix(" or None")
     for name, value in given.items():
         if not (_KINDS[alone](value) or (value is None and alone != kind)):
-            raise InputError(f"{name} must be {kind}; it is {_shown(value)}")
+            raise InputError(f"{name} must be {kind}; it is {shown(value)}")
 
 
 def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one per joint") -> Array:
@@ -65,7 +65,7 @@ def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one p
         fits = False
     if not fits or not np.isfinite(found).all():
         size = " x ".join(map(str, shape))
-        raise InputError(f"{what} must be {size} finite numbers, {each}; it is {_shown(given)}")
+        raise InputError(f"{what} must be {size} finite numbers, {each}; it is {shown(given)}")
     return found.astype(np.float64)
 
 
@@ -81,11 +81,20 @@ def levels_of(given: Any, n: int, what: str) -> Array:
         fits = False
     if not fits or not (np.isfinite(found) & (found >= 0)).all():
         raise InputError(
-            f"{what} must be {n} finite numbers of at least 0, one per joint; it is {_shown(given)}"
+            f"{what} must be {n} finite numbers of at least 0, one per joint; it is {shown(given)}"
         )
     return found.astype(np.float64)
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as a message shows it: itself where it is short, else its type and, of an array, its shape."""
     text = one_line(repr(value))
-    return text if len(text) <= _SHOWN else f"of type {type(value).__name__}"
+    if len(text) <= _SHOWN:
+        return text
+    text = f"of type {type(value).__name__}"
+    shape, kind = getattr(value, "shape", None), getattr(getattr(value, "dtype", None), "kind", "")
+    if isinstance(shape, tuple) and kind:
+        text += f" and shape {shape}"
+        if kind == "f" and not isfinite(value.sum()):
+            text += ", with a number that is not finite"
+    return text
