@@ -8,7 +8,7 @@ from foreign_logs import NAMES, assert_same, motion, refused, rtde
 from armloop.cli import main
 from armloop.convert import read_map
 from armloop.convert.headers import suggest
-from armloop.data.log import MotionLog, read_log
+from armloop.data.log import MotionLog, read_log, write_log
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +106,14 @@ def test_joints_numbered_otherwise_than_from_one_do_not_get_lost(tmp_path, log, 
     assert {kind: list(found.names()) for kind, found in read_map(place).quantities().items()} == names
     assert main(["convert", str(table), "--map", str(place), "--out", str(out)]) == 0
     assert_same(read_log(out, joints=3), log)
+
+
+def test_what_is_not_unsure_needs_no_completing(tmp_path, log, capsys):
+    write_log(tmp_path / "own.csv", log)
+    assert main(["convert", str(tmp_path / "own.csv"), "--suggest", "--map", str(tmp_path / "map.yaml")]) == 0
+    said = capsys.readouterr().out
+    assert "nothing is unsure" in said and "to read the file by it: armloop convert" in said
+    assert "complete it" not in said
 
 
 HEADERS = {

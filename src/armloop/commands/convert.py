@@ -122,9 +122,8 @@ def _suggest(options: Convert, arm: object) -> None:
         print(f"  unsure of {line}")
     if not unsure:
         print("  nothing is unsure; the map is not needed, but shows what will be read")
-    print(
-        f"wrote {place}; complete it, then: armloop convert {recording.path} --map {place} --out LOG.parquet"
-    )
+    step = "complete it, then" if unsure else "to read the file by it"
+    print(f"wrote {place}; {step}: armloop convert {recording.path} --map {place} --out LOG.parquet")
 
 
 def _answer(found: object, out: object) -> dict[str, object]:
