@@ -8,7 +8,7 @@ from foreign_logs import NAMES, assert_same, motion, refused, rtde
 from armloop.cli import main
 from armloop.convert import read_map
 from armloop.convert.headers import suggest
-from armloop.data.log import MotionLog, read_log
+from armloop.data.log import MotionLog, read_log, write_log
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +82,40 @@ def test_suggest_writes_a_map_with_questions_that_must_be_answered(tmp_path, log
     assert_same(read_log(out), log)
 
 
+@pytest.mark.parametrize("numbers", [(0, 1, 2), (1, 2, 4)])
+def test_joints_numbered_otherwise_than_from_one_do_not_get_lost(tmp_path, log, capsys, numbers):
+    names = {kind: [f"{kind}{j}" for j in numbers] for kind in ("q", "v", "tau")}
+    table, place, out = tmp_path / "table.csv", tmp_path / "map.yaml", tmp_path / "log.csv"
+    cells = np.column_stack([log.time, log.q, log.v, log.tau])
+    np.savetxt(
+        table,
+        cells,
+        delimiter=",",
+        header=",".join(["time", *(name for each in names.values() for name in each)]),
+        comments="",
+    )
+    refused(["convert", str(table), "--out", str(out)], capsys)
+    assert not out.exists()
+    assert main(["convert", str(table), "--suggest", "--map", str(place)]) == 0
+    assert "unsure of joints" in capsys.readouterr().out
+    units = {"time": "s", "q": "rad", "v": "rad/s", "tau": "N*m"}
+    text = place.read_text()
+    for unit in units.values():
+        text = text.replace("unit: '?'", f"unit: {unit}", 1)
+    place.write_text(text)
+    assert {kind: list(found.names()) for kind, found in read_map(place).quantities().items()} == names
+    assert main(["convert", str(table), "--map", str(place), "--out", str(out)]) == 0
+    assert_same(read_log(out, joints=3), log)
+
+
+def test_what_is_not_unsure_needs_no_completing(tmp_path, log, capsys):
+    write_log(tmp_path / "own.csv", log)
+    assert main(["convert", str(tmp_path / "own.csv"), "--suggest", "--map", str(tmp_path / "map.yaml")]) == 0
+    said = capsys.readouterr().out
+    assert "nothing is unsure" in said and "to read the file by it: armloop convert" in said
+    assert "complete it" not in said
+
+
 HEADERS = {
     "t,pos0,pos1,vel0,vel1,effort0,effort1": "pos0 pos1 effort0 effort1",
     "time,joint_1_q,joint_2_q,joint_1_dq,joint_2_dq,joint_1_tau,joint_2_tau": "joint_1_q joint_2_q joint_1_tau joint_2_tau",
@@ -110,8 +144,8 @@ BAD_MAPS = {
         "time: {column: t}\nq: {columns: [a], offset: .inf}\ntau: {columns: [b]}",
         "must be a finite number",
     ),
-    "range": ("time: {column: t}\nq: {columns: 'q{1..999999999}'}\ntau: {columns: [b]}", "1 to 24 joints"),
-    "no range": ("time: {column: t}\nq: {columns: 'q{3..1}'}\ntau: {columns: [b]}", "1 to 24 joints"),
+    "range": ("time: {column: t}\nq: {columns: 'q{1..999999999}'}\ntau: {columns: [b]}", "1 to 16 joints"),
+    "no range": ("time: {column: t}\nq: {columns: 'q{3..1}'}\ntau: {columns: [b]}", "1 to 16 joints"),
     "twice": ("time: {column: t}\nq: {columns: [a]}\nq: {columns: [b]}\ntau: {columns: [b]}", "stands twice"),
     "a list": ("- a\n- b", "mapping of fields"),
     "no yaml": ("time: {column: [", "map.yaml"),

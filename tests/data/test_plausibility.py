@@ -145,6 +145,27 @@ def test_lists_are_converted() -> None:
     assert whole.q.dtype == np.float64
 
 
+@pytest.mark.parametrize(
+    ("ticks", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
+)
+def test_times_that_are_no_seconds_are_refused_where_no_v_tells(
+    tmp_path: Path, ticks: float, unit: str
+) -> None:
+    log = good()
+    expected = rf"column time has .* samples a second, as if it were in {unit} \(100 Hz\); time must be in s"
+    with pytest.raises(LogError, match=expected):
+        MotionLog.from_arrays(ticks * log.time, log.q, log.tau, name="run")
+    names = ["time", *(f"{kind}{j}" for kind in ("q", "tau") for j in (1, 2, 3))]
+    table, path = np.column_stack([ticks * log.time, log.q, log.tau]), tmp_path / "run.csv"
+    np.savetxt(path, table, delimiter=",", header=",".join(names), comments="", fmt="%.12g")
+    with pytest.raises(LogError, match=expected):
+        read_log(path)
+    table[:, 0] += 1.75e9 * ticks
+    np.savetxt(path, table, delimiter=",", header=",".join(names), comments="", fmt="%.18g")
+    with pytest.raises(LogError, match=rf"time, row 1 .*too large a number; .* in s, and looks like {unit}"):
+        read_log(path)
+
+
 def test_independent_samples_are_no_motion_and_pass() -> None:
     rng = np.random.default_rng(0)
     q, v = rng.uniform(-2, 2, (400, 3)), rng.uniform(-1, 1, (400, 3))

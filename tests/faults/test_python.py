@@ -14,6 +14,8 @@ from faults.conftest import contents
 
 import armloop as al
 from armloop.data.motion import Motion
+from armloop.drake.plant.exact import exact_model
+from armloop.dynamics import Dynamics
 from armloop.util.errors import InputError
 
 Call = Callable[[SimpleNamespace], Any]
@@ -25,6 +27,16 @@ def with_nan(motion: Motion, name: str, value: float) -> Motion:
     x = getattr(motion, name).copy()
     x[3, 1] = value
     return replace(motion, **{name: x})
+
+
+class Lazy:
+    """A data frame that knows its columns and gives none, as polars' LazyFrame."""
+
+    def __init__(self, columns: dict[str, Any]) -> None:
+        self.columns = list(columns)
+
+    def __getitem__(self, name: str) -> Any:
+        raise TypeError("'LazyFrame' object is not subscriptable (aside from slicing)")
 
 
 #: What was handed in, and what is said of it.
@@ -183,6 +195,52 @@ WRONG: dict[str, tuple[Call, str]] = {
         "q2 of the motion is -inf at sample 3",
     ),
     "a step of a motion that is none": (lambda x: x.model.predict(x.motion, step=4), "step is 4; it must be"),
+    "a motion of nothing": (
+        lambda x: x.model.predict(x.motion.take(slice(0, 0))),
+        "the motion has no samples",
+    ),
+    "motions at once": (
+        lambda x: x.model.feedforward(*np.zeros((3, 40, 3))),
+        r"q must be 3 finite numbers, one per joint; it is of type ndarray and shape \(40, 3\)",
+    ),
+    "a frame in place of a log": (
+        lambda x: x.model.score(Lazy(x.frame)),
+        r"a log must be a MotionLog, .* of a data frame, MotionLog\.from_frame; this is of type Lazy",
+    ),
+    "columns in place of a log": (lambda x: x.model.score(x.frame), r"from_frame; this is of type dict"),
+    "a lazy frame": (
+        lambda x: al.MotionLog.from_frame(Lazy(x.frame)),
+        r"the Lazy gives no column by its name, 'time'; .* its collect\(\) returns",
+    ),
+    "dates in place of seconds": (
+        lambda x: al.MotionLog.from_arrays(x.dates, x.run.q, x.run.tau),
+        r"time is no array of numbers \(it holds datetime64\[ns\]\); give seconds as numbers, of dates such as",
+    ),
+    "dates of Python": (
+        lambda x: al.MotionLog.from_arrays(x.dates.astype("M8[us]").astype(object), x.run.q, x.run.tau),
+        r"time is no array of numbers \(it holds object\); give seconds as numbers",
+    ),
+    "torques as objects": (
+        lambda x: al.MotionLog.from_arrays(x.run.time, x.run.q, x.run.tau.astype(object)),
+        r"tau is no array of numbers \(it holds object\); give real numbers in SI units",
+    ),
+    "a posture of two joints": (
+        lambda x: Dynamics(x.model).mass_matrix([0, 0]),
+        r"vectors must all be \(3,\) or \(N, 3\); they are \(2,\)",
+    ),
+    "a posture that is nowhere": (
+        lambda x: Dynamics(x.model).gravity([0.0, np.nan, 0.0]),
+        r"vectors must be of finite numbers; one is \[0\.0, nan, 0\.0\]",
+    ),
+    "a posture in text": (lambda x: Dynamics(x.model).friction("abc"), "of finite numbers; one is 'abc'"),
+    "complex postures": (
+        lambda x: Dynamics(x.model).torque(*np.zeros((3, 40, 3), complex)),
+        r"of finite numbers; one is of type ndarray and shape \(40, 3\)",
+    ),
+    "friction of no joint": (
+        lambda x: exact_model(x.model.arm, []),
+        "friction is given for 0 joints; three_axis has 3",
+    ),
     "two joints": (
         lambda x: x.model.feedforward([0, 0], np.zeros(3), np.zeros(3)),
         "q must be 3 finite numbers",
@@ -225,7 +283,10 @@ def given(place: Path) -> SimpleNamespace:
         f"{kind}{j + 1}": getattr(run, kind)[:, j] for kind in ("q", "v", "tau") for j in range(3)
     }
     motion = Motion(run.time, run.q, run.v, 0 * run.q, np.array([0]))
-    return SimpleNamespace(run=run, model=al.load_model("model.json"), frame=frame, motion=motion)
+    dates = np.datetime64("2030-01-01", "ns") + (1e9 * run.time).astype("m8[ns]")
+    return SimpleNamespace(
+        run=run, model=al.load_model("model.json"), frame=frame, motion=motion, dates=dates
+    )
 
 
 @pytest.mark.parametrize("name", WRONG)

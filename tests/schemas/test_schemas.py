@@ -9,6 +9,7 @@ from msgspec import Meta, Struct
 
 from armloop.schemas.checking import Misfit, checked
 from armloop.schemas.published import FILES, schemas
+from armloop.schemas.types import MOST_JOINTS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -18,6 +19,13 @@ def test_the_published_schemas_are_current() -> None:
     assert found == schemas()
     for name in found:
         assert name in (DOCS / "files.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("page", "words"), [("limits.md", "at most {}."), ("files.md", "an arm at most {} joints")]
+)
+def test_the_pages_say_how_many_joints_an_arm_may_have(page: str, words: str) -> None:
+    assert words.format(MOST_JOINTS) in (DOCS / page).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", FILES)

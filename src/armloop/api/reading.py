@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -90,11 +90,14 @@ def require_some(logs: Sequence[MotionLog]) -> None:
 
 def as_logs(logs: MotionLog | Sequence[MotionLog]) -> list[MotionLog]:
     """One log or several, as a list; raises ``InputError`` for what is none."""
-    several = [logs] if isinstance(logs, MotionLog | str) or not isinstance(logs, Iterable) else list(logs)
+    # a data frame and a dict are one of their kind, although they give the names of their columns one by one
+    alone = isinstance(logs, MotionLog | str | Mapping) or hasattr(logs, "columns")
+    several: list[Any] = [logs] if alone or not isinstance(logs, Iterable) else list(logs)
     for log in several:
         if not isinstance(log, MotionLog):
             raise InputError(
-                f"a log must be a MotionLog, such as of armloop.read_log; this is of type {type(log).__name__}"
+                "a log must be a MotionLog, such as of armloop.read_log or, of a data frame, MotionLog.from_frame; this is "
+                f"of type {type(log).__name__}"
             )
     return several
 

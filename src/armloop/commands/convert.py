@@ -136,9 +136,8 @@ def _suggest(options: Convert, arm: Arm | None) -> None:
         print(f"  unsure of {line}")
     if not unsure:
         print("  nothing is unsure; the map is not needed, but shows what will be read")
-    print(
-        f"wrote {place}; complete it, then: armloop convert {recording.path} --map {place} --out LOG.parquet"
-    )
+    step = "complete it, then" if unsure else "to read the file by it"
+    print(f"wrote {place}; {step}: armloop convert {recording.path} --map {place} --out LOG.parquet")
 
 
 def _tell(found: Converted, out: Path, arm: Arm | None) -> None:

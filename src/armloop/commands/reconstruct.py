@@ -84,6 +84,7 @@ def run(options: Reconstruct) -> None:
     )
     from armloop.data.pieces import IN_MEMORY, first_samples, log_sources
     from armloop.data.signals import Conditioning
+    from armloop.identification.goodness import unjudged
     from armloop.identification.reconstruction import Options
     from armloop.identification.reconstruction import reconstruct as run
     from armloop.regression.sparse import Sparse
@@ -157,7 +158,7 @@ def run(options: Reconstruct) -> None:
         print(NOTE, end="\n\n")
     print(score_table(result.held_out, arm, "Prediction error on held-out blocks"), end="\n\n")
     print(parts_table(result.parts, arm))
-    for note in result.notes:
+    for note in [*unjudged(result.parts), *result.notes]:
         print(f"note: {note}")
     print(f"model written to {options.out}")
 

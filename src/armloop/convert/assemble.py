@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,11 +14,11 @@ from armloop.convert.joints import doubtful_order, match
 from armloop.convert.mapping import UNSAID, Mapping, QuantityMap, per_joint
 from armloop.convert.recording import Array, Recording, some
 from armloop.convert.units import CURRENTS, FACTORS, RATES, canonical, time_unit
+from armloop.data.header import JOINT_COLUMN
 from armloop.data.log import FEWEST_SAMPLES, GAP_PERIODS, MotionLog, unchecked_log
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
-_OWN = re.compile(r"(q|v|tau|vdot)\d{1,3}|time")
 # A run that follows another starts so many sample periods later: clearly a gap.
 _GAP = 4 * GAP_PERIODS
 
@@ -86,7 +85,9 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
         if name not in recording.columns:
             raise LogError(f"{where}: no column {name} to keep; there are: {some(recording.columns, 12)}")
         if name not in used:
-            extra[f"source.{name}" if _OWN.fullmatch(name) else name] = recording.columns[name][keep]
+            extra[f"source.{name}" if name == "time" or JOINT_COLUMN.fullmatch(name) else name] = (
+                recording.columns[name][keep]
+            )
     if len(keep) < N:
         notes.append(f"{N - len(keep)} of {N} {recording.rows}s repeat the time of the last; left out")
     joints = mapping.joints or [str(j + 1) for j in range(n)]

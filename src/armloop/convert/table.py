@@ -8,6 +8,7 @@ from armloop.convert.headers import suggest
 from armloop.convert.mapping import Mapping, QuantityMap, TimeMap
 from armloop.convert.recording import Array, Recording
 from armloop.convert.text import TextTable, clock_seconds, numbers_of, read_text
+from armloop.data.header import JOINT_COLUMN
 from armloop.data.tables import PARQUET, is_number, kind_of
 from armloop.util.errors import LogError
 
@@ -32,9 +33,12 @@ def read_table(path: Path) -> Recording:
 
 def _own(columns: dict[str, Array]) -> Mapping | None:
     """The map of a table that is a motion log already: its units are SI by definition, except of tau (A or N·m)."""
-    n = next(k for k in range(100) if f"q{k + 1}" not in columns)
+    joints = {name for name in columns if JOINT_COLUMN.fullmatch(name)}
+    n = sum(name.startswith("q") for name in joints)
     names = {kind: [f"{kind}{j}" for j in range(1, n + 1)] for kind in ("q", "v", "tau", "vdot")}
-    if n == 0 or "time" not in columns or not all(c in columns for kind in ("v", "tau") for c in names[kind]):
+    needed = {"time", *names["q"], *names["v"], *names["tau"]}
+    # a number beyond 1..n, zero too, is of a table that counts otherwise: none of its joints may get lost
+    if n == 0 or not needed <= columns.keys() or not joints <= needed.union(names["vdot"]):
         return None
     vdot = QuantityMap(names["vdot"], "rad/s^2") if all(c in columns for c in names["vdot"]) else None
     return Mapping(

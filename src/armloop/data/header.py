@@ -9,7 +9,8 @@ from pathlib import Path
 from armloop.data.tables import read_header
 from armloop.util.errors import LogError
 
-_JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
+#: A column of a joint: what it holds, and the number.
+JOINT_COLUMN = re.compile(r"(q|v|tau|vdot)(\d{1,3})")
 
 
 def check_header(path: Path, joints: int | None = None) -> dict[str, list[str]]:
@@ -37,7 +38,7 @@ def columns_of(path: Path, header: Sequence[str], joints: int | None = None) -> 
         )
     found: dict[str, set[int]] = {"q": set(), "v": set(), "tau": set(), "vdot": set()}
     for name in header:
-        match = _JOINT_COLUMN.fullmatch(name)
+        match = JOINT_COLUMN.fullmatch(name)
         if match is None and name != "time":
             continue
         if header.count(name) > 1:

@@ -136,10 +136,10 @@ class MotionLog:
                 "time,q1..,v1..,tau1.., or arrays to MotionLog.from_arrays"
             )
         kinds = columns_of(Path(name), [str(column) for column in names], joints)
-        seconds = _numbers(frame["time"], "time", name)
+        seconds = _numbers(_column(frame, "time", name), "time", name)
         columns: dict[str, Array] = {}
         for key in chain(*kinds.values()):
-            columns[key] = _numbers(frame[key], key, name)
+            columns[key] = _numbers(_column(frame, key, name), key, name)
             if columns[key].shape != seconds.shape or seconds.ndim != 1:
                 raise LogError(
                     f"{name}: {key} has the shape {columns[key].shape}, time {seconds.shape}; each column must be (N,)"
@@ -335,6 +335,17 @@ def _check_shapes(time: Array, q: Array, name: str) -> None:
         raise LogError(f"{name}: time must be (N,) and q (N, n); they are {time.shape} and {q.shape}")
 
 
+def _column(frame: Any, key: str, name: str) -> Any:
+    """A column of a data frame; raises `LogError` where the frame does not give it, as a lazy one does not."""
+    try:
+        return frame[key]
+    except (TypeError, KeyError) as error:
+        raise LogError(
+            f"{name}: the {type(frame).__name__} gives no column by its name, {key!r}; give a data frame in memory: of a "
+            "lazy one what its collect() returns"
+        ) from error
+
+
 def _numbers(values: Any, label: str, name: str) -> Array:
     """The values as an array of floating-point numbers; raises `LogError` where they are none."""
     try:
@@ -345,7 +356,10 @@ def _numbers(values: Any, label: str, name: str) -> Array:
             raise ValueError("some are masked")
         return np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]})") from error
+        right = "give real numbers in SI units, none of them missing"
+        if label == "time":
+            right = "give seconds as numbers, of dates such as (time - time[0]) / numpy.timedelta64(1, 's')"
+        raise LogError(f"{name}: {label} is no array of numbers ({str(error)[:80]}); {right}") from error
 
 
 def unchecked_log(**values: Any) -> MotionLog:

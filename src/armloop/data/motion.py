@@ -37,9 +37,13 @@ class Motion:
     begins: Array | None = None
 
     def __post_init__(self) -> None:
-        for key in ("time", "q", "v", "vdot", "starts"):
-            if not isinstance(getattr(self, key), np.ndarray):
-                object.__setattr__(self, key, _as_array(getattr(self, key), key))
+        for key in ("time", "q", "v", "vdot", "begins"):
+            given = getattr(self, key)
+            if type(given) is not np.ndarray or given.dtype != np.float64:
+                if key != "begins" or given is not None:
+                    object.__setattr__(self, key, _as_array(given, key, "fiu", np.float64))
+        if type(self.starts) is not np.ndarray or self.starts.dtype != np.intp:
+            object.__setattr__(self, "starts", _as_array(self.starts, "starts", "iu", np.intp))
         if self.time.ndim != 1 or self.q.ndim != 2 or len(self.q) != len(self.time):
             raise InputError(f"time must be (N,) and q (N, n); they are {self.time.shape} and {self.q.shape}")
         if self.v.shape != self.q.shape or self.vdot.shape != self.q.shape:
@@ -49,6 +53,12 @@ class Motion:
             )
         if self.starts.ndim != 1 or len(self.starts) == 0 or self.starts[0] != 0:
             raise InputError("starts must begin with 0, the first sample of the first run")
+        if len(self.starts) > 1:
+            last = int(self.starts[-1])
+            if last >= self.samples or (self.starts[1:] <= self.starts[:-1]).any():
+                raise InputError(
+                    f"starts must rise, each the index of one of the {self.samples} samples; the last is {last}"
+                )
         if self.begins is not None and self.begins.shape != self.starts.shape:
             raise InputError(
                 f"begins must have the shape of starts, {self.starts.shape}; it is {self.begins.shape}"
@@ -113,17 +123,19 @@ class Motion:
         return [slice(int(first), int(last)) for first, last in zip(self.starts, ends, strict=True)]
 
 
-def _as_array(given: Any, name: str) -> NDArray[Any]:
-    """What is no array yet as one; raises `InputError` where it holds no numbers."""
+def _as_array(given: Any, name: str, kinds: str, dtype: type) -> NDArray[Any]:
+    """What is no array of a type yet as one; raises `InputError` where it holds no numbers of these kinds of numpy's."""
     try:
         found = np.asarray(given)
     except ValueError:
         found = np.asarray(None)
-    if found.dtype.kind not in "fiu":
+    if found.dtype.kind not in kinds:
+        numbers = "numbers" if "f" in kinds else "whole numbers"
         raise InputError(
-            f"{name} of a motion must be an array of numbers; it is of type {type(given).__name__}"
+            f"{name} of a motion must be an array of {numbers}; it is of type {type(given).__name__}"
+            + (f" and holds {found.dtype}" if isinstance(given, np.ndarray) else "")
         )
-    return found
+    return found.astype(dtype)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from armloop.data.clock import LEAST_RATE, likely_unit, sample_rate
 from armloop.data.dropouts import dropouts
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import (
@@ -46,6 +47,8 @@ def faults(log: Recorded) -> Iterator[Finding]:
     windows = None if log.derived else windows_of(log)
     if windows is not None:
         yield from scale(windows)
+    yield from _clock(log)
+    if windows is not None:
         yield from dead_columns(log, windows)
         yield from frozen(log, windows.path)
     yield from _jumps(log)
@@ -63,8 +66,7 @@ def doubts(log: Recorded) -> Iterator[Finding]:
         yield Finding("columns v", "are missing; v is the derivative of q")
     else:
         yield from disagreements(log)
-    steps = np.diff(log.time)
-    rate = 1 / float(np.median(steps))
+    rate = sample_rate(log.time)
     if rate < 50.0:
         yield Finding(
             "column time",
@@ -141,6 +143,18 @@ def _degrees(log: Recorded) -> Iterator[Finding]:
                 f"reach {farthest:.3g} and {fastest:.3g}, more than any arm's joint in rad (m) and rad/s (m/s); "
                 "convert degrees (mm) to SI units",
             )
+
+
+def _clock(log: Recorded) -> Iterator[Finding]:
+    """Times that are no seconds, or samples too few to be a motion."""
+    rate = sample_rate(log.time)
+    if (likely := likely_unit(rate)) is not None:
+        unit, in_unit = likely
+        yield Finding(
+            "column time",
+            f"has {rate:.3g} samples a second, as if it were in {unit} ({in_unit:.4g} Hz); time must be in s, and the "
+            f"motion of an arm takes {LEAST_RATE:g} samples a second or more",
+        )
 
 
 def _jumps(log: Recorded) -> Iterator[Finding]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armloop.data.clock import likely_unit, sample_rate
 from armloop.data.csv_rows import index_rows
 from armloop.util.arrays import Array
 from armloop.util.errors import LogError
@@ -94,10 +95,12 @@ def read_columns(path: Path, names: Sequence[str], rows: tuple[int, int] | None 
         if kind_of(path) == CSV:
             _, cells = next(islice(_csv_rows(path), row + 1, None))
             cell = cells[read_header(path).index(name)]
-        wrong = "too large a number" if np.isfinite(value) else "not a finite number"
-        raise LogError(
-            f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; correct it or drop the row"
-        )
+        wrong, right = "not a finite number", "correct it or drop the row"
+        if np.isfinite(value):
+            wrong = "too large a number"
+            likely = likely_unit(sample_rate(table[name])) if name == "time" else None
+            right = right if likely is None else f"time must be in s, and looks like {likely[0]}"
+        raise LogError(f"{path}: column {name}, {place(path, row)}: {cell!r} is {wrong}; {right}")
     return table
 
 

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from armloop.dynamics.model import ModelEquations
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
-from armloop.util.errors import ModelError
+from armloop.util.errors import InputError, ModelError
 from armloop.util.functions import MATH, NUMPY
+from armloop.util.given import shown
 
 _POSTURES = 2000
 
@@ -21,7 +22,8 @@ class Dynamics:
     """The equations of motion tau = M(q) vdot + bias(q, v) + gravity(q) + friction(v) of a model.
 
     Every method takes vectors (n,) of one sample or (N, n) of many, and answers in kind. What belongs to which
-    part, and what is left out, is said at :class:`ModelEquations`.
+    part, and what is left out, is said at :class:`ModelEquations`. What is no such vector of finite numbers is an
+    ``InputError``.
     """
 
     def __init__(self, model: ReconstructedModel, *, symmetric: bool = False) -> None:
@@ -49,7 +51,7 @@ class Dynamics:
 
     def friction(self, v: ArrayLike, load: ArrayLike | None = None, q: ArrayLike | None = None) -> Array:
         """Friction at velocities v, 0 at rest; ``load`` and ``q`` for friction that changes with them (0 by default)."""
-        nothing = np.zeros_like(np.asarray(v, dtype=float))
+        nothing = np.zeros_like(_numbers(v))
         return self._answer(
             lambda e, x, y, z: e.friction(x, y, q=z),
             v,
@@ -68,15 +70,27 @@ class Dynamics:
         return self._answer(lambda e, x, y, z: e.acceleration(x, y, z), q, v, tau)
 
     def _answer(self, law: Callable[..., Any], *arguments: ArrayLike) -> Array:
-        arrays = [np.asarray(x, dtype=float) for x in arguments]
+        arrays = [_numbers(x) for x in arguments]
         shape = arrays[0].shape
         if shape[-1:] != (self.n,) or len(shape) not in (1, 2) or any(x.shape != shape for x in arrays):
             shapes = ", ".join(str(x.shape) for x in arrays)
-            raise ValueError(f"vectors must all be ({self.n},) or (N, {self.n}); they are {shapes}")
+            raise InputError(f"vectors must all be ({self.n},) or (N, {self.n}); they are {shapes}")
         if len(shape) == 1:
             return np.array(law(self._one, *(x.tolist() for x in arrays)), dtype=float)
         found = law(self._many, *([x[:, j] for j in range(self.n)] for x in arrays))
         return _stack(found, shape[0])
+
+
+def _numbers(given: ArrayLike) -> Array:
+    """What was given as an array of finite numbers; raises ``InputError`` where it is none."""
+    try:
+        found = np.asarray(given)
+        fits = found.dtype.kind in "fiu"
+    except ValueError:  # rows of several lengths
+        fits = False
+    if not fits or not np.isfinite(found).all():
+        raise InputError(f"vectors must be of finite numbers; one is {shown(given)}")
+    return found.astype(np.float64, copy=False)
 
 
 def _stack(values: Sequence[Any], N: int) -> Array:

@@ -324,6 +324,8 @@ class ReconstructedModel:
             raise ModelError(
                 f"the model is of an arm with {self.arm.n} joints, the motion has {motion.joints}"
             )
+        if motion.samples == 0:
+            raise ModelError("the motion has no samples; give one at least")
         for name in ("q", "v", "vdot"):
             x = getattr(motion, name)
             if not math.isfinite(x.sum()) and not np.isfinite(x).all():

@@ -12,6 +12,7 @@ from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.regimes import Clusters, sort_samples
 from armloop.data.signals import as_torque, preprocess
+from armloop.identification.goodness import unjudged
 from armloop.identification.reconstruction import Reconstruction
 from armloop.reports.coefficients import NOTE, coefficients_table, stribeck_table
 from armloop.reports.html import Card, Picture, Report, Section, render
@@ -103,7 +104,7 @@ def reconstruction_sections(
     if has_trials(reconstruction.reports):
         trials = orders_figure(reconstruction.reports, reference.reports if reference else ())
         pictures.append(Picture(trials, say["orders"]))
-    notes = list(reconstruction.notes)
+    notes = [*unjudged(reconstruction.parts), *reconstruction.notes]
     if ladder := history.get("friction_ladder"):
         # the notes say the same in a line each, for the terminal
         notes = [

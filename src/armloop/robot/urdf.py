@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from armloop.robot.urdf_checks import MOVING, check_joint, check_link, three
+from armloop.schemas.types import MOST_JOINTS
 from armloop.util.arrays import Array
 from armloop.util.doubts import warn
 from armloop.util.errors import ArmError
 
 Element = ElementTree.Element
 
-MOST_JOINTS = 16
-"""Moving joints that an arm may have."""
 _MOST_BYTES, _MOST_ELEMENTS, _LONGEST_NAME = 8_000_000, 2_000, 128
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

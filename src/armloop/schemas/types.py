@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 #: Joints of an arm, candidate functions of a model: more than any arm has, few enough to be computed with.
-MOST_JOINTS, MOST_TERMS = 24, 200_000
+MOST_JOINTS, MOST_TERMS = 16, 200_000
 
 #: A finite number. In SI units nothing of an arm is as large, and products of what is smaller do not overflow.
 #: No link of an arm or a crane is heavier, kg, and no part of it farther away, m.

@@ -51,7 +51,7 @@ def require(kind: str, **given: Any) -> None:
     alone = kind.removesuffix(" or None")
     for name, value in given.items():
         if not (_KINDS[alone](value) or (value is None and alone != kind)):
-            raise InputError(f"{name} must be {kind}; it is {_shown(value)}")
+            raise InputError(f"{name} must be {kind}; it is {shown(value)}")
 
 
 def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one per joint") -> Array:
@@ -61,7 +61,7 @@ def numbers_of(given: Any, shape: tuple[int, ...], what: str, each: str = "one p
     found = _array(given)
     if found.shape != shape or not np.isfinite(found).all():
         size = " x ".join(map(str, shape))
-        raise InputError(f"{what} must be {size} finite numbers, {each}; it is {_shown(given)}")
+        raise InputError(f"{what} must be {size} finite numbers, {each}; it is {shown(given)}")
     return found
 
 
@@ -73,7 +73,7 @@ def levels_of(given: Any, n: int, what: str) -> Array:
     found = found if found.ndim else np.full(n, found)
     if found.shape != (n,) or not (np.isfinite(found) & (found >= 0)).all():
         raise InputError(
-            f"{what} must be {n} finite numbers of at least 0, one per joint; it is {_shown(given)}"
+            f"{what} must be {n} finite numbers of at least 0, one per joint; it is {shown(given)}"
         )
     return found
 
@@ -89,6 +89,15 @@ def _array(given: Any) -> Array:
     return found.astype(np.float64) if found.dtype.kind in "fiu" else np.array(np.nan)
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """A value as a message shows it: itself where it is short, else its type and, of an array, its shape."""
     text = one_line(repr(value))
-    return text if len(text) <= _SHOWN else f"of type {type(value).__name__}"
+    if len(text) <= _SHOWN:
+        return text
+    text = f"of type {type(value).__name__}"
+    shape, kind = getattr(value, "shape", None), getattr(getattr(value, "dtype", None), "kind", "")
+    if isinstance(shape, tuple) and kind:
+        text += f" and shape {shape}"
+        if kind == "f" and not isfinite(value.sum()):
+            text += ", with a number that is not finite"
+    return text

@@ -1,6 +1,7 @@
 """A reconstruction says how good it is, and a model that lacks a law says that first."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,11 @@ from synthetic import fourier_motion, friction, measured, rigid_torque, three_ax
 from armloop.cli import main
 from armloop.data.log import MotionLog, write_log
 from armloop.data.pieces import log_sources
+from armloop.identification.goodness import Parts, unjudged
 from armloop.identification.reconstruction import Options, reconstruct
 from armloop.model import load_model
 from armloop.regression.sparse import Sparse
+from armloop.reports.reconstruction_report import reconstruction_sections
 
 PLAIN = Options(standard_errors=False)
 
@@ -36,6 +39,15 @@ def test_a_good_model_leaves_noise() -> None:
     answer = made.to_dict()["joints"]
     assert [entry["joint"] for entry in answer] == [1, 2, 3]
     assert made.model.baseline["joints"] == answer
+
+
+def test_joints_that_are_not_judged_are_said_to_be_with_the_reason() -> None:
+    assert unjudged([Parts(1, 0.9, 0.0, 0.1)]) == []
+    (note,) = unjudged([Parts(1), Parts(2, 0.9, 0.0, 0.1), Parts(3)])
+    assert note.startswith("joints 1, 3: ") and "fewer than 200 samples" in note
+    made = reconstruct([log(1)], three_axis(), library="rigid-body", options=PLAIN)
+    (section,) = reconstruction_sections(replace(made, parts=[Parts(1), *made.parts[1:]]))
+    assert section.notes[0].startswith("joint 1: the torque's energy is not parted")
 
 
 def test_a_model_that_lacks_a_law_says_so_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -368,12 +368,13 @@ class TestPieces:
             logs: Any = [SimpleNamespace(samples=each)] * 10
             assert bandwidth._selected(logs) == picked
         q = 0.01 * np.arange(100.0)[:, None]
-        time = np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0)
-        log = MotionLog(time, q, np.full_like(q, 0.01), q)
+        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0))
+        log = MotionLog(time, q, np.ones_like(q), q)
         assert len(log.runs()) == 2
         (one,) = bandwidth.even_selection([log])
         assert one.q.tolist() == q[30:90].tolist()
-        early = MotionLog(np.arange(100.0) + np.where(np.arange(100) >= 70, 50.0, 0.0), q, log.v, q)
+        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 70, 50.0, 0.0))
+        early = MotionLog(time, q, log.v, q)
         assert bandwidth.even_selection([early])[0].q.tolist() == q[:60].tolist()
         several = bandwidth.even_selection([log] * 3)
         assert [len(part.q) for part in several] == [60 // len(several)] * len(several)

@@ -1,5 +1,6 @@
 """From logs to a scored model: what is not clean is said, what does not fit is refused."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from armloop.identification.reconstruction.reconstruct import default_library
 from armloop.identification.reconstruction.rigid_body import rigid_body
 from armloop.identification.reconstruction.shared import SHARED_CONDITIONING, slowest_sliding
 from armloop.identification.scoring import score
-from armloop.util.errors import InputError, LogError
+from armloop.util.errors import ExcitationError, InputError, LogError
 
 
 def held_out_rows(samples, options):
@@ -155,3 +156,17 @@ def test_the_library_follows_the_number_of_joints():
     assert default_library(arm) == "double-feature-set"
     five = replace(arm, joints=(*arm.joints, *arm.joints[:2]))
     assert default_library(five) == "rigid-body"
+
+
+def test_singular_equations_are_the_logs_fault(monkeypatch: pytest.MonkeyPatch):
+    def singular(*_: object) -> None:
+        np.linalg.solve(np.zeros((2, 2)), np.ones(2))
+
+    module = sys.modules[
+        "armloop.identification.reconstruction.reconstruct"
+    ]  # the package has a function of that name
+    monkeypatch.setattr(module, "check_recorded", singular)
+    with pytest.raises(
+        ExcitationError, match=r"Singular matrix.*do not determine the model; .* record a motion"
+    ):
+        reconstruct([a_run(1)], three_axis(), library="rigid-body")

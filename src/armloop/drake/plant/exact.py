@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from armloop.drake.given import require_of
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.friction import JointFriction
 from armloop.laws.effects import Estimate
@@ -14,6 +15,7 @@ from armloop.model import AddedEffect, ReconstructedModel
 from armloop.model.components import RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 
 def exact_model(arm: Arm, friction: Sequence[JointFriction], effects: Effects = ()) -> ReconstructedModel:
@@ -21,7 +23,14 @@ def exact_model(arm: Arm, friction: Sequence[JointFriction], effects: Effects = 
 
     No reconstruction can do better: a reference for what is left to gain, not a controller one could have. Of a
     payload only the mass and its place are known, not the ball's own inertia (2/5 m r^2).
+
+    friction : one `JointFriction` per joint
+
+    Raises `InputError` for friction of another number of joints.
     """
+    require_of(Arm, arm=arm)
+    if len(friction) != arm.n:
+        raise InputError(f"friction is given for {len(friction)} joints; {arm.name} has {arm.n}")
     laws = tuple(
         tuple(
             term

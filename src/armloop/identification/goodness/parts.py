@@ -7,6 +7,7 @@ upper bound for the noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -78,6 +79,17 @@ class Parts:
             f"joint {self.joint}: the model leaves {np.sqrt(rest):.0%} of the torque ({rest:.1%} of its energy), {share} of "
             f"it predictable from the motion: a law is missing"
         )
+
+
+def unjudged(parts: Sequence[Parts]) -> list[str]:
+    """A note on the joints whose torque was not parted, and why; none where all were."""
+    joints = [str(one.joint) for one in parts if one.explained is None]
+    if not joints:
+        return []
+    return [
+        f"joint{'s' if len(joints) > 1 else ''} {', '.join(joints)}: the torque's energy is not parted, for fewer than "
+        f"{_FEWEST} samples of the moving joint ({_FEWEST // 5} that no fit has seen) can be judged; log more of its motion"
+    ]
 
 
 def parts_of(witness: Witness, progress: Progress = silent) -> list[Parts]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from armloop.data.motion import Samples
@@ -10,6 +13,18 @@ from armloop.util.errors import ExcitationError
 
 #: Torques that stay below are none, N·m (N): a watch's are a hundred times as large.
 NOTHING = 1e-8
+
+
+@contextmanager
+def determined() -> Iterator[None]:
+    """Raise ``ExcitationError`` where equations of a fit turn out to be singular beyond what the checks foresee."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise ExcitationError(
+            f"the fit's equations have no single solution ({error}): the logs do not determine the model; check their "
+            "units, and record a motion of all joints together through more of their range (armloop excite makes one)"
+        ) from error
 
 
 def check_recorded(arm: Arm, samples: Samples) -> None:

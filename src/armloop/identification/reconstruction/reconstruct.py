@@ -22,7 +22,7 @@ from armloop.identification.reconstruction.bandwidth import (
 from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks, independent_blocks
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.encoder_zeros import encoder_zeros
-from armloop.identification.reconstruction.excitation import check_recorded
+from armloop.identification.reconstruction.excitation import check_recorded, determined
 from armloop.identification.reconstruction.fitted import uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
 from armloop.identification.reconstruction.held_out import held_out_intervals
@@ -107,6 +107,7 @@ def default_conditioning(library: str) -> Conditioning:
     return named(library).conditioning
 
 
+@determined()
 @one_thread
 def reconstruct(
     logs: Sequence[LogSource],
