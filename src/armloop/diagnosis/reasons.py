@@ -11,7 +11,8 @@ import numpy as np
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
 from armloop.diagnosis.judgement import MULTIPLE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
-from armloop.model import ReconstructedModel
+from armloop.laws.effects.base import number
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Mask
 
 #: A model that leaves this part of a joint's torque, RMS, most of it predictable, judges nothing there.
@@ -100,6 +101,15 @@ def in_doubt(label: str, share: float) -> str:
     return (
         f"{label} would remove {share:.0%} of what can be explained, but more is left there that nothing accounts for: it "
         "may be of the same origin, and is not stated"
+    )
+
+
+def event_in_doubt(event: AddedEffect) -> str:
+    """A sentence on an event that removes no more than what nothing accounts for at other times."""
+    start, end = (number(event.parameters[key].value) for key in ("start", "end"))
+    return (
+        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but as much is left there "
+        "at other times that nothing accounts for: it may be of the same origin, and is not stated"
     )
 
 
