@@ -206,6 +206,26 @@ def test_a_start_of_too_few_samples_explains_nothing(
     assert find_carried(judged) is None
 
 
+def test_a_load_at_the_cost_of_other_joints_is_none(
+    model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However much it removes of all joints together."""
+    whole = evidence(model, run(1, TIMES))
+    account = best_account(whole, [], True, silent)
+    asked: list[Any] = []
+
+    def leaves_more(loaded: Any, plain: Any, least: np.ndarray) -> bool:
+        asked.append((loaded, plain, least))
+        return True
+
+    assert account_with_load(whole, account, silent, 1) is not None
+    monkeypatch.setattr(carrying, "leaves_more", leaves_more)
+    assert account_with_load(whole, account, silent, 1) is None
+    ((loaded, plain, least),) = asked
+    np.testing.assert_array_equal(loaded.rows, plain.rows)
+    assert loaded.error < plain.error / 4 and (least >= 0.4 * plain.rows).all()
+
+
 def test_the_account_with_a_load_is_one_of_the_model_as_it_is(model: ReconstructedModel) -> None:
     """What remains of it is what the model leaves with the load once, not twice."""
     whole = evidence(model, run(1, TIMES))

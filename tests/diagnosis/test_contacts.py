@@ -57,6 +57,43 @@ def test_samples_of_events_that_are_known_and_of_new_ones_do_not_count() -> None
     assert np.flatnonzero(~kept[0][:, 1]).tolist() == [0, *gone]
 
 
+def test_an_event_of_no_more_than_what_nothing_accounts_for_at_other_times_is_drowned() -> None:
+    """A second of ten samples removes 9 of a joint's baselines, as energy; the same is left once in the second run."""
+    given = motion((100, 50), 2)
+    left, rows = np.full((150, 2), 4.4), np.ones((150, 2), dtype=bool)
+    rows[20:32] = False
+    left[20:32] = 99.0  # of the event
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(motion=given),
+        independent=np.arange(150),
+        rows=rows,
+        scale=np.array([2.0, 2.0]),
+        left_by=lambda model: left * model,
+    )
+    inside = np.arange(150)
+    contact: Any = SimpleNamespace(
+        added=event(2.15, 3.15),
+        rows=(inside >= 18) & (inside < 35),
+        before=np.array([7.0, 0.0]),
+        after=np.array([np.sqrt(13.0), 1.0]),
+    )
+    is_drowned, model = contacts.drowned, 1.0
+    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    left[110:120] = 2 * np.sqrt(10.1)
+    assert is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    # another joint's is none, nor what is accounted for, nor less than twice the baseline
+    assert not is_drowned(evidence, model, contact, [1])  # type: ignore[arg-type]
+    assert not is_drowned(evidence, 0.85, contact, [0, 1])  # type: ignore[arg-type]
+    left[:110] = left[120:] = 3.5
+    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    # as long as the event, in one run, and beyond the baseline
+    left[:110], left[120:] = 4.4, 4.4
+    left[110] = 3.0
+    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+    left[110:120], left[95:105] = 4.4, 2 * np.sqrt(10.1)
+    assert not is_drowned(evidence, model, contact, [0, 1])  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("start", "end", "whole"),
     [(0.11, 9.79, True), (0.09, 9.79, False), (0.11, 9.81, False)],

@@ -56,7 +56,7 @@ class TestJudgement:
     def test_what_the_best_removes_soaks_up_a_part(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(judgement, "lead", lambda *scores: np.inf)
         monkeypatch.setattr(judgement, "gain", lambda current, trial: 1.0)
-        current, best = (SimpleNamespace(energy=np.array([x])) for x in (100.0, 10.0))
+        current, best = (SimpleNamespace(energy=np.array([x]), rows=np.zeros(1)) for x in (100.0, 10.0))
         for removed, behind in ((100.0, True), (89.0, False)):
             energy = best.energy + judgement.NEARLY * removed
             trial: Any = SimpleNamespace(energy=energy, rows=np.zeros(1))

@@ -79,6 +79,7 @@ class Answers:
             "judge_reversals": self.reversals,
             "account_with_load": self.loaded,
             "outweighed": lambda *_: None,
+            "drowned": lambda *_: False,
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
@@ -192,7 +193,7 @@ def test_a_run_that_moves_is_searched(
     turned: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    law = None if unlisted is None else SimpleNamespace(joint=unlisted)
+    law = None if unlisted is None else SimpleNamespace(joint=unlisted, parameters={})
     answers = Answers(
         monkeypatch, found=found, contacts=contacts, unlisted=law, turned=turned, unknown=unknown
     )
@@ -345,6 +346,28 @@ def test_what_is_outweighed_by_an_unknown_rest_goes_and_is_told(monkeypatch: pyt
     answers.given.update(found=[spring], contacts=[])
     made = judged()
     assert made.verdict == "cannot_tell" and made.reasons[0].startswith("spring")
+
+
+@pytest.mark.parametrize(("form", "joints"), [("", (1, 2)), ("sin(q3)", (1,))])
+def test_an_event_that_may_be_of_an_unknown_rest_goes_and_is_told(
+    form: str, joints: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A residual that the verdict names is a rest as long as it has no law."""
+    other = SimpleNamespace(added="other push", rows=np.zeros(4, dtype=bool))
+    unlisted = SimpleNamespace(joint=3, parameters={"law": form} if form else {})
+    Answers(monkeypatch, contacts=[CONTACT, other], unlisted=unlisted)
+    asked: list[Any] = []
+
+    def drowned(evidence: Evidence, model: Any, contact: Any, left: Any) -> bool:
+        asked.append((evidence.name, model, contact.added, left))
+        return contact is other
+
+    monkeypatch.setattr(module, "drowned", drowned)
+    monkeypatch.setattr(module, "event_in_doubt", lambda added: f"{added} in doubt")
+    made = judged()
+    assert asked[0] == ("account", ("with", "push", "other push"), "push", joints)
+    assert made.contacts == [CONTACT] and made.model == ("with", "push")
+    assert made.reasons[:2] == ["other push in doubt", "stands"]
 
 
 def test_what_is_left_is_judged_where_joints_slide_and_what_is_found_at_reversals_is_not_asked(

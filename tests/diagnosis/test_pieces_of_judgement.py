@@ -54,6 +54,22 @@ class TestJudgement:
         once = chance + 45.0 * (np.arange(20) == 3)
         assert not judgement.is_behind(current, fit(5.0, once), best)
 
+    def test_what_a_trial_makes_worse_of_several_joints_is_judged_together(self) -> None:
+        """Of joints 2 and 3 each two thirds more is left, which is no more than chance by itself; of joint 1 far less."""
+        chance = np.where(np.arange(20) % 2, 1.9, 0.1)
+
+        def fit(left: tuple[float, float, float], blocks: Any) -> Score:
+            return Score(1, np.outer(left, blocks), np.full((3, 20), 2))
+
+        other = fit((90.0, 1.5, 1.5), chance)
+        for left, least, surely in (
+            ((2.0, 2.5, 2.5), 19.0, True),
+            ((2.0, 2.5, 2.5), 21.0, False),
+            ((2.0, 2.5, 1.5), 19.0, False),
+        ):
+            found = judgement.leaves_more(fit(left, chance[::-1]), other, np.full(3, least))
+            assert found == surely
+
     @pytest.mark.parametrize(
         ("lead", "trial", "behind"),
         [

@@ -83,7 +83,10 @@ class TestTrialOfAPush:
         arm, given = three_axis(), motion((len(residual),), 3)
         samples = SimpleNamespace(motion=given, period=0.01, reach=of.get("reach", 0.02))
         evidence: Any = SimpleNamespace(
-            samples=samples, scale=np.array([0.5, 1.0, 2.0]), model=SimpleNamespace(arm=arm)
+            samples=samples,
+            scale=np.array([0.5, 1.0, 2.0]),
+            variation=np.ones(3),
+            model=SimpleNamespace(arm=arm),
         )
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
         kind = pushes._Kind(effect("external_torque", 1))
@@ -117,7 +120,7 @@ class TestTrialOfAPush:
         given = motion((100,), 3)
         samples = SimpleNamespace(motion=given, period=0.01, reach=0.02)
         evidence: Any = SimpleNamespace(
-            samples=samples, scale=np.ones(3), model=SimpleNamespace(arm=three_axis())
+            samples=samples, scale=np.ones(3), variation=np.ones(3), model=SimpleNamespace(arm=three_axis())
         )
         monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
         residual = np.zeros((100, 3))
@@ -125,6 +128,43 @@ class TestTrialOfAPush:
         residual[20:60, 2] = np.where(np.arange(40) % 2, -3.0, 3.0)  # which no push is
         found = pushes.push(evidence, residual, slice(20, 60), np.ones((100, 3), dtype=bool), shown)
         assert (found is not None) == is_one
+
+    @pytest.mark.parametrize(
+        ("size", "variation", "tells", "sideways", "name"),
+        [
+            (2.0, 1.0, True, 0.0, "external_torque"),
+            (0.4, 1.0, True, 0.0, "external_contact"),  # 0.6 baselines, as energy, are the model's own
+            (2.0, 16.0, True, 0.0, "external_contact"),
+            (2.0, 1.0, False, 0.0, "external_contact"),  # joint 3 says nothing, as where it rests
+            (2.0, 1.0, True, 2.0, "external_contact"),  # which no torque on one joint explains
+        ],
+    )
+    def test_what_it_surely_makes_worse_on_another_joint_is_no_force(
+        self,
+        size: float,
+        variation: float,
+        tells: bool,
+        sideways: float,
+        name: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """A force of f N upwards at the tool is 0.75 f N·m of joint 2 and 0.35 f of joint 3, which shows nothing."""
+        monkeypatch.setattr(
+            pushes, "_FEW", 2
+        )  # so that a force is what an arm of three joints feels above all
+        monkeypatch.setattr(pushes, "_EXPLAINED", 0.6)
+        monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
+        evidence: Any = SimpleNamespace(
+            samples=SimpleNamespace(motion=motion((100,), 3), period=0.01, reach=0.02),
+            scale=np.array([0.1, 0.1, 0.233]),
+            variation=np.array([1.0, 1.0, variation]),
+            model=SimpleNamespace(arm=three_axis()),
+        )
+        residual, counted = np.zeros((100, 3)), np.ones((100, 3), dtype=bool)
+        residual[20:60, 0], residual[20:60, 1] = sideways, size
+        counted[:, 2] = tells
+        found = pushes.push(evidence, residual, slice(20, 60), counted, [0, 1])
+        assert found is not None and found.added.effect.name == name
 
     def test_what_it_removes_is_counted_where_it_was_not_fitted(
         self, monkeypatch: pytest.MonkeyPatch

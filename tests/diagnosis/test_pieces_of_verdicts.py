@@ -88,7 +88,10 @@ class TestReasons:
         ) -> bool | None:
             words, real = reasons._multiple(Parts(1, 0.5, left, noise, error, None, apart), 0, 2.5)
             assert words.startswith("joint 1: the residual is 2.5 times the baseline")
-            assert ("something is there" in words) == (real is True)
+            assert ("something is there" in words) == (left is None or error is None or noise is None)
+            assert ("nor a law that was found accounts for it" in words) == (
+                real is True and "something" not in words
+            )
             assert ("nothing in it can be predicted" in words) == (real is False)
             return real
 
@@ -111,9 +114,9 @@ class TestReasons:
             model=SimpleNamespace(history=SimpleNamespace(get=lambda _: [[1, 1], [1, 0.2], [1, 1]])),
         )
         words = reasons.too_still(evidence)
-        assert bool(words) == bool(still) and (not still or f"joints at rest: {still})" in words)
+        assert bool(words) == bool(still) and (not still or f"motion does not count: {still})" in words)
         evidence.rows[:, 0] = False
-        assert "joints at rest: [1, 2]" in reasons.too_still(evidence)
+        assert "motion does not count: [1, 2]" in reasons.too_still(evidence)
 
     @staticmethod
     def standing(monkeypatch: pytest.MonkeyPatch, after: Any, **of: Any) -> Any:
@@ -126,7 +129,8 @@ class TestReasons:
             rows=np.repeat(np.arange(50) < 20, 3).reshape(50, 3),
             scale=np.full(3, 0.5),
         )
-        evidence.rows[of.get("slides", 20) :, 1] = False
+        slides = evidence.rows.copy()
+        slides[of.get("slides", 20) :, 1] = evidence.rows[of.get("counts", of.get("slides", 20)) :, 1] = False
         far = np.zeros((50, 3), dtype=bool)
         far[: of.get("far", 0), 2] = True
         seen: list[Any] = []
@@ -135,6 +139,7 @@ class TestReasons:
         monkeypatch.setattr(reasons, "outside_trained_range", lambda motion, ranges: far.mean(axis=0))
         monkeypatch.setattr(reasons, "far_outside", lambda motion, ranges: far)
         monkeypatch.setattr(reasons, "too_slow", lambda model, motion: np.zeros((50, 3), dtype=bool))
+        monkeypatch.setattr(reasons, "sliding", lambda samples, model: slides)
         monkeypatch.setattr(reasons, "merged", lambda parts, outside: [])
         monkeypatch.setattr(
             reasons, "_multiple", lambda part, j, ratio: (f"{part.joint} {ratio:g}", (False, True, None)[j])
@@ -165,6 +170,22 @@ class TestReasons:
         for far, unknown in ((40, False), (41, True)):
             words, found = self.standing(monkeypatch, [0.5, None, 0.5], far=far)
             assert len(words) == 1 and words[0].startswith("joint 3: 8") and found is unknown
+
+    def test_a_joint_of_which_next_to_nothing_counts_is_said_to_slide_where_it_does(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        events = "joint 2 slides only within events: nothing else can be said of it"
+        assert self.standing(monkeypatch, [0.5, None, 0.5], counts=19) == ([events], False)
+        first, none = np.arange(40) < 21, np.zeros(40, dtype=bool)
+        every = ~none
+        for slides, strays, creeps, words in (
+            (none, none, none, "joint 1 does not slide in this run"),
+            (every, ~none, none, "joint 1 slides only beyond 1.2 times the range"),
+            (every, first, none, "joint 1 slides only beyond 1.2 times the range"),
+            (every, none, first, "joint 1 slides only slower than it was trained at, or"),
+            (every, none, none, "joint 1 slides only within events"),
+        ):
+            assert reasons._uncounted(0, slides, strays, creeps).startswith(words)
 
     def test_a_model_that_leaves_half_of_a_torque_judges_nothing_there(
         self, monkeypatch: pytest.MonkeyPatch

@@ -101,6 +101,7 @@ class TestParameters:
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=given, period=0.01, reach=reach),
             scale=np.ones(arm.n),
+            variation=np.ones(arm.n),
             model=SimpleNamespace(arm=arm),
         )
         columns = kind.columns(evidence, given)

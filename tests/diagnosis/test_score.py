@@ -19,3 +19,6 @@ def test_of_one_joint_its_own_blocks_count() -> None:
         np.testing.assert_array_equal(own.counts, np.ones((1, len(errors))))
         assert own.complexity == 3 and own.error == sum(errors) == score.energy[j]
         assert score.rows[j] == score.seen[j] == len(errors)
+    # of two joints, the blocks in which either has rows
+    two = score.of_joints(np.array([True, False, True]))
+    np.testing.assert_array_equal(two.errors, [[1, 25], [4, 0]])

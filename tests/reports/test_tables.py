@@ -14,7 +14,7 @@ from armloop.laws.effects import effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
 from armloop.reports.diagnosis_tables import diagnosis_table
-from armloop.reports.findings import nothing_to_supply
+from armloop.reports.findings import findings, nothing_to_supply
 from armloop.reports.tables import (
     eta_table,
     formulas,
@@ -56,6 +56,18 @@ def test_a_diagnosis_names_effect_and_errors(loop: SimpleNamespace, clean: objec
     text = diagnosis_table(loop.diagnosis)
     assert "Verdict: effects found" in text and "joint spring, joint 2" in text and "stiffness" in text
     assert "Verdict: no effect" in diagnosis_table(clean)
+
+
+def test_the_largest_residual_is_said_to_be_of_the_joints_that_were_judged(
+    monkeypatch: pytest.MonkeyPatch, clean: Diagnosis
+) -> None:
+    (every,) = findings(clean)
+    assert every.startswith("At its largest the residual is")
+    n = clean.model.arm.n
+    before = [0.5, *[float("nan")] * (n - 2), 1.5]
+    monkeypatch.setattr(Diagnosis, "errors", lambda self: {"before": before, "noise_floor": [1.0] * n})
+    (some,) = findings(clean)
+    assert some.startswith(f"At its largest, of joints 1 and {n}, the residual is 1.5 times the baseline")
 
 
 def test_why_a_controller_adds_nothing(loop: SimpleNamespace, clean: Diagnosis) -> None:

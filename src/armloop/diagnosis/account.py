@@ -79,7 +79,7 @@ class Account:
         if law is not None:
             return self
         other = replace(self, outcome=outcome, unlisted=None)
-        mine, others = self._score(), other._score()
+        mine, others = self.score(evidence.rows), other.score(evidence.rows)
         if self.unlisted is not None:
             return other if lead(others, mine) <= CHANCE else self
         least = FAR_LESS * float((mine.energy - mine.rows).sum())
@@ -130,10 +130,11 @@ class Account:
             held_out[self.outcome.after.stacked.joint == self.unlisted.joint - 1] = self.unlisted.left
         return held_out
 
-    def _score(self) -> Score:
-        """What judges effects and law."""
-        rows = self.outcome.after.stacked
-        return Score.of(0, self._held_out(), rows.joint, rows.block, rows.joints)
+    def score(self, rows: Mask) -> Score:
+        """What judges effects and law on some (N, n) of the rows that count."""
+        stacked, some = self.outcome.after.stacked, rows[self.evidence.rows]
+        joint, block = stacked.joint[some], stacked.block[some]
+        return Score.of(0, self._held_out()[some], joint, block, stacked.joints)
 
     def explains(self, contacts: list[Contact], residual: Array) -> float:
         """The part of a residual (N, n), N·m (N), in the bursts of contacts that is not left by effects and law."""

@@ -18,7 +18,7 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MULTIPLE, gain
+from armloop.diagnosis.judgement import MULTIPLE, gain, leaves_more, soaked
 from armloop.diagnosis.reasons import too_still
 from armloop.diagnosis.search import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
@@ -90,7 +90,15 @@ def account_with_load(
     # of the model as it is: the load is among the effects found
     run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
     outcome = clear(evidence, pruned(evidence, together))
-    return replace(other, whole=run, evidence=evidence, outcome=outcome)
+    loaded = replace(other, whole=run, evidence=evidence, outcome=outcome)
+    return None if _at_the_cost_of_others(account, loaded) else loaded
+
+
+def _at_the_cost_of_others(account: Account, loaded: Account) -> bool:
+    """Whether an account with a load surely leaves more of some joints than that without: it is but like what is there."""
+    common = account.evidence.rows & loaded.evidence.rows
+    bare, plain = Known.of(loaded.whole.only(common)).fit.score, account.score(common)
+    return leaves_more(loaded.score(common), plain, soaked(bare, plain))
 
 
 def _with(evidence: Evidence, load: CarriedLoad, account: Account) -> Known:

@@ -17,12 +17,13 @@ from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import at_rest, innovations
+from armloop.diagnosis.judgement import MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
-from armloop.model import AddedEffect
+from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
@@ -259,3 +260,31 @@ def without(evidence: Evidence, contacts: list[Contact]) -> Evidence:
     for contact in contacts:
         rows &= ~contact.rows[:, None]
     return evidence.only(rows)
+
+
+def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joints: Sequence[int]) -> bool:
+    """Whether an event removes no more than is left, outside of all events, of some stretch of its run that is as long.
+
+    Each joint counts by its part of what the event removes, as for effects that an unknown rest outweighs.
+
+    Args:
+        evidence: the run without its events.
+        model: that with the effects found.
+        joints: those (0-based) of which something real is left that nothing accounts for; less than twice the baseline
+            does not count.
+    """
+    motion, kept, rows = evidence.samples.motion, evidence.independent, evidence.rows
+    left = (np.where(rows, evidence.left_by(model), 0.0)[kept] / evidence.scale) ** 2
+    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    time = motion.time[kept]
+    length = max(int((contact.rows[kept] & (time >= start) & (time <= end)).sum()), 1)
+    removed = np.maximum(contact.before**2 - contact.after**2, 0.0) / evidence.scale**2
+    rest = np.zeros(len(removed))
+    for j in joints:
+        if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
+            continue
+        for run in motion.runs():
+            sums = np.cumsum(np.append(0.0, left[(kept >= run.start) & (kept < run.stop), j]))
+            most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
+            rest[j] = max(rest[j], most - 1.0)
+    return bool(removed @ (removed - rest) < 0)

@@ -17,10 +17,10 @@ from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.carried import account_with_load
-from armloop.diagnosis.contacts import Contact, find_contacts, known_contacts, without
+from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
-from armloop.diagnosis.reasons import Standing, in_doubt, standing, too_still
+from armloop.diagnosis.reasons import Standing, event_in_doubt, in_doubt, standing, too_still
 from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import (
@@ -324,10 +324,18 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
         stand = standing(evidence.only(sliding), augmented, found.errors()["after"], known)
         searched = [f for f in outcome.found if turned is None or f not in turned.found]
         doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])
-        if doubtful is None:
+        if doubtful is not None:
+            doubted.append(in_doubt(doubtful.effect.label(), doubtful.share))
+            outcome = without_effect(evidence, outcome, doubtful)
+            contacts = account.without_effect(outcome).contacts
+            continue
+        # a residual without a law is all there, though the verdict names it
+        left = stand.left if unlisted is None or unlisted.parameters else (*stand.left, unlisted.joint - 1)
+        slides = evidence.only(sliding)
+        drowning = [each for each in contacts if drowned(slides, augmented, each, left)]
+        if not drowning:
             break
-        doubted.append(in_doubt(doubtful.effect.label(), doubtful.share))
-        outcome = without_effect(evidence, outcome, doubtful)
-        contacts = account.without_effect(outcome).contacts
+        doubted += [event_in_doubt(each.added) for each in drowning]
+        contacts = [each for each in contacts if each not in drowning]
     verdict = "cannot_tell" if found.verdict == "no_effect" and stand.unknown else found.verdict
     return replace(found, verdict=verdict, standing=replace(stand, reasons=[*doubted, *stand.reasons]))

@@ -98,7 +98,7 @@ class Evidence:
         if samples.cutoff_hz > 0:
             # Effects that ask how fine the samples are must know how fine the filter has left them.
             context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
-        rows = _sliding(samples, model) & independent_rows(samples)[:, None]
+        rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
@@ -242,6 +242,11 @@ def too_slow(model: ReconstructedModel, motion: Motion) -> NDArray[np.bool_]:
 def near_standstill(samples: Samples) -> NDArray[np.bool_]:
     """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
     return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
+
+
+def sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+    """(N, n) samples in which a joint slides, no closer than the filter can tell apart."""
+    return np.asarray(_sliding(samples, model) & independent_rows(samples)[:, None])
 
 
 def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:

@@ -72,12 +72,26 @@ def is_behind(current: Score, trial: Score, best: Score) -> bool:
 
     What it does better on one joint is no excuse for what it surely leaves on another.
     """
-    soaked = np.maximum(ALIKE * trial.rows, NEARLY * (current.energy - best.energy))
-    worse = np.flatnonzero(trial.energy - best.energy > soaked).tolist()
+    worse = np.flatnonzero(trial.energy - best.energy > soaked(current, best)).tolist()
     chance = lead(trial, best) <= CHANCE and all(
         lead(trial.of_joint(j), best.of_joint(j)) <= SIGNIFICANCE for j in worse
     )
     return not (chance or not worse) or gain(current, trial) < MOST * gain(current, best)
+
+
+def soaked(current: Score, best: Score) -> Array:
+    """(n,) squared error, weighted, of each joint by which what is there may do worse than the best, which soaks up more."""
+    return np.maximum(ALIKE * best.rows, NEARLY * (current.energy - best.energy))
+
+
+def leaves_more(trial: Score, other: Score, least: Array) -> bool:
+    """Whether a trial leaves more of some joint, by more than its least (n,), and surely of all that it leaves more of.
+
+    Those joints are judged together, for a law that ties joints may do a little harm to each.
+    """
+    more = trial.energy - other.energy
+    worse = more > 0
+    return bool((more > least).any()) and lead(trial.of_joints(worse), other.of_joints(worse)) > SIGNIFICANCE
 
 
 def lead(worse: Score, better: Score) -> float:

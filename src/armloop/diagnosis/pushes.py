@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import enough, leaves_more
+from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
@@ -41,6 +43,8 @@ class Contact:
         share: part of the event's energy that it removes on samples it was not fitted on.
         own: the same of the joints that the event was noticed at; the others leave what they always do.
         rivals: what explains the samples as well, with its share.
+        contradicted: whether it surely leaves more than there was, by more than the model's own shortcomings, of joints
+            that the event was not noticed at.
     """
 
     added: AddedEffect
@@ -50,6 +54,7 @@ class Contact:
     share: float
     own: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
+    contradicted: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +98,9 @@ def push(
         for kind in kinds
         if (trial := _trial(evidence, residual, weight, burst, kind, shown)) is not None
     ]
+    # What explains the joints that show an event is none of it if others would have had to show it, and do not.
+    agreed = [(trial, kind) for trial, kind in tried if not trial.contradicted]
+    tried = agreed if any(trial.own >= _EXPLAINED for trial, _ in agreed) else tried
     if not tried:
         return None
     most = max(trial.share for trial, _ in tried)
@@ -114,9 +122,7 @@ def push(
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
     rivals.pop(chosen.effect.place, None)
-    return Contact(
-        best.added, best.rows, best.before, best.after, best.share, best.own, list(rivals.values())
-    )
+    return replace(best, rivals=list(rivals.values()))
 
 
 def _trial(
@@ -156,7 +162,24 @@ def _trial(
     noticed = float((y[:, shown] ** 2).sum())
     own = 1 - float((left[:, shown] ** 2).sum()) / noticed if noticed > 0 else 0.0
     share = 1 - float((left**2).sum()) / energy
-    return Contact(AddedEffect(kind.effect, parameters), around(motion, burst), before, after, share, own)
+    was, would_be = (_elsewhere(z, weight[burst], pieces, shown) for z in (y, left))
+    return Contact(
+        AddedEffect(kind.effect, parameters),
+        around(motion, burst),
+        before,
+        after,
+        share,
+        own,
+        contradicted=leaves_more(would_be, was, enough(evidence, was)),
+    )
+
+
+def _elsewhere(left: Array, weight: Array, pieces: NDArray[np.intp], shown: list[int]) -> Score:
+    """The score of what is left (N, n), weighted, of joints that an event was not noticed at, where it counts."""
+    counted = weight > 0
+    counted[:, shown] = False
+    samples, joints = np.nonzero(counted)
+    return Score.of(0, left[samples, joints], joints, pieces[samples], left.shape[1])
 
 
 def _burst(

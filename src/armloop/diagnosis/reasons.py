@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, too_slow
+from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
 from armloop.diagnosis.judgement import MULTIPLE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
-from armloop.model import ReconstructedModel
+from armloop.laws.effects.base import number
+from armloop.model import AddedEffect, ReconstructedModel
+from armloop.util.arrays import Mask
 
 #: A model that leaves this part of a joint's torque, RMS, most of it predictable, judges nothing there.
 TOO_POOR = 0.5
@@ -53,17 +55,17 @@ def standing(
     left = evidence.left_by(augmented)
     parts = parts_of(witness(left, samples, evidence.context.load))
     outside = outside_trained_range(samples.motion, model.history.get("range"))
-    far = far_outside(samples.motion, model.history.get("range")).mean(axis=0)
-    slow = (too_slow(model, samples.motion) & samples.moving).sum(axis=0) / np.maximum(
-        samples.moving.sum(axis=0), 1
-    )
+    strays, creeps = far_outside(samples.motion, model.history.get("range")), too_slow(model, samples.motion)
+    far = strays.mean(axis=0)
+    slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
+    slides = sliding(samples, model)
     reasons: list[str] = []
     unknown, unexplained = False, []
     for j, part in enumerate(parts):
         reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > _MOSTLY)
         if evidence.rows[:, j].sum() < _FEWEST:
-            reasons.append(f"joint {j + 1} does not slide in this run: nothing can be said of it")
+            reasons.append(_uncounted(j, slides[:, j], strays[:, j], creeps[:, j]))
             continue
         poor = _too_poor(model, j)
         if poor:
@@ -89,8 +91,8 @@ def too_still(evidence: Evidence) -> str:
     if len(still) < evidence.rows.shape[1] and blocks >= FEWEST_BLOCKS:
         return ""
     return (
-        f"too little motion to judge ({blocks} blocks of a second or more, joints at rest: {still}); log at least "
-        f"{FEWEST_BLOCKS + 1} s in which the joints move"
+        f"too little motion to judge ({blocks} blocks of a second or more, joints whose motion does not count: {still}); "
+        f"log at least {FEWEST_BLOCKS + 1} s in which the joints move"
     )
 
 
@@ -100,6 +102,28 @@ def in_doubt(label: str, share: float) -> str:
         f"{label} would remove {share:.0%} of what can be explained, but more is left there that nothing accounts for: it "
         "may be of the same origin, and is not stated"
     )
+
+
+def event_in_doubt(event: AddedEffect) -> str:
+    """A sentence on an event that removes no more than what nothing accounts for at other times."""
+    start, end = (number(event.parameters[key].value) for key in ("start", "end"))
+    return (
+        f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but as much is left there "
+        "at other times that nothing accounts for: it may be of the same origin, and is not stated"
+    )
+
+
+def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask) -> str:
+    """Why next to nothing counts of a joint, by its samples (N,)."""
+    if slides.sum() < _FEWEST:
+        return f"joint {j + 1} does not slide in this run: nothing can be said of it"
+    if (slides & ~strays).sum() < _FEWEST:
+        where = f"beyond {FAR:g} times the range the model was trained on"
+    elif (slides & ~strays & ~creeps).sum() < _FEWEST:
+        where = f"slower than it was trained at, or beyond {FAR:g} times the range"
+    else:
+        return f"joint {j + 1} slides only within events: nothing else can be said of it"
+    return f"joint {j + 1} slides only {where}: nothing can be said of it"
 
 
 def _range(j: int, outside: float, far: float) -> list[str]:
@@ -138,10 +162,16 @@ def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
     """A sentence on a residual that nothing accounts for, and whether it is more than noise; None if nobody knows."""
     size = f"joint {j + 1}: the residual is {ratio:.1f} times the baseline"
     left, error, noise = part.predictable_left, part.std_error, part.noise
-    if left is None or error is None or noise is None or left > max(_SURE * error, _PART * (left + noise)):
+    if left is None or error is None or noise is None:
         return (
             f"{size}: something is there, too weak or too short on this run to be named; the motion of --next-run would "
             "show it",
+            True,
+        )
+    if left > max(_SURE * error, _PART * (left + noise)):
+        return (
+            f"{size}, and {left / (left + noise):.0%} of its energy can be predicted from the motion, but no listed effect "
+            "nor a law that was found accounts for it",
             True,
         )
     if part.separated and left + error <= _PART * (left + noise):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +36,13 @@ class Score:
 
     def of_joint(self, j: int) -> Score:
         """The score of one joint (0-based) in the blocks in which it has rows."""
-        seen = self.counts[j] > 0
-        return Score(self.complexity, self.errors[j : j + 1, seen], self.counts[j : j + 1, seen])
+        return self.of_joints(np.arange(len(self.counts)) == j)
+
+    def of_joints(self, joints: Mask) -> Score:
+        """The score of some joints (n,) in the blocks in which they have rows."""
+        counts = self.counts[joints]
+        seen = counts.any(axis=0)
+        return Score(self.complexity, self.errors[joints][:, seen], counts[:, seen])
 
     @property
     def energy(self) -> Array:

@@ -59,8 +59,10 @@ def _nothing(diagnosis: Diagnosis) -> str:
         return Prose("findings", moves=False)["nothing"]
     errors = diagnosis.errors()
     ratio = np.asarray(errors["before"], dtype=float) / np.asarray(errors["noise_floor"], dtype=float)
-    most = float(np.nanmax(ratio)) if np.isfinite(ratio).any() else 0.0
-    return Prose("findings", moves=True, most=most, verdict=diagnosis.verdict)["nothing"]
+    known = np.isfinite(ratio)
+    most = float(ratio[known].max(initial=0.0))
+    judged = [] if known.all() else [str(j + 1) for j in np.flatnonzero(known)]
+    return Prose("findings", moves=True, most=most, judged=judged, verdict=diagnosis.verdict)["nothing"]
 
 
 def reasons(diagnosis: Diagnosis) -> list[str]:
