@@ -111,6 +111,18 @@ def test_a_missing_law_is_predictable(law: str) -> None:
     assert not found[0].much_is_left and not found[2].much_is_left
 
 
+@pytest.mark.parametrize("order", [6, 20])
+def test_a_missing_ripple_is_predictable(order: int) -> None:
+    """One and a half and five periods in the travel of joint 2, of which sin q and cos q say nothing."""
+    given = samples()
+    residual = 0.1 * white(given, 3)
+    residual[:, 1] += 0.3 * np.sqrt(2) * np.sin(order * given.motion.q[:, 1] + 0.5)
+    found = parts(residual, given)
+    check_sums(found)
+    assert found[1].predictable_left == pytest.approx(0.09, rel=0.15)
+    assert not found[0].much_is_left and not found[2].much_is_left
+
+
 def test_what_was_fitted_helps_and_does_not_judge() -> None:
     """A residual that is small where the model was fitted says nothing there."""
     given = samples()

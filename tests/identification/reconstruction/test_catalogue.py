@@ -99,6 +99,46 @@ def test_a_ripple_beyond_the_low_pass_is_found() -> None:
     check(found.model.effects[0], {"amplitude": 0.3, "phase": 0.7})
 
 
+def cogging(motion: Motion) -> Array:
+    """Eight poles, two periods of them in the travel of joint 2: the base parameters soak part of it up."""
+    return np.outer(np.sin(8 * motion.q[:, 1] + 0.7), [0, 1, 0])
+
+
+@pytest.mark.parametrize("library", ["rigid-body", "lagrangian"])
+def test_a_ripple_of_low_order_is_fitted_together_with_the_rest(library: str) -> None:
+    found = made([cogging], library=library)
+    assert named(found) == [("torque_ripple", 2, None)]
+    parameters = found.model.effects[0].parameters
+    assert parameters["order"].value == 8
+    check(found.model.effects[0], {"amplitude": 1.0, "phase": 0.7})
+    assert parameters["amplitude"].std_error < 0.02
+    # so nothing of it is left
+    assert max(found.held_out.moving["nrmse"]) < 0.02
+
+
+def test_several_ripples_of_a_joint_are_found() -> None:
+    def twice(motion: Motion) -> Array:
+        return np.outer(
+            np.sin(12 * motion.q[:, 2] + 0.7) + 0.6 * np.sin(40 * motion.q[:, 2] - 0.2), [0, 0, 1]
+        )
+
+    found = made([twice])
+    assert named(found) == [("torque_ripple", 3, None)] * 2
+    for added, truth in zip(
+        found.model.effects,
+        ({"amplitude": 1.0, "phase": 0.7}, {"amplitude": 0.6, "phase": -0.2}),
+        strict=True,
+    ):
+        check(added, truth)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_broad_over_the_angle_is_no_ripple(seed: int) -> None:
+    """A spring on one side, which no law of the catalogue is."""
+    found = made([lambda motion: np.outer(20 * np.maximum(motion.q[:, 1] - 0.2, 0.0), [0, 1, 0])], seed)
+    assert "torque_ripple" not in [name for name, *_ in named(found)]
+
+
 def test_two_laws_are_both_found() -> None:
     found = made([sprung, coupled])
     assert sorted(named(found)) == [("joint_spring", 2, None), ("transmission_coupling", 2, 3)]
@@ -159,6 +199,7 @@ class TestSearch:
             place=(name, 1, None),
             complexity=complexity,
             needs_model=False,
+            periodic=False,
             shapes=lambda context: shapes,
             estimates=lambda arm, coefficients, covariance, shape: (coefficients, shape),
             plausible=lambda arm, estimates: plausible and estimates == ("of it", shapes[-1]),
@@ -232,6 +273,52 @@ class TestSearch:
         made = [self.effect("eight", 1, eight), self.effect("nine", 1, (*eight, 8.0))]
         trials = lambda name, shape, taken: None if shape == 0 else self.trial(shape)  # noqa: E731
         assert self.found(monkeypatch, made, trials) == [("eight", 7.0, 0.5)]
+
+    def test_orders_come_from_the_peaks_and_those_beside_them(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Of hundreds; a joint may have several, and chance has as many tries as there are orders."""
+        made = [self.effect("wave", 1, tuple(float(k) for k in range(4, 104)))]
+        made[0].periodic, made[0].joint = True, 2
+        made[0].plausible = lambda arm, estimates: True
+        peaks = {0: [7.0, 4.0], 1: [50.0], 2: []}
+        asked, judged = [], [0.0]
+
+        class Columns:
+            context: Any = SimpleNamespace(motion=SimpleNamespace(q=np.arange(6.0).reshape(3, 2)))
+
+            def __init__(self, arm: Any, samples: Any) -> None:
+                pass
+
+            def raw(self, effect: Any, shape: float) -> np.ndarray:
+                return np.ones((1, 1, 2))
+
+            def smoothed(self, effect: Any, shape: float) -> Any:
+                return shape
+
+        def bench(laws: Any) -> Any:
+            def trial(shape: float, new: float, worth: float) -> Any:
+                asked.append(shape)
+                return self.trial(10.0 if shape in (6.0, 50.0) else 5.0, score=judged[0])
+
+            def left(joint: int) -> Any:
+                assert joint == 1
+                return np.array([0, 2]), np.array([len(laws) + 0.0, 9.0])
+
+            return SimpleNamespace(trial=trial, left=left)
+
+        def lines(q: Any, left: Any, orders: Any, worth: float) -> Any:
+            assert q.tolist() == [1.0, 5.0] and orders == list(made[0].shapes(None)) and worth == 0.05
+            return peaks[int(left[0])]
+
+        monkeypatch.setattr(catalogue, "permanent", lambda arm: made)
+        monkeypatch.setattr(catalogue, "_Columns", Columns)
+        monkeypatch.setattr(catalogue, "lines", lines)
+        nothing: Any = None
+        # Student's t of eight degrees of freedom: 8.906 in a hundred thousand cases, 4.501 in a thousand
+        for score, found in ((8.91, [(6.0, 100), (50.0, 100)]), (8.90, [])):
+            judged[0] = score
+            laws = catalogue.search(nothing, nothing, bench, lambda text: None)
+            assert [(law.shape, law.among) for law in laws.chosen] == found and laws.tried == 1
+        assert asked == [4.0, 5.0, 6.0, 7.0, 8.0, 49.0, 50.0, 51.0, 4.0, 5.0, 6.0, 7.0, 8.0]
 
     def test_it_must_be_plausible_and_its_coefficients_its_parameters(
         self, monkeypatch: pytest.MonkeyPatch

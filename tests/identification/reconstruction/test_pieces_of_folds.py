@@ -165,12 +165,6 @@ class TestRipple:
         left = left + noise * np.random.default_rng(1).normal(size=len(self.Q))
         return ripple.Residual(self.Q, left * of.get("window", 1.0), np.arange(4000) // 200)
 
-    def test_the_spectrum_over_the_angle(self) -> None:
-        # a wave of amplitude A has N A²/2 of its order, none of the others
-        left = self.residual((7.0, 2.0), (9.0, 1.0)).left
-        power = ripple.spectrum(self.Q, left, np.arange(5.0, 11.0))
-        np.testing.assert_allclose(power, [0, 0, 8000, 0, 2000, 0], atol=1e-6)
-
     def test_a_line_stands_out_with_its_phase_kept(self) -> None:
         orders = np.arange(20.0, 100.0)
         found = ripple._line(self.residual((50.0, 1.0), noise=0.5), orders, 3)

@@ -19,29 +19,36 @@ from armloop.util.arrays import Array
 _FADES, _WIDTHS = (0.01, 0.1), (1e-3, 1e-2, 1e-1)
 #: Time constants of the recent past, as parts of the time in which a joint crosses its range at its typical speed.
 _PASTS = (0.05, 0.25)
+#: Half periods of the own angle's harmonics within its travel: cosines, which at its ends need not come back to where they
+#: began (Fourier's series of the even continuation), so that a wave of any order is a sum of few of them.
+_HALVES = 24
 _TINY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Scales:
-    """What is fast and what is far for an arm: (n,) highest speeds and widths of the ranges of q, on all its data."""
+    """What is fast and what is far for an arm: (n,) highest speeds, widths of the ranges of q and their lower ends, on all
+    its data."""
 
     speed: Array
     span: Array
+    low: Array
 
     @staticmethod
     def of(motion: Motion) -> Scales:
         """Of a motion; a joint that does not move has tiny ones."""
         speed = np.quantile(np.abs(motion.v), 0.995, axis=0)
-        return Scales(np.maximum(speed, _TINY), np.maximum(np.ptp(motion.q, axis=0), _TINY))
+        return Scales(
+            np.maximum(speed, _TINY), np.maximum(np.ptp(motion.q, axis=0), _TINY), motion.q.min(axis=0)
+        )
 
 
 def features(motion: Motion, joint: int, scales: Scales, load: Array | None = None) -> Array:
     """(N, p) columns that a residual of joint ``joint`` (0-based) may depend on.
 
-    State: q, v, vdot of all joints, the powers of the own speed. Direction: that of every joint and of the sums and
-    differences of its speed with the others'. Recent path: travel since the last reversal, presliding elements,
-    and fading averages of the own speed.
+    State: q, v, vdot of all joints, the powers of the own speed, harmonics of the own angle. Direction: that of every
+    joint and of the sums and differences of its speed with the others'. Recent path: travel since the last reversal,
+    presliding elements, and fading averages of the own speed.
 
     Args:
         load: (N, n) torque that passes the joints, by the model.
@@ -51,6 +58,8 @@ def features(motion: Motion, joint: int, scales: Scales, load: Array | None = No
     own, speed = v[:, joint], v[:, joint] / fastest[joint]
     others = [k for k in range(motion.joints) if k != joint]
     columns = [q, v, vdot, np.sin(q[:, joint]), np.cos(q[:, joint])]
+    turn = np.pi * (q[:, joint] - scales.low[joint]) / span[joint]
+    columns.append(np.cos(np.outer(turn, np.arange(1, _HALVES + 1))))
     columns += [np.abs(speed) * speed, np.sqrt(np.abs(speed)) * np.sign(speed), speed**3]
     columns += [np.tanh(speed / fade) for fade in _FADES]
     columns += [np.tanh(v[:, k] / (_FADES[0] * fastest[k])) for k in others]

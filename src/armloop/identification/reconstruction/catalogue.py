@@ -7,6 +7,10 @@ together, on blocks left out. One is taken if it lowers the error there by more 
 were tried; the simplest first. Then friction is chosen anew beside it, and every law asked again whether the others
 leave it anything.
 
+Which order a ripple has is read off the spectrum of what the model leaves, over the joint's angle: there are more orders
+than can be tried one by one. What the base parameters soaked up may have moved the peak, so the orders next to it are
+tried too. A joint may ripple with several orders.
+
 Laws that the model can say already are not asked for: a rotor's inertia is a base parameter, Coulomb friction a rung
 of the friction ladder. Nor are those that depend on the time: within a run they fit, on another run they fail.
 """
@@ -21,6 +25,7 @@ from scipy.stats import t as student
 
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
+from armloop.identification.reconstruction.lines import lines
 from armloop.identification.reconstruction.projected import Projected, Trial
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
@@ -39,6 +44,8 @@ _NEW = 2e-3
 #: What comes and goes: the arm as it was trained carries what it carries.
 _OF_A_RUN = ("payload",)
 _MOST = 6
+#: More shapes than these are not tried one by one.
+_FEW = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +57,7 @@ class Law:
         size: number of its coefficients.
         constant: joints (0-based) at which one of its columns is constant.
         gain: part of the squared error that it removes on left-out blocks, of the joint it shows on most.
+        among: number of shapes that it could have had, where these are many.
     """
 
     effect: Effect
@@ -57,13 +65,14 @@ class Law:
     size: int
     constant: tuple[int, ...] = ()
     gain: float = 0.0
+    among: int = 1
 
     @staticmethod
-    def found(effect: Effect, shape: float, columns: Array, gain: float) -> Law:
+    def found(effect: Effect, shape: float, columns: Array, gain: float, among: int = 1) -> Law:
         """A law whose unfiltered columns on some motion are (N, n, p)."""
         flat = (np.ptp(columns, axis=0) == 0) & columns.any(axis=0)
         constant = tuple(np.flatnonzero(flat.any(axis=1)).tolist())
-        return Law(effect, shape, columns.shape[2], constant, gain)
+        return Law(effect, shape, columns.shape[2], constant, gain, among)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,28 +175,34 @@ def search(
     # its coefficients are its free parameters: so it is one of the columns of a regression
     listed = [effect for effect in permanent(arm) if not effect.needs_model]
     chosen: list[Law] = []
-    context, tried = Context(arm, samples.motion, period=samples.period), len(listed)
+    context = Context(arm, samples.motion, period=samples.period)
+    shapes = [list(effect.shapes(context)) for effect in listed]
+    shapes = [
+        all_of if effect.periodic or len(all_of) <= _FEW else []
+        for effect, all_of in zip(listed, shapes, strict=True)
+    ]
+    tried = len(listed)
     while len(chosen) < _MOST:
         own = bench(chosen)
         taken = {law.effect.place for law in chosen}
         trials = []
-        for effect in listed:
-            if effect.place not in taken:
-                found = _best_shape(own, effect, context, samples)
-                if found is not None and is_worth(found[1], tried):
-                    shape, trial = found
-                    estimates = effect.estimates(arm, trial.coefficients, trial.covariance, shape)
-                    if effect.plausible(arm, estimates):
-                        trials.append((effect, shape, trial))
+        for effect, all_of in zip(listed, shapes, strict=True):
+            if effect.place in taken and not effect.periodic:
+                continue
+            among = len(all_of) if effect.periodic else 1
+            few = _peaks(own, effect, all_of, context) if effect.periodic else all_of
+            found = _best_shape(own, effect, few, context, samples)
+            if found is not None and is_worth(found[1], tried * among) and _plausible(arm, effect, *found):
+                trials.append((effect, *found, among))
         if not trials:
             break
-        most = max(trial.removed for _, _, trial in trials)
+        most = max(trial.removed for _, _, trial, _ in trials)
         as_good = [one for one in trials if one[2].removed >= _AS_GOOD * most]
-        effect, shape, trial = min(as_good, key=lambda one: (one[0].complexity, -one[2].removed))
+        effect, shape, trial, among = min(as_good, key=lambda one: (one[0].complexity, -one[2].removed))
         progress(
             f"{effect.label()}: fitted together with the rest it removes {trial.share:.0%} on left-out blocks"
         )
-        chosen.append(Law.found(effect, shape, effect.full_columns(context, shape), trial.share))
+        chosen.append(Law.found(effect, shape, effect.full_columns(context, shape), trial.share, among))
     return Laws(chosen, tried)
 
 
@@ -195,9 +210,9 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
     """The laws without those to which the others, and the friction chosen beside them, leave nothing."""
     for k in reversed(range(len(laws.chosen))):
         others = laws.chosen[:k] + laws.chosen[k + 1 :]
-        own = bench(others)
-        trial = own.trial(Laws([laws.chosen[k]]).columns(arm, samples))
-        if trial is None or not is_worth(trial, laws.tried):
+        own, law = bench(others), laws.chosen[k]
+        trial = own.trial(Laws([law]).columns(arm, samples))
+        if trial is None or not is_worth(trial, laws.tried * law.among):
             return pruned(replace(laws, chosen=others), bench, arm, samples)
     return laws
 
@@ -209,14 +224,24 @@ def is_worth(trial: Trial, tried: int) -> bool:
     return trial.share > WORTH and trial.score > enough and trial.everywhere
 
 
+def _plausible(arm: Arm, effect: Effect, shape: float, found: Trial) -> bool:
+    return effect.plausible(arm, effect.estimates(arm, found.coefficients, found.covariance, shape))
+
+
+def _peaks(own: Projected, effect: Effect, orders: Sequence[float], context: Context) -> list[float]:
+    """Orders at which what the regression leaves of an effect's joint has a line over the angle, and those beside them."""
+    assert effect.joint is not None
+    sample, left = own.left(effect.joint - 1)
+    q = context.motion.q[sample, effect.joint - 1]
+    near = {peak + beside for peak in lines(q, left, orders, WORTH) for beside in (-1.0, 0.0, 1.0)}
+    return sorted(near & set(orders))
+
+
 def _best_shape(
-    own: Projected, effect: Effect, context: Context, samples: Samples
+    own: Projected, effect: Effect, shapes: Sequence[float], context: Context, samples: Samples
 ) -> tuple[float, Trial] | None:
     """The shape that removes most on left-out blocks; None where the effect can say nothing new."""
     best: tuple[float, Trial] | None = None
-    shapes = list(effect.shapes(context))
-    if len(shapes) > 8:
-        return None
     for shape in shapes:
         trial = own.trial(_smoothed(samples, effect.full_columns(context, shape)), _NEW, WORTH)
         if trial is not None and (best is None or trial.removed > best[1].removed):

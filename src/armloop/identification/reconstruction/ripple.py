@@ -2,8 +2,9 @@
 
 A strain-wave gear ripples a hundred or two hundred times per revolution: at one rad/s that is beyond the corner at which
 torques are regressed. So the residual is taken on the unfiltered torque, and its spectrum over the angle (not over time)
-is searched for lines. A line must stand out from the orders beside it, for a model's other shortcomings are broad; it
-must keep its phase from block to block, and help on blocks left out.
+is searched for lines (:mod:`reconstruction.lines`), which must keep their phase from block to block, and help on blocks
+left out. A strong ripple of low order is none of these: it passes the low-pass, and the base parameters soak part of it
+up, so it is one of the laws that are fitted beside them (:mod:`reconstruction.catalogue`).
 """
 
 from __future__ import annotations
@@ -18,18 +19,17 @@ from armloop.data.blocks import block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import Conditioning, ShortRunError, preprocess
+from armloop.identification.reconstruction.lines import lines, waves
 from armloop.identification.reconstruction.projected import block_covariance, block_score
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import TINY, Array, Index, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 #: The torque is taken up to this part of the sample rate; the model's motion as it is always taken.
 _BAND = 0.4
-#: A line must be so many times as strong as the median of the orders beside it …
-_STANDS_OUT = 20.0
-#: … from a quarter below to a quarter above, but for the nearest, which it leaks into; and hold so much of the residual.
-_BESIDE, _NEAREST, _WORTH = 0.25, 6, 0.005
+#: Part of the residual that a line must hold.
+_WORTH = 0.005
 #: Probability that noise alone shows any line.
 _CHANCE = 1e-3
 _MOST, _FOLDS, _BLOCK_SECONDS, _FEWEST = 3, 5, 1.5, 500
@@ -69,7 +69,7 @@ def find_ripple(
                 break
             order, x, covariance = line
             found.append(AddedEffect(effect, effect.estimates(model.arm, x, covariance, order), "always"))
-            left = Residual(left.q, left.left - _waves(left.q, order) @ x, left.block)
+            left = Residual(left.q, left.left - waves(left.q, order) @ x, left.block)
     return found
 
 
@@ -80,13 +80,8 @@ def notes(effects: Sequence[AddedEffect]) -> list[str]:
 
 def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Array] | None:
     """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None."""
-    power = spectrum(left.q, left.left, orders) / max(float(np.sum(left.left**2)), TINY)
-    for k in np.argsort(power)[::-1][:_MOST]:
-        order = float(orders[k])
-        beside = (np.abs(orders - order) <= _BESIDE * order) & (np.abs(orders - order) > _NEAREST)
-        if power[k] < _WORTH or beside.sum() < _NEAREST or power[k] < _STANDS_OUT * np.median(power[beside]):
-            continue
-        X, y = _waves(left.q, order), left.left
+    for order in lines(left.q, left.left, orders.tolist(), _WORTH):
+        X, y = waves(left.q, order), left.left
         after, fold = np.array(y), left.block % _FOLDS
         for f in range(_FOLDS):
             mine = fold == f
@@ -97,21 +92,6 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
             x = bread @ (X.T @ y)
             return order, x, block_covariance(bread, X * np.asarray(y - X @ x)[:, None], left.block)
     return None
-
-
-def spectrum(q: Array, x: Array, orders: Array) -> Array:
-    """(K,) sum of squares that waves of whole orders of an angle q (M,) take of x (M,), as if they were orthogonal."""
-    turn = np.exp(1j * q)
-    wave = turn ** float(orders[0])
-    power = np.empty(len(orders))
-    for k in range(len(orders)):
-        power[k] = 2 * np.abs(np.vdot(wave, x)) ** 2 / len(x)
-        wave = wave * turn
-    return power
-
-
-def _waves(q: Array, order: float) -> Array:
-    return np.column_stack([np.sin(order * q), np.cos(order * q)])
 
 
 def _residuals(

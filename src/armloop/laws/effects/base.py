@@ -144,6 +144,7 @@ class Effect(ABC):
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
         simulated: whether Drake's systems can have it; else it is found in logs alone.
         rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
+        periodic: whether its shape is a number of cycles per revolution of its joint.
         fault_order: of sensors: a record is falsified by the lower ones first.
         nested: how many of its coefficients, the last, are all of another listed law: it is there if the others are.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
@@ -167,6 +168,7 @@ class Effect(ABC):
     of_time: ClassVar[bool] = False
     simulated: ClassVar[bool] = True
     rubs: ClassVar[bool] = False
+    periodic: ClassVar[bool] = False
     fault_order: ClassVar[int] = 9
     nested: ClassVar[int] = 0
     alike: ClassVar[Mapping[str, str]] = {}

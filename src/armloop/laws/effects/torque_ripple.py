@@ -15,6 +15,7 @@ class TorqueRipple(Law):
     """tau_j += A sin(N q_j + φ), N a whole number of cycles per revolution."""
 
     name = "torque_ripple"
+    periodic = True
     parameters = (
         Parameter("amplitude", "TAU"),
         Parameter("order", "1/rev", shape="chosen"),
