@@ -11,6 +11,7 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import reasons, unlisted, whereabouts
+from armloop.diagnosis.score import Score
 from armloop.identification.goodness import Parts
 
 
@@ -235,10 +236,11 @@ class TestWhatIsLeft:
 
         def fit(*size: np.ndarray) -> Any:
             counts = [len(x) for x in size]
-            stacked = SimpleNamespace(
-                joint=np.repeat([0, 1], counts), block=np.concatenate([np.arange(c) // 10 for c in counts])
-            )
-            return SimpleNamespace(stacked=stacked, held_out=np.concatenate(size))
+            joint, block = np.repeat([0, 1], counts), np.concatenate([np.arange(c) // 10 for c in counts])
+            held_out = np.concatenate(size)
+            score = Score.of(0, held_out, joint, block, 2)
+            stacked = SimpleNamespace(joint=joint, block=block)
+            return SimpleNamespace(stacked=stacked, held_out=held_out, score=score)
 
         def left(after: Any, before: float = 10.0) -> int | None:
             # a joint's energy before any effect: that of a constant residual
