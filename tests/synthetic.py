@@ -61,7 +61,7 @@ def conditioned_samples(
         tau = tau + noise * tau.std(axis=0) * rng.normal(size=tau.shape)
         parts.append((np.arange(count) * 0.02, q, v, vdot, tau))
     time, q, v, vdot, tau = (np.concatenate(column) for column in zip(*parts, strict=True))
-    starts = np.cumsum([0, *counts[:-1]])
+    starts = np.cumsum([0, *counts[:-1]])[np.array(counts) > 0]
     return Samples(Motion(time, q, v, vdot, starts), tau, np.ones_like(q, dtype=bool), 0.02)
 
 

@@ -142,7 +142,11 @@ def test_a_model_without_a_baseline_is_weighed_by_the_torque() -> None:
     def of(**baseline: Any) -> Evidence:
         context = SimpleNamespace(period=0.05)
         model: Any = SimpleNamespace(
-            baseline=baseline, history={}, context=lambda motion, effects: context, arm=None
+            baseline=baseline,
+            history={},
+            uncertainty={},
+            context=lambda motion, effects: context,
+            arm=None,
         )
         return Evidence.of(model, given, [])
 

@@ -282,20 +282,13 @@ class TestSearch:
         peaks = {0: [7.0, 4.0], 1: [50.0], 2: []}
         asked, judged = [], [0.0]
 
-        class Columns:
-            context: Any = SimpleNamespace(motion=SimpleNamespace(q=np.arange(6.0).reshape(3, 2)))
-
-            def __init__(self, arm: Any, samples: Any) -> None:
-                pass
-
-            def raw(self, effect: Any, shape: float) -> np.ndarray:
-                return np.ones((1, 1, 2))
-
-            def smoothed(self, effect: Any, shape: float) -> Any:
-                return shape
+        made[0].full_columns = lambda context, shape: np.full((1, 1, 2), shape)
+        motion = SimpleNamespace(q=np.arange(6.0).reshape(3, 2))
+        samples: Any = SimpleNamespace(motion=motion, period=0.1)
 
         def bench(laws: Any) -> Any:
-            def trial(shape: float, new: float, worth: float) -> Any:
+            def trial(columns: np.ndarray, new: float, worth: float) -> Any:
+                shape = float(columns[0, 0, 0])
                 asked.append(shape)
                 return self.trial(10.0 if shape in (6.0, 50.0) else 5.0, score=judged[0])
 
@@ -310,13 +303,14 @@ class TestSearch:
             return peaks[int(left[0])]
 
         monkeypatch.setattr(catalogue, "permanent", lambda arm: made)
-        monkeypatch.setattr(catalogue, "_Columns", Columns)
+        monkeypatch.setattr(catalogue, "Context", lambda arm, motion, period: SimpleNamespace(motion=motion))
+        monkeypatch.setattr(catalogue, "_smoothed", lambda samples, columns: columns)
         monkeypatch.setattr(catalogue, "lines", lines)
         nothing: Any = None
         # Student's t of eight degrees of freedom: 8.906 in a hundred thousand cases, 4.501 in a thousand
         for score, found in ((8.91, [(6.0, 100), (50.0, 100)]), (8.90, [])):
             judged[0] = score
-            laws = catalogue.search(nothing, nothing, bench, lambda text: None)
+            laws = catalogue.search(nothing, samples, bench, lambda text: None)
             assert [(law.shape, law.among) for law in laws.chosen] == found and laws.tried == 1
         assert asked == [4.0, 5.0, 6.0, 7.0, 8.0, 49.0, 50.0, 51.0, 4.0, 5.0, 6.0, 7.0, 8.0]
 

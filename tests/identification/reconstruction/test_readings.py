@@ -58,7 +58,7 @@ def test_orders_and_units_are_named(seed: int, dry: float) -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_friction_that_is_met_better_at_other_speeds_says_nothing_of_a_unit(seed: int) -> None:
     """Joints that slide slower than the plain fit's Coulomb friction fades in: read as revolutions, it would be there."""
-    motion = fourier_motion(60.0, 100.0, seed)
+    motion = fourier_motion(60.0, 300.0, seed)
     slow = replace(motion, time=30.0 * motion.time, v=motion.v / 30.0, vdot=motion.vdot / 900.0)
     tau = rigid_torque(three_axis(), slow.q, slow.v, slow.vdot) + 8 * np.sign(slow.v)
     check_torques([measured(slow, tau, seed, 0.0)], three_axis(), 1.0)

@@ -42,7 +42,7 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
         bare = model.predict(samples.motion) - replace(model, effects=()).predict(samples.motion)
         samples = replace(samples, tau=samples.tau - smooth(samples, bare))
     errors = standard_errors(model, samples, fitted_rows(chunk, found, shared))
-    if samples.cutoff_hz <= 0 or not data.in_memory:
+    if samples.cutoff_hz <= 0 or not errors.get("block_seconds"):
         return errors
     left = residual(replace(model, effects=()), samples)
     blocks = independent_blocks(samples.motion, errors["block_seconds"])

@@ -37,9 +37,6 @@ from armloop.util.progress import Progress, paced, silent
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
 #: Part of a joint's squared error that a rung must be worth for the joint to keep it.
 _KEEP = 0.002
-#: Elements that are together worth less than this part of the torque, root mean square, are not missed either: of a law that
-#: is met nearly exactly a hundredth of what is left is nothing, and where the joint is faster it may be much.
-_UNNOTICED = 1e-3
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
 _FADES = (0.003, 0.01, 0.03, 0.1)
 _WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
@@ -201,8 +198,7 @@ def select_friction(
         tell(f"friction: extension {level + 1} of {len(ladder)}")
         comparisons.append(state.take(level, extension.name, one_by_one=data.plenty))
     if data.plenty:
-        comparisons.append(state.eliminate_backward())
-    comparisons.append(state.drop_elements(data.plenty))
+        comparisons += [state.eliminate_backward(), state.drop_elements()]
     notes = [] if state.prior_name is None else [f"where the motion tells nothing: {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
@@ -265,28 +261,20 @@ class _State:
                         joints.add(j)
         return Comparison("backward elimination", before, self._error(self._errors), None, sorted(joints))
 
-    def drop_elements(self, plenty: bool) -> Comparison:
-        """Backward elimination of elements (widths, speeds, powers): those that a joint does not miss together.
+    def drop_elements(self) -> Comparison:
+        """Backward elimination of elements (widths, speeds, powers) that a joint does not miss together, the last first.
 
-        Where data are few, those alone that nobody would notice: the held-out folds cannot choose among so many.
+        The simpler and the sharper stay.
         """
-        before = self._error(self._errors)
-        joints = [j for j in range(len(self.taken)) if self._dropped_of(j, plenty)]
+        before, joints = self._error(self._errors), []
+        for j, dropped in enumerate(self._dropped):
+            for place in reversed(self.choice(self.taken)[j]):
+                dropped.add(place)
+                if -self._gain(self._held_out(self.taken), _SURE, [j])[0] >= _KEEP:
+                    dropped.remove(place)
+            joints += [j] if dropped else []
         self._weights, self._errors = self._judged()
         return Comparison("elements dropped", before, self._error(self._errors), None, joints)
-
-    def _dropped_of(self, joint: int, plenty: bool) -> set[int]:
-        """Drop elements of a joint, the last first, while they are not missed together: the simpler and the sharper stay."""
-
-        dropped = self._dropped[joint]
-        for place in reversed(self.choice(self.taken)[joint]):
-            dropped.add(place)
-            errors = self._held_out(self.taken)
-            rise = float((errors - self._errors)[:, joint].sum() / self._squares[joint])
-            missed = -self._gain(errors, _SURE, [joint])[0] >= _KEEP or not plenty
-            if missed and rise >= _UNNOTICED**2:
-                dropped.remove(place)
-        return dropped
 
     def _earns_alone(self, joint: int, level: int) -> bool:
         more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
