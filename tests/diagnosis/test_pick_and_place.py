@@ -168,7 +168,8 @@ class TestListedEffectsBeforeALaw:
         own: Any = outcome("first", first_left)
         nothing: Any = None
         stated: Any = SimpleNamespace(joint=1, left=own.after.held_out) if of.get("stated", True) else None
-        account = Account(nothing, [], nothing, own, stated)
+        evidence: Any = SimpleNamespace(rows=np.ones((40, 1), dtype=bool))
+        account = Account(nothing, [], evidence, own, stated)
         kept: Any = account._or_listed(found, lambda text: None, None)
         return kept.outcome.name, asked
 
