@@ -217,6 +217,16 @@ class TestLawThatIsNotListed:
         after.held_out[mine] = told + size * noise
         assert bool(unlisted._law(evidence, after, 1).terms) == is_law
 
+    @pytest.mark.parametrize(("error", "is_law"), [(0.33, True), (0.34, False)])
+    def test_a_coefficient_of_a_law_is_three_of_its_stated_errors_from_zero(
+        self, error: float, is_law: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        evidence, after, noise = self.moving()
+        mine = after.stacked.joint == 1
+        after.held_out[mine] = evidence.samples.motion.v[::2, 1] + 0.01 * noise
+        monkeypatch.setattr(unlisted, "covariance", lambda X, left, rows: error**2 * np.eye(X.shape[1]))
+        assert bool(unlisted._law(evidence, after, 1).terms) == is_law
+
     def test_at_most_four_functions_make_a_law(self) -> None:
         evidence, after, noise = self.moving()
         motion, mine = evidence.samples.motion, after.stacked.joint == 1

@@ -87,6 +87,15 @@ def test_what_differs_from_log_to_log_is_no_change_of_the_next(models: tuple[Any
     assert diagnose(differing, [worn(9, 3.0)], jobs=1).named == [("coulomb_friction", 2)]
 
 
+def test_the_baseline_of_a_run_holds_what_differs_between_logs(models: tuple[Any, Any]) -> None:
+    differing, _ = models
+    found = diagnose(differing, [worn(9, 0.0)], jobs=1)
+    spread = friction_spread(differing, found.samples)
+    own = np.array(differing.baseline["rmse"])
+    expected = np.sqrt(own**2 + np.mean((spread**2).sum(axis=2), axis=0))
+    assert found.errors()["noise_floor"] == pytest.approx(expected) and expected[1] > 1.2 * own[1]
+
+
 def test_the_torque_of_one_standard_deviation_grows_with_friction(models: tuple[Any, Any]) -> None:
     differing, alike = models
     motion = fourier_motion(20.0, 100.0, 5)
