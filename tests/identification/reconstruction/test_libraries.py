@@ -70,7 +70,7 @@ def entry(
     noise = spread * np.random.default_rng(len(library)).normal(size=12)
     made = SimpleNamespace()
     kind: Any = SimpleNamespace(name=library)
-    return Contender(kind, made, "", (nrmse,), coefficients, checks, nrmse**2 + noise)  # type: ignore[arg-type]
+    return Contender(kind, made, "", (nrmse,), coefficients, coefficients, checks, nrmse**2 + noise)  # type: ignore[arg-type]
 
 
 def taken(*entries: Contender) -> str:
@@ -107,11 +107,16 @@ def test_what_is_no_arm_is_not_taken_however_little_it_leaves() -> None:
     assert taken(entry("a", 0.01, 9, BAD), entry("b", 0.02, 9, BAD)) == "a"
 
 
-def test_fewer_coefficients_are_taken_where_the_difference_is_within_its_scatter() -> None:
+def test_the_simpler_is_taken_where_the_difference_is_within_its_scatter() -> None:
     apart = entry("many", 0.020, 40, GOOD), entry("few", 0.022, 15, GOOD)
     assert taken(*apart) == "many"
     alike = entry("many", 0.020, 40, GOOD, 1e-3), entry("few", 0.0201, 15, GOOD, 1e-3)
     assert taken(*alike) == "few"
+    # few, but picked from many
+    assert taken(alike[0], replace(alike[1], complexity=60.0)) == "many"
+    best, simplest = choose(alike)
+    assert "simplest of those that leave as little" in comparison_notes([best, simplest])[0]
+    assert "simplest" not in comparison_notes(choose(apart))[0]
 
 
 def test_a_library_that_the_logs_do_not_carry_is_left_out_with_the_reason() -> None:
@@ -319,6 +324,31 @@ def test_coefficients_of_effects_friction_and_bodies_add_up() -> None:
     nothing: Any = None
     attempt = Attempt(nothing, nothing, nothing, found)
     assert attempt.coefficients() == 3 + 5 + 6 and attempt.margin == 0.0
+
+
+@pytest.mark.parametrize(
+    ("shared", "independent", "picked_from"),
+    [(True, [70, 60], 60), (False, [70, 60], 2 * 130), (True, [6], 6)],
+)
+def test_coefficients_that_were_picked_weigh_what_they_were_picked_from(
+    shared: bool, independent: list[int], picked_from: int
+) -> None:
+    """k of p weigh k (1 + ln(p / k)), which is k where none was left out; friction and laws weigh one each."""
+    terms = SparseTerms(1, np.ones((6, 1)), np.eye(6)[:, :2] + np.eye(6)[:, 2:4] + np.eye(6)[:, 4:], ())
+    found: Any = SimpleNamespace(
+        arm=SimpleNamespace(n=2),
+        effects=[],
+        friction=[[1, 2], []],
+        components=[terms],
+        reports=[SimpleNamespace(independent=count) for count in independent],
+    )
+    library: Any = SimpleNamespace(shared=shared)
+    nothing: Any = None
+    attempt = Attempt(library, nothing, nothing, found)
+    assert attempt.coefficients() == 2 + 6
+    assert attempt.complexity() == pytest.approx(2 + 6 * (1 + np.log(picked_from / 6)))
+    bare = Attempt(library, nothing, nothing, SimpleNamespace(**{**vars(found), "components": []}))  # type: ignore[arg-type]
+    assert bare.complexity() == 2
 
 
 def test_what_leaves_less_but_is_no_arm_is_named() -> None:

@@ -129,7 +129,9 @@ class TestLibraries:
         attempt: Any = object() if of.get("tried", True) else None
         checks: Any = SimpleNamespace(passed=passed)
         own = np.array(blocks) if blocks is not None else None
-        return Contender(library, attempt, "too short", (error, None), coefficients, checks, own)
+        return Contender(
+            library, attempt, "too short", (error, None), coefficients, coefficients, checks, own
+        )
 
     def taken(self, *tried: Contender) -> list[int]:
         return [k for k, one in enumerate(choose(tried)) if one.chosen]
@@ -145,7 +147,7 @@ class TestLibraries:
         nothing: Any = None
         assert Contender(nothing, nrmse=(None,)).error == np.inf and self.contender(0.2, 1).error == 0.2
 
-    def test_fewer_coefficients_where_the_difference_is_within_its_standard_error(self) -> None:
+    def test_the_simpler_where_the_difference_is_within_its_standard_error(self) -> None:
         best = self.contender(0.1, 9, blocks=[1.0] * 8)
         spread = np.array([1, -1, 1, -1, 1, -1, 1, -1.0])
         error = float(np.sqrt(8 / 7 / 8))
