@@ -5,7 +5,10 @@ import json
 import os
 import re
 import stat
+import time
 from collections.abc import Callable
+from multiprocessing import get_context
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import pytest
@@ -335,6 +338,32 @@ def test_a_folder_in_use_says_so(place: Path, capsys: pytest.CaptureFixture[str]
             assert "another run writes into this folder" in capsys.readouterr().err
     finally:
         os.close(held)
+
+
+def _linger(begun: Event) -> None:
+    begun.set()
+    time.sleep(60)
+
+
+def test_a_worker_that_outlives_its_command_holds_no_folder(place: Path) -> None:
+    """As one does for a moment whose command was killed: the next run need not wait for it."""
+    for name in "de":
+        (place / name).mkdir()
+    with outputs.guarding("loop"):
+        outputs.take_folder(place / "d")
+        with outputs.guarding("track"):
+            outputs.take_folder(place / "e")
+            begun = get_context("fork").Event()
+            worker = get_context("fork").Process(target=_linger, args=(begun,))
+            worker.start()
+            assert begun.wait(60)
+    try:
+        with outputs.guarding("loop"):
+            outputs.take_folder(place / "d")
+            outputs.take_folder(place / "e")
+    finally:
+        worker.kill()
+        worker.join()
 
 
 def test_numbers_that_are_not_finite_are_null() -> None:

@@ -29,8 +29,8 @@ _LONGEST_RECORD = 1 << 22
 class _Guard:
     """A command that runs: its name, what it reads by device and inode, and what it has taken for itself."""
 
-    def __init__(self, command: str, force: bool) -> None:
-        self.command, self.force = command, force
+    def __init__(self, command: str, force: bool, around: _Guard | None) -> None:
+        self.command, self.force, self.around = command, force, around
         self.inputs: set[tuple[int, int]] = set()
         self.locks: list[int] = []
         self.made: list[Path] = []
@@ -41,6 +41,18 @@ class _Guard:
 _guard: _Guard | None = None
 
 
+def _let_go() -> None:
+    """A fork inherits a lock's open file, and would hold the lock a while after its command was killed."""
+    guard = _guard
+    while guard is not None:
+        while guard.locks:
+            os.close(guard.locks.pop())
+        guard = guard.around
+
+
+os.register_at_fork(after_in_child=_let_go)
+
+
 @contextmanager
 def guarding(command: str, inputs: Iterable[str | Path] = (), force: bool = False) -> Iterator[None]:
     """Hold outputs to the rules while the block runs; ``force`` leaves out all but the one on devices.
@@ -48,7 +60,7 @@ def guarding(command: str, inputs: Iterable[str | Path] = (), force: bool = Fals
     inputs : files that may be read; those that do not exist are passed over
     """
     global _guard
-    before, _guard = _guard, _Guard(command, force)
+    before, _guard = _guard, _Guard(command, force, _guard)
     try:
         for path in inputs:
             reading(path)
