@@ -37,8 +37,9 @@ from armloop.util.progress import Progress
 PLAIN, LIKELY = 0.75, 0.5
 #: … which must be at least this part of the joint's torque, both root mean square …
 NOTICEABLE = 0.03
-#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors):
-#: in ratios, so that no fast reversal outweighs the others; by Student's t, for they may be few.
+#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors): in
+#: ratios, so that no fast reversal outweighs the others, of errors beside the least noticeable one, so that none does
+#: at which there is nothing to remove; by Student's t, for they may be few.
 _CHANCE = 0.00135
 #: A simpler effect that leaves no more of the squared error than this part of it is as good.
 ALIKE = 0.1
@@ -182,7 +183,8 @@ class _View:
         mine = self.rows & (self.joint == j)
         before, after = current.held_out[mine] ** 2, trial.held_out[mine] ** 2
         gain = float(before.sum() - after.sum())
-        sums = [np.maximum(block_sums(x, self.block[mine]), TINY) for x in (before, after)]
+        least = max(self.noticeable[j], TINY)
+        sums = [block_sums(x + least, self.block[mine]) for x in (before, after)]
         noticed, always = (
             gain >= self.noticeable[j] * mine.sum(),
             MOSTLY * gain <= self.usual[j] * mine.sum(),
