@@ -1,6 +1,7 @@
 """The ladder takes the friction that is there and leaves out what is not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from armloop.identification.reconstruction import Options, reconstruct
 from armloop.identification.reconstruction.friction_selection import (
     Comparison,
     _notes,
+    _State,
     extensions,
     restricted,
 )
@@ -107,3 +109,24 @@ def test_what_a_law_brought_is_said_to_the_digit_that_decided():
         "friction, Stribeck: joints 1, 3; held-out nRMSE 0.00421 → 0.00408",
         "friction, offset: no joint; held-out nRMSE 0.004213, with it 0.004216",
     ]
+
+
+@pytest.mark.parametrize(
+    ("samples", "joints", "sure"),
+    [(1000, None, False), (1030, None, True), (2290, [1], False), (2330, [1], True)],
+)
+def test_a_rung_must_be_likelier_than_chance_makes_one_of_all_rungs_and_joints(
+    samples: int, joints: list[int] | None, sure: bool
+) -> None:
+    """Squared errors that fall by 1 % on each of five folds, of samples of which ten neighbours tell as much as one.
+
+    Half of 1 % of the 5 x 2 x samples / 10 values exceeds ln(8 / 0.05) from 1,015 on; of one joint's half as many values
+    ln(16 / 0.05) from 2,307 on.
+    """
+    state = object.__new__(_State)
+    state.pooled = SimpleNamespace(repeats=10.0)  # type: ignore[assignment]
+    state._counts, state._errors = np.full((5, 2), float(samples)), np.ones((5, 2))
+    state._places, state.taken = [[0]] * 8, [[], []]
+    after = np.exp(np.full((5, 2), -0.01) * ([1, 1] if joints is None else [0, 1]))
+    gain, found = state._gain(after, 1.0, joints)
+    assert gain == pytest.approx(0.01) and found is sure

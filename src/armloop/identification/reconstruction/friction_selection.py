@@ -5,8 +5,10 @@ Coulomb level it makes levels that differ with the direction), the Stribeck fall
 viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with memory
 before the joint slides, with and without load. A rung brings a row of elements (widths, speeds, powers), of which a
 passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
-scatter over the folds; else for the joints alone for which it falls by more than twice that. At the end, each joint
-hands back the rungs it does not miss, and of the others the elements.
+scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
+must be likelier by a factor that chance reaches with one of twenty ladders at most (the likelihood ratio of data that
+fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
+2020). At the end, each joint hands back the rungs it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
 
@@ -35,6 +37,8 @@ from armloop.util.progress import Progress, paced, silent
 
 #: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
+#: Chance that a ladder has a rung which nothing calls for.
+_LEVEL = 0.05
 #: Part of a joint's squared error that a rung must be worth for the joint to keep it.
 _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
@@ -303,16 +307,19 @@ class _State:
         return float(np.mean(np.sqrt(errors.sum(axis=0) / self._squares)))
 
     def _gain(self, errors: Array, times: float, joints: list[int] | None = None) -> tuple[float, bool]:
-        """Mean log ratio of the squared errors before and after, and whether it exceeds its scatter over the folds.
+        """Mean log ratio of the squared errors before and after; whether it exceeds its scatter over the folds and chance.
 
         In ratios, so that no joint and no fold that happens to be hard outweighs the others. ``joints`` are those
         whose errors the gain is a part of.
         """
         ratios = np.log(np.maximum(self._errors, TINY) / np.maximum(errors, TINY))
-        whole = (self._counts if joints is None else self._counts[:, joints]).sum()
-        gains = (self._counts * ratios).sum(axis=1) / max(whole, 1.0)
+        whole = max((self._counts if joints is None else self._counts[:, joints]).sum(), 1.0)
+        gains = (self._counts * ratios).sum(axis=1) / whole
         scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
-        return float(gains.sum()), float(gains.sum()) > times * scatter
+        likelihood = 0.5 * whole / self.pooled.repeats * gains.sum()
+        questions = len(self._places) * (1 if joints is None else len(self.taken))
+        sure = gains.sum() > times * scatter and likelihood > np.log(questions / _LEVEL)
+        return float(gains.sum()), bool(sure)
 
 
 def _notes(comparisons: list[Comparison]) -> list[str]:

@@ -86,7 +86,7 @@ class Pooled:
         self.candidates = candidates
         self.passive = passive
         self.folds = folds
-        self._repeats = repeats
+        self.repeats = repeats
         self._parts = [own[:folds] for own in sums.parts]
         self._judges = [own[:folds] for own in sums.judges]
         self._wholes = [total(parts) for parts in self._parts]
@@ -133,7 +133,7 @@ class Pooled:
                     for part, own in zip(wholes, self._spread(theta, choice), strict=True)
                 ]
                 weights = 1 / np.maximum(errors, TINY)
-        return Solution(theta, G, b, weights, self._repeats)
+        return Solution(theta, G, b, weights, self.repeats)
 
     def relative_errors(self, theta: Array, choice: Choice) -> Array:
         """(n,) nRMSE of coefficients on what judges the model; NaN for a joint that does not move there."""
@@ -163,7 +163,7 @@ class Pooled:
         For y = X θ + e with e of variance 1/weights: ½ (log|Λ| − log|G + Λ| + μᵀ (G + Λ) μ − θ₀ᵀ Λ θ₀), where
         μ is the posterior mean (Bishop, Pattern Recognition and Machine Learning, 2006, Sect. 3.5).
         """
-        G, b = self._equations(self._wholes, choice, weights / self._repeats, None)
+        G, b = self._equations(self._wholes, choice, weights / self.repeats, None)
         r, sizes = self.shared, np.diag(G).copy()
         # what the motion does not show has no size of its own
         sizes[:r] += np.diag(prior.precision)
@@ -199,7 +199,7 @@ class Pooled:
             start = end
         G[np.diag_indices(size)] *= 1 + _RIDGE
         if prior is not None:
-            precision = self._repeats * prior.precision
+            precision = self.repeats * prior.precision
             G[:r, :r] += precision
             b[:r] += precision @ prior.centre
         return G, b
