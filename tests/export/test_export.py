@@ -93,6 +93,18 @@ def test_what_becomes_of_the_links_names_is_said(tmp_path, target):
     assert any("links are named link_1, link_2, .." in note for note in found.notes)
 
 
+@pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf"])
+def test_a_tool_is_where_the_urdf_has_one_and_nowhere_else(tmp_path, target):
+    arm = ARMS["three_axis"]
+    for X_tool in (np.eye(4), arm.X_tool):
+        found = export(
+            model_of(replace(arm, X_tool=X_tool), disguised(arm, False), friction=PLAIN),
+            target,
+            tmp_path / "arm",
+        )
+        assert ('name="tool"' in found.files[0].read_text()) == (X_tool is arm.X_tool)
+
+
 @pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
 def test_energies_and_terms_become_the_bodies_they_are(tmp_path, target):
     if target == "mjcf":
