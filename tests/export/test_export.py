@@ -264,6 +264,14 @@ def test_the_exported_urdf_is_the_same_arm(tmp_path):
         np.testing.assert_allclose(again.X_tool, arm.X_tool, atol=1e-12)
 
 
+def test_a_continuous_joint_without_limits_stays_without(tmp_path):
+    arm = ARMS["three_axis"]
+    free = replace(arm.joints[0], lower=-np.inf, upper=np.inf, velocity=np.inf, effort=np.inf)
+    arm = replace(arm, joints=(free, *arm.joints[1:]))
+    export(model_of(arm, disguised(arm, False), friction=PLAIN), "urdf", tmp_path / "arm.urdf")
+    assert load_arm(tmp_path / "arm.urdf").joints == arm.joints
+
+
 def test_the_command_prints_and_answers(tmp_path, capsys):
     model_of(ARMS["three_axis"], friction=RICH).save(tmp_path / "model.json")
     line = ["export", str(tmp_path / "model.json"), "--to", "sdf", "--out", str(tmp_path / "arm.sdf")]
