@@ -258,5 +258,5 @@ def test_a_segment_settles_for_more_than_ten_samples(key, tmp_path, monkeypatch)
 def test_an_own_plant_without_friction_is_the_arm_that_collect_simulates(tmp_path):
     arm = tmp_path / "arm.urdf"
     arm.write_text(urdf_path("scara").read_text())
-    stated = "own_plant: {arm: arm.urdf}\nreference: {kind: fourier, duration: 2.0}\nscore: []\n"
+    stated = "own_plant: {arm: arm.urdf}\nreference: {kind: fourier, duration: 5.0}\nscore: []\n"
     assert load(tmp_path, stated).plant.config.friction == plant_for(arm).config.friction
