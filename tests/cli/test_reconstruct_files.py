@@ -93,8 +93,8 @@ def test_friction_is_restricted_to_the_laws_named(
     more = ["--library", "rigid-body", "--friction", "coulomb, viscous", "--jobs", "2"]
     command = ["reconstruct", *files, "--arm", "three_axis", "--out", str(tmp_path / "model.json")]
     assert main([*command, *more]) == 0
-    said = capsys.readouterr().out
-    assert "note: friction: nothing but coulomb, viscous" in said
-    assert "--jobs is not used: logs of up to 500,000 samples are kept in memory" in said
+    said = capsys.readouterr()
+    assert "note: friction: nothing but coulomb, viscous" in said.out
+    assert "--jobs is not used: logs of up to 500,000 samples are kept in memory" in said.err
     terms = json.loads((tmp_path / "model.json").read_text())["friction"]
     assert {term["kind"] for joint in terms for term in joint} <= {"smooth_sign", "viscous"}

@@ -328,8 +328,11 @@ def test_faults_of_tables_name_the_place(tmp_path, log, capsys):
     out = ["--out", str(tmp_path / "o.csv")]
     cases = {
         "cut.csv": ([*lines[:-1], lines[-1][:20]], "row 600 (line 601)"),
-        "text.csv": ([*lines[:9], lines[9].replace(",", ",x", 1), *lines[10:]], "row 9"),
-        "back.csv": ([*lines[:9], lines[5], *lines[10:]], "row 9"),
+        "text.csv": ([*lines[:9], lines[9].replace(",", ",x", 1), *lines[10:]], "row 9 (line 10)"),
+        "back.csv": (
+            ["# of a Tuesday", *lines[:4], "", *lines[4:9], lines[5], *lines[10:]],
+            "row 9 (line 12)",
+        ),
         "none.csv": (lines[:1], "no rows"),
         "numbers.csv": (lines[1:], "header"),
     }

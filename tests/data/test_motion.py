@@ -43,3 +43,16 @@ def test_runs_lie_within_the_motion(starts: list[float], said: str) -> None:
 def test_a_motion_of_no_numbers_is_refused() -> None:
     with pytest.raises(InputError, match=r"q of a motion must be an array of numbers; .* holds complex128"):
         Motion(TIME, 1j * REST, REST, REST)
+
+
+def test_time_does_not_fall_within_a_run() -> None:
+    x = np.zeros((4, 1))
+    for time, starts in (([0.0, 0.1, 0.1, 0.2], [0]), ([0.0, 0.1, 0.0, 0.1], [0, 2])):
+        assert Motion(np.array(time), x, x, x, np.array(starts)).samples == 4
+    with pytest.raises(InputError, match=r"within a run: it does at sample 2, 0\.1 to 0 s"):
+        Motion(np.array([0.0, 0.1, 0.0, 0.1]), x, x, x)
+    several = Motion(np.array([0.0, 0.1, 0.0, 0.1]), x, x, x, np.array([0, 2]))
+    assert several.take([0, 1, 3]).starts.tolist() == [0] and several.take([1, 2, 3]).starts.tolist() == [
+        0,
+        1,
+    ]

@@ -93,6 +93,18 @@ def test_what_becomes_of_the_links_names_is_said(tmp_path, target):
     assert any("links are named link_1, link_2, .." in note for note in found.notes)
 
 
+@pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf"])
+def test_a_tool_is_where_the_urdf_has_one_and_nowhere_else(tmp_path, target):
+    arm = ARMS["three_axis"]
+    for X_tool in (np.eye(4), arm.X_tool):
+        found = export(
+            model_of(replace(arm, X_tool=X_tool), disguised(arm, False), friction=PLAIN),
+            target,
+            tmp_path / "arm",
+        )
+        assert ('name="tool"' in found.files[0].read_text()) == (X_tool is arm.X_tool)
+
+
 @pytest.mark.parametrize("target", ["urdf", "sdf", "mjcf", "drake"])
 def test_energies_and_terms_become_the_bodies_they_are(tmp_path, target):
     if target == "mjcf":
@@ -250,6 +262,14 @@ def test_the_exported_urdf_is_the_same_arm(tmp_path):
         assert again.fingerprint() == arm.fingerprint()
         assert [j.name for j in again.joints] == [j.name for j in arm.joints]
         np.testing.assert_allclose(again.X_tool, arm.X_tool, atol=1e-12)
+
+
+def test_a_continuous_joint_without_limits_stays_without(tmp_path):
+    arm = ARMS["three_axis"]
+    free = replace(arm.joints[0], lower=-np.inf, upper=np.inf, velocity=np.inf, effort=np.inf)
+    arm = replace(arm, joints=(free, *arm.joints[1:]))
+    export(model_of(arm, disguised(arm, False), friction=PLAIN), "urdf", tmp_path / "arm.urdf")
+    assert load_arm(tmp_path / "arm.urdf").joints == arm.joints
 
 
 def test_the_command_prints_and_answers(tmp_path, capsys):

@@ -31,6 +31,18 @@ def test_a_violated_bound_is_met_and_the_rest_follows():
         constrained_least_squares(G, b, np.linalg.solve(G, b), cuts, 0.99)
 
 
+def test_a_coefficient_that_no_data_show_gives_way_to_a_constraint():
+    # min (x+1)² with x + y ≥ 0, y in no equation: y = 1 costs nothing
+    G, b = np.diag([1.0, 0.0]), np.array([-1.0, 0.0])
+
+    def cuts(theta):
+        return np.array([[1.0, 1.0]]) if theta.sum() < -1e-8 else np.zeros((0, 2))
+
+    theta, active = constrained_least_squares(G, b, b, cuts)
+    np.testing.assert_allclose(theta, [-1.0, 1.0], atol=1e-6)
+    assert active == 1
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_matrix_is_kept_positive_definite_by_cuts_though_columns_differ_by_orders(seed):
     rng = np.random.default_rng(seed)

@@ -129,4 +129,4 @@ def test_a_ridge_holds_what_equal_columns_do_not_tell_apart():
 
 def test_columns_of_given_squares_are_made_one_long():
     assert unit_length(np.array([4.0, 0.01, 1e-300])).tolist() == pytest.approx([0.5, 10.0, 1e150])
-    assert np.isfinite(unit_length(np.zeros(1))).all()
+    assert unit_length(np.zeros(1)).tolist() == [1.0]

@@ -9,7 +9,7 @@ from answers import answered
 
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.reports.plots.loops import bode_figure
-from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
 from armloop.util.progress import silent
 from armloop.workflows import tune_scenario
 
@@ -49,3 +49,10 @@ def test_files_tables_and_a_better_loop(tmp_path):
     assert [len(axes.lines) for axes in alone.axes] == [len(axes.lines) - 1 for axes in bode.axes]
     for table in (gains_table, margins_table, verified_table):
         assert len(table(tuning).rows) == 6
+    # asked for what these gains have is missing nothing; each joint alone then would have to be faster than it is
+    has = min(m.bandwidth for m in tuning.proposed.margins)
+    thin = min(m.phase_margin for m in tuning.proposed.margins)
+    assert missed_notes(dataclasses.replace(tuning, bandwidth=has, margin=thin)) == []
+    slow = missed_notes(dataclasses.replace(tuning, bandwidth=4 * np.pi * has, margin=thin))
+    assert len(slow) == 3 and all("Hz of bandwidth, not" in note for note in slow)
+    assert missed_notes(tuning)[0].startswith("Joint 2 has 4.4") and "and here they move it" in page

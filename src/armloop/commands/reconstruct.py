@@ -96,6 +96,7 @@ def run(options: Reconstruct) -> None:
         score_table,
         steps_table,
     )
+    from armloop.util.doubts import warn
     from armloop.util.files import write_text
     from armloop.util.workers import Cluster, Processes
 
@@ -108,9 +109,7 @@ def run(options: Reconstruct) -> None:
     most = 0 if options.scheduler else IN_MEMORY
     logs = log_sources(options.logs, arm.n, recorded, most)
     if options.jobs is not None and sum(log.samples for log in logs) <= most:
-        progress(options)(
-            f"--jobs is not used: logs of up to {most:,} samples are kept in memory and regressed at once"
-        )
+        warn(f"--jobs is not used: logs of up to {most:,} samples are kept in memory and regressed at once")
     workers = Cluster(options.scheduler) if options.scheduler else Processes(options.jobs)
     try:
         result = run(
@@ -126,7 +125,7 @@ def run(options: Reconstruct) -> None:
                 snr=snr,
                 friction=_laws(options.friction),
             ),
-            progress(options),
+            progress(),
             recorded,
             workers,
             in_memory=most,
@@ -137,7 +136,7 @@ def run(options: Reconstruct) -> None:
     if options.report:
         from armloop.reports.reconstruction_report import reconstruction_report
 
-        progress(options)("drawing the report")
+        progress()("drawing the report")
         write_text(options.report, reconstruction_report(result, first_samples(logs)))
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})

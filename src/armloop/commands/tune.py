@@ -39,17 +39,19 @@ def run(options: Tune) -> None:
     find_scenario(options.scenario)  # before Drake is imported
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.model import load_model
-    from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+    from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
     from armloop.workflows import tune_scenario
 
     scenario = load_tracking(options.scenario, simulated_arm(options))
     model = load_model(options.model, scenario.plant.arm) if options.model else None
     answer, tuning = tune_scenario(
-        scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress(options)
+        scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress()
     )
     if options.json:
         print_json(answer)
         return
     print("\n\n".join(str(table(tuning)) for table in (gains_table, margins_table, verified_table)))
+    for note in missed_notes(tuning):
+        print(f"note: {note}")
     if folder is not None:
         print(f"\nwritten: {folder}/tune.json, report.html, bode.png, step.png")

@@ -272,7 +272,7 @@ def _cells(recording: Recording, name: str, needed: str, correct: str) -> Array:
     bad = np.flatnonzero(~np.isfinite(cells))
     if len(bad):
         raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {int(bad[0]) + 1}: not a number "
+            f"{recording.path}: column {name}, {recording.place(int(bad[0]))}: not a number "
             f"({len(bad)} of {len(cells)}); correct {correct}"
         )
     return cells
@@ -292,7 +292,7 @@ def _time(recording: Recording, mapping: Mapping) -> tuple[Array, NDArray[np.int
     if len(back):
         row = int(back[0])
         raise LogError(
-            f"{recording.path}: column {name}, {recording.rows} {row + 1}: {raw[row]:.9g} follows {raw[row - 1]:.9g}; "
+            f"{recording.path}: column {name}, {recording.place(row)}: {raw[row]:.9g} follows {raw[row - 1]:.9g}; "
             "time must rise; give runs that were recorded one by one as files of their own"
         )
     keep = np.flatnonzero(step > 0)

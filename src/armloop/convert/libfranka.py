@@ -45,4 +45,6 @@ def read_libfranka(path: Path) -> Recording:
     )
     notes = [f"{len(table.starts)} logs below each other"] if len(table.starts) > 1 else []
     notes += [f"{clocks[0]} is in {unit}", *table.left_out()]
-    return Recording(path, "libfranka log", columns, mapping, starts=table.starts, notes=notes)
+    return Recording(
+        path, "libfranka log", columns, mapping, starts=table.starts, notes=notes, lines=table.lines
+    )

@@ -31,6 +31,12 @@ class Recording:
     )  # what the columns' names leave open, by field of the map
     units: dict[str, str] = field(default_factory=dict)  # by column, what a row below the header says
 
+    lines: Sequence[int] = ()  # of a text file, the line that each row stands in, from 1
+
+    def place(self, row: int) -> str:
+        """A row for a message, from 0 here and from 1 there, with its line in a text file."""
+        return f"{self.rows} {row + 1}" + (f" (line {self.lines[row]})" if self.lines else "")
+
     @property
     def samples(self) -> int:
         """The number of rows."""

@@ -45,4 +45,6 @@ def read_rtde(path: Path) -> Recording:
         TimeMap("timestamp", "s"), QuantityMap(names("actual_q"), "rad"), QuantityMap(names(stem), unit), v
     )
     notes = [f"tau is {stem}", *table.left_out()]
-    return Recording(path, "UR RTDE recording", columns, mapping, starts=table.starts, notes=notes)
+    return Recording(
+        path, "UR RTDE recording", columns, mapping, starts=table.starts, notes=notes, lines=table.lines
+    )

@@ -27,7 +27,15 @@ def read_table(path: Path) -> Recording:
                 f"{path}: column {name} stands twice, with other numbers; give each a name of its own"
             )
     return Recording(
-        path, kind, columns, mapping, starts=table.starts, notes=said, unsure=unsure, units=units
+        path,
+        kind,
+        columns,
+        mapping,
+        starts=table.starts,
+        notes=said,
+        unsure=unsure,
+        units=units,
+        lines=table.lines,
     )
 
 

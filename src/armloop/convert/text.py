@@ -26,7 +26,8 @@ _CONTROL = [bytes([k]) for k in range(32) if k not in (9, 10, 12, 13)]
 
 @dataclass
 class TextTable:
-    """Columns of a table; ``starts`` holds the first row below each header, ``units`` what a row below it says.
+    """Columns of a table; ``starts`` holds the first row below each header, ``units`` what a row below it says, ``lines``
+    the line of the file that each row stands in, from 1.
 
     ``twice`` names those that stand a second time with other numbers.
     """
@@ -37,6 +38,7 @@ class TextTable:
     units: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     twice: list[str] = field(default_factory=list)
+    lines: list[int] = field(default_factory=list)
 
     def left_out(self) -> list[str]:
         """What is to be said of the columns that are dropped."""
@@ -141,7 +143,7 @@ def read_text(path: Path) -> TextTable:
             notes.append(f"{name}: dates or times of day, counted in s from the first row")
         else:
             dropped.append(f"{name} (empty)" if pyarrow.types.is_null(kind) else f"{name} ({kind})")
-    return TextTable(columns, starts, dropped, units, notes, twice)
+    return TextTable(columns, starts, dropped, units, notes, twice, numbers)
 
 
 def numbers_of(cells: Any) -> Array:

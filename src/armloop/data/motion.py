@@ -59,6 +59,14 @@ class Motion:
                 raise InputError(
                     f"starts must rise, each the index of one of the {self.samples} samples; the last is {last}"
                 )
+        falls = np.flatnonzero(self.time[1:] < self.time[:-1]) + 1
+        falls = falls[~np.isin(falls, self.starts)] if len(falls) else falls
+        if len(falls):
+            row = int(falls[0])
+            raise InputError(
+                f"time must not fall within a run: it does at sample {row}, {self.time[row - 1]:g} to {self.time[row]:g} s; "
+                "starts takes the first sample of each run"
+            )
         if self.begins is not None and self.begins.shape != self.starts.shape:
             raise InputError(
                 f"begins must have the shape of starts, {self.starts.shape}; it is {self.begins.shape}"
@@ -83,9 +91,10 @@ class Motion:
         return cls(np.arange(float(len(postures))), postures, np.zeros_like(postures), unit)
 
     def take(self, rows: Any, starts: Index | None = None) -> "Motion":
-        """Return some of the samples, in order, as one run, unless `starts` says otherwise."""
-        starts = np.array([0]) if starts is None else starts
-        return Motion(self.time[rows], self.q[rows], self.v[rows], self.vdot[rows], starts)
+        """Return some of the samples, in order, as one run of each record's clock, unless `starts` says otherwise."""
+        time = self.time[rows]
+        starts = np.concatenate([[0], np.flatnonzero(time[1:] < time[:-1]) + 1]) if starts is None else starts
+        return Motion(time, self.q[rows], self.v[rows], self.vdot[rows], starts)
 
     @property
     def samples(self) -> int:

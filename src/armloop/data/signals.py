@@ -129,7 +129,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     if not parts:
         longest = max(float(np.ptp(log.time[run])) for log in logs for run in log.runs())
         raise ShortRunError(
-            f"{logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
+            f"log {logs[0].name}: the longest run without a gap lasts {longest:.3g} s; with a filter of "
             f"{how.cutoff_hz:g} Hz a run must last at least {how.shortest:.3g} s"
         )
     # All at the period of the coarsest, on cubic splines: they have passed the filter, and even the coarsest keeps what has.
@@ -309,7 +309,7 @@ def _as_they_are(logs: Sequence[MotionLog]) -> Samples:
     for log in logs:
         if log.vdot is None:
             raise LogError(
-                f"{log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}"
+                f"log {log.name}: without a filter the log must bring its own columns vdot1..vdot{log.joints}"
             )
     q, v, vdot, tau = (
         np.concatenate([np.asarray(getattr(log, key)) for log in logs]) for key in ("q", "v", "vdot", "tau")

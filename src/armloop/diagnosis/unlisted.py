@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.data.blocks import block_sums
-from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
 from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, gain, lead
@@ -276,8 +275,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
     y = after.held_out[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
-    motion = evidence.samples.motion
-    moving = Motion(motion.time[rows], motion.q[rows], motion.v[rows], motion.vdot[rows], np.array([0]))
+    moving = evidence.samples.motion.take(rows)
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, own = library.columns(moving), moving.v[:, [j]]
     X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])

@@ -18,7 +18,7 @@ _MOST = 400
 #: What a description of the arm does not take over from its URDF, of which a model has the moving joints alone.
 NAMES = (
     "joints keep their names; links are named link_1, link_2, .. from the base on, and what the URDF fixes to one (links, "
-    "frames) is part of it and has no frame of its own, but for the link tool"
+    "frames) is part of it and has no frame of its own, but for a link named tool"
 )
 
 

@@ -114,8 +114,8 @@ class Moments(Sums):
 
 
 def unit_length(squares: Array) -> Array:
-    """(p,) factors that make columns of these squared lengths (p,) one long; finite for a column of nothing."""
-    return np.asarray(1 / np.sqrt(np.maximum(squares, TINY)))
+    """(p,) factors that make columns of these squared lengths (p,) one long; 1 for a column of nothing, which has none."""
+    return np.asarray(1 / np.sqrt(np.where(squares > 0, squares, 1.0)))
 
 
 def equilibrated(G: Array, ridge: float) -> tuple[Array, Array]:

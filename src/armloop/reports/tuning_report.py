@@ -9,7 +9,7 @@ import numpy as np
 from armloop.reports.html import Card, Picture, Report, Section, render
 from armloop.reports.plots.loops import bode_figure, step_figure
 from armloop.reports.prose import Prose
-from armloop.reports.tuning_tables import gains_table, margins_table, verified_table
+from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
 from armloop.reports.words import number
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ def tuning_report(tuning: Tuning) -> str:
         say.paragraphs("loops"),
         [Picture(bode_figure(tuning), say["bode"])],
         [gains_table(tuning), margins_table(tuning)],
+        notes=missed_notes(tuning),
     )
     verified = Section(
         "On the simulated arm",

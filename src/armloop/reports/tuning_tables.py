@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table, percent
 
 if TYPE_CHECKING:
@@ -60,6 +61,12 @@ def verified_table(tuning: Tuning) -> Table:
         rows,
         "On the simulated arm",
     )
+
+
+def missed_notes(tuning: Tuning) -> list[str]:
+    """What was wanted and is not reached, a sentence each."""
+    say = Prose("tuning", tuning=tuning)
+    return say.paragraphs("missed")
 
 
 def _both(tuning: Tuning) -> tuple[tuple[str, TunedLoop], ...]:

@@ -43,7 +43,9 @@ class PlantData(Struct, forbid_unknown_fields=True):
         str, Finite
     ] = {}  # positions, rad (m), of moving joints that are fixed there, such as a gripper's
     tip: Name = ""  # the arm's last link; moving joints off the way to it are fixed at zero
-    friction: Annotated[list[FrictionData], Meta(max_length=MOST_JOINTS)] = []  # one per joint, base to tip
+    friction: Annotated[
+        list[FrictionData], Meta(max_length=MOST_JOINTS)
+    ] = []  # one per joint, base to tip; of a usual size when empty
     ranges: RangesData | None = None  # from the limits when absent
     time_step: Annotated[float, Meta(ge=1e-4, le=5e-3)] = 0.001  # s, of the plant and of the controllers
     encoder_counts: Annotated[int, Meta(ge=0, le=1 << 40)] = 524288  # per revolution; 0 for ideal encoders

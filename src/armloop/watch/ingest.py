@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armloop.monitoring.sums import log_sums
+from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers
@@ -64,7 +65,7 @@ def ingest(
             digest = file.digest()
         except InputError as error:
             counts += Counts(aside=1)
-            progress(f"set aside: {error}")
+            warn(f"set aside: {error}")
             continue
         if digest in places:
             counts += Counts(known=1)

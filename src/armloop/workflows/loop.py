@@ -66,7 +66,7 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
     scenario = load_tracking(SCENARIO)
     plant = scenario.plant
     seconds: dict[str, float] = {}
-    clock = partial(_clock, seconds, progress)
+    clock = partial(_clock, seconds)
     with clock("collect", "1/7 measure: collecting three logs on the simulated arm"):
         tell = paced(progress)
         logs = collect(
@@ -109,9 +109,15 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
             labels = {name: controller(name) for name in tracking}
             write_replay(folder / "replay.html", plant.arm, tracking, labels=labels)
             before, after = before_run.result(), after_run.result()
+        right = _is_right(diagnosis, undeclared)
+        again = {"before (model as collected)": before, "after (augmented model)": after}
+        print(eta_table(again, paper=False))
+        print(
+            f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}\n"
+        )
         with clock("measured", "6/7 the same on measured data: a UR5 that was pushed"):
             measured_words, measured_section = pushed.result()
-    right = _is_right(diagnosis, undeclared)
+        print(f"On measured data (currents as logged)\n\n{measured_words}\n", flush=True)
     result = LoopResult(
         seed=seed,
         arm=plant.arm,
@@ -128,13 +134,6 @@ def run_loop(folder: Path, seed: int, progress: Progress) -> LoopResult:
         seconds=seconds,
         notes=reconstruction.notes,
     )
-    again = {"before (model as collected)": before, "after (augmented model)": after}
-    print(eta_table(again, paper=False))
-    print(
-        f"undeclared effect: {_in_words(undeclared)}; the verdict was {'right' if right else 'WRONG'}",
-        flush=True,
-    )
-    print(f"\nOn measured data (a UR5, currents as logged)\n\n{measured_words}\n", flush=True)
     with clock("report", "7/7 writing the report"):
         write_json(folder / "loop.json", loop_answer(result, scenario))
         sections = [Section.from_dict(measured_section)]
@@ -210,9 +209,9 @@ def _in_words(undeclared: UndeclaredEffect) -> str:
 
 
 @contextmanager
-def _clock(seconds: dict[str, float], progress: Progress, stage: str, words: str) -> Iterator[None]:
-    """Announce a stage and keep its wall time."""
-    progress(words)
+def _clock(seconds: dict[str, float], stage: str, words: str) -> Iterator[None]:
+    """Announce a stage, for what is printed in it, and keep its wall time."""
+    print(words, flush=True)
     start = time.perf_counter()
     yield
     seconds[stage] = time.perf_counter() - start

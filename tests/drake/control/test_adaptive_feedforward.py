@@ -164,17 +164,21 @@ def test_by_default_half_of_the_effort_and_times_above_zero() -> None:
             AdaptiveFeedforward(model, **wrong)  # type: ignore[arg-type]
 
 
-def test_what_is_given_back_while_a_later_name_settles_fades_by_the_whole_ramp() -> None:
+def test_it_is_not_judged_in_the_middle_of_a_blend_so_that_its_torque_never_jumps() -> None:
     loop = Loop(trial=1.5)
     loop.to(0.2)
     loop.known = Known(1, (torque(2.0),), since=0.1)
     loop.to(0.25)
-    loop.error = 1.0  # named at 0.25 s, judged at 2.75 s
-    # supplied from 2.25 s on, it would settle at 3.25 s
+    loop.error = 1.0  # named at 0.25 s, to be judged at 2.75 s
+    # blended in from 2.25 s on, and to settle from 3.25 s on
     loop.known = Known(2, (torque(2.0), torque(1.0, "more")), since=0.1)
-    loop.to(2.75)
-    assert loop.given_back == 1
     full = np.array([3.0, 4.0, 0.0])
-    assert_allclose(loop.to(3.2), 0.55 * full)
-    assert_allclose(loop.to(3.5), 0.25 * full)
-    assert_allclose(loop.to(3.75), 0.0, atol=1e-12)
+    assert_allclose(loop.to(2.75), 0.5 * full + 0.5 * np.array([2.0, 2.0, 0.0]))
+    loop.to(3.2)
+    assert loop.given_back == 0
+    assert_allclose(loop.to(3.25), full)
+    assert loop.given_back == 1
+    # by the whole ramp, and nothing is left to settle
+    assert_allclose(loop.to(3.7), 0.55 * full)
+    assert_allclose(loop.to(4.0), 0.25 * full)
+    assert_allclose(loop.to(4.25), 0.0, atol=1e-12)

@@ -10,12 +10,18 @@ from numpy.testing import assert_allclose
 from armloop.drake.control.controllers import LISTED
 from armloop.drake.experiments import scenarios
 from armloop.drake.experiments.collection import CollectionPlan
-from armloop.drake.experiments.scenarios import load_plan, load_plant, load_tracking, plant_names
+from armloop.drake.experiments.scenarios import (
+    load_plan,
+    load_plant,
+    load_tracking,
+    plant_for,
+    plant_names,
+)
 from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.experiment.excitation import fourier_reference, write_reference
 from armloop.schemas.scenarios import PlanData, PlantData
 from armloop.util.errors import ScenarioError
-from armloop.util.resources import scenario_path
+from armloop.util.resources import scenario_path, urdf_path
 
 OWN = """
 own_plant:
@@ -247,3 +253,10 @@ def test_a_segment_settles_for_more_than_ten_samples(key, tmp_path, monkeypatch)
                 load_plan("mine")
         else:
             assert getattr(load_plan("mine"), key) == seconds
+
+
+def test_an_own_plant_without_friction_is_the_arm_that_collect_simulates(tmp_path):
+    arm = tmp_path / "arm.urdf"
+    arm.write_text(urdf_path("scara").read_text())
+    stated = "own_plant: {arm: arm.urdf}\nreference: {kind: fourier, duration: 5.0}\nscore: []\n"
+    assert load(tmp_path, stated).plant.config.friction == plant_for(arm).config.friction

@@ -121,7 +121,7 @@ def test_an_explicit_corner_stands_and_must_lie_below_the_nyquist_rate(
     found = reconstruct([log], three_axis(), library="rigid-body", conditioning=TEN_HZ, options=how)
     assert found.model.conditioning.cutoff_hz == 10.0
     with pytest.raises(
-        LogError, match=r"run: a cutoff of 50 Hz is not below 50 Hz, half of the 100 samples a second"
+        LogError, match=r"^log run: a cutoff of 50 Hz is not below 50 Hz, half of the 100 samples a second"
     ):
         reconstruct([log], three_axis(), conditioning=Conditioning(cutoff_hz=50.0))
     write_log(tmp_path / "run.csv", log)

@@ -58,9 +58,9 @@ class AdaptiveFeedforward(LeafSystem):
     each the sum of the effects' torques at q_ref, v_ref, vdot_ref; nothing before the first name. A new revision is
     blended in from the one before. What the controller's integrator has learned of the change meanwhile is taken off
     by the same ramp, as a constant, -(I(t_named) - I(t_change)), so that it need not unwind, and once more after the ramp,
-    during which it went on learning. `trial` seconds after the
-    ramp the mean absolute tracking error is compared with that of the `trial` seconds before the first name: where it
-    has become more than a tenth worse the effect, and what was taken off for the integrator, is given back by the same
+    during which it went on learning. `trial` seconds after the ramp, or at the end of a blend that is under way then, the
+    mean absolute tracking error of the last `trial` seconds is compared with that of as many before the first name: where
+    it has become more than a tenth worse the effect, and what was taken off for the integrator, is given back by the same
     ramp, and what was named there is not taken again. Faults of sensors are not supplied.
 
     Input ports: `q_ref`, `v_ref`, `vdot_ref` (n,); `state` (2n,); `named`, abstract, of `ResidualMonitor`;
@@ -123,7 +123,9 @@ class AdaptiveFeedforward(LeafSystem):
         if held is not None and (not taken.integrals or time - taken.integrals[-1][0] > _REMEMBER - 1e-9):
             taken = replace(taken, integrals=(*taken.integrals, (time, held))[-_REMEMBERED:])
         known = self._named.Eval(context)
-        if time >= taken.judge_at:
+        # in the middle of a blend what is supplied is neither of its two ends
+        blended = time >= taken.since + self._ramp
+        if time >= taken.judge_at and blended:
             taken = replace(taken, judge_at=np.inf)
             if float(np.mean(taken.errors)) > _WORSE * taken.without:
                 refused = taken.refused | {added.effect.place for added in taken.now}
@@ -134,7 +136,7 @@ class AdaptiveFeedforward(LeafSystem):
             # the integrator went on learning during the ramp
             taken = _blended(taken, time, taken.now, _learned(taken, known.since, held))
             taken = replace(taken, settle_at=np.inf)
-        elif known.revision > taken.revision and time >= taken.since + self._ramp:
+        elif known.revision > taken.revision and blended:
             effects = tuple(
                 added
                 for added in known.effects

@@ -83,15 +83,12 @@ def plant_for(spec: str | Path | Arm, friction: tuple[JointFriction, ...] | None
     if built_in(spec):
         return load_plant(spec.name if isinstance(spec, Arm) else str(spec))
     arm = spec if isinstance(spec, Arm) else load_arm(spec)
-    if friction is None:
-        _say_unused(arm)
-        turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
-        friction = tuple(turning if turns else sliding for turns in arm.revolute)
-    return Plant(arm.name, arm, PlantConfig(friction, MotionRanges.of(arm)))
+    return Plant(arm.name, arm, PlantConfig(friction or _usual_friction(arm), MotionRanges.of(arm)))
 
 
-def _say_unused(arm: Arm) -> None:
-    """Say which joints of a URDF have a damping or a friction that the generic one takes the place of."""
+def _usual_friction(arm: Arm) -> tuple[JointFriction, ...]:
+    """Friction of a usual size for joints of which none is stated; says where it takes the place of a URDF's."""
+    turning, sliding = JointFriction(0.65, 0.5, 0.1, 1.0), JointFriction(6.5, 5.0, 0.01, 20.0)
     joints = ElementTree.fromstring(arm.urdf).iter("joint") if arm.urdf else ()
     stated = {
         joint.get("name")
@@ -105,6 +102,7 @@ def _say_unused(arm: Arm) -> None:
             f"{arm.name}: damping and friction in the URDF's <dynamics> of {', '.join(unused)} are not used: the simulated "
             "joints have friction of a usual size; state theirs as `friction` of a scenario's own_plant"
         )
+    return tuple(turning if turns else sliding for turns in arm.revolute)
 
 
 def plan_names() -> list[str]:
@@ -237,9 +235,9 @@ def _plant(name: str, data: PlantData, where: str, loaded: Arm | None = None) ->
         arm = loaded or load_arm(data.arm, data.lock, data.tip or None)
     except ArmError as error:
         raise ScenarioError(f"{where}: arm: {error}") from error
-    if len(data.friction) != arm.n:
+    if len(data.friction) not in (0, arm.n):
         raise ScenarioError(f"{where}: friction has {len(data.friction)} joints; {arm.name} has {arm.n}")
-    friction = []
+    friction = [] if data.friction else list(_usual_friction(arm))
     for j, values in enumerate(data.friction):
         try:
             friction.append(JointFriction(**asdict(values)))

@@ -17,7 +17,7 @@ from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 
 _TURNS = 60
-_CLOSE = 0.01
+CLOSE = 0.01
 """A bandwidth within this part of the wanted one is right."""
 _INTEGRAL = 0.1
 """The integrator's corner k_i / k_p, as a part of the crossover."""
@@ -58,7 +58,7 @@ def _joint(
     for _ in range(_TURNS):
         gains = _at_crossover(sampled, crossing, np.deg2rad(margin))
         reached = sampled_margins(sampled, gains, points=2000)[0].bandwidth
-        if abs(reached / bandwidth - 1) < _CLOSE and sampled.is_stable(gains):
+        if abs(reached / bandwidth - 1) < CLOSE and sampled.is_stable(gains):
             return float(gains.kp[0]), float(gains.ki[0]), float(gains.kd[0])
         crossing *= float(np.clip(bandwidth / reached, 0.7, 1.4))
     raise InputError(

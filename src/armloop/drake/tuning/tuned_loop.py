@@ -9,6 +9,7 @@ import numpy as np
 from armloop.drake.control.pid import PidGains
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.experiments.tracking import TrackingResult, run_tracking
+from armloop.drake.tuning.gain_design import CLOSE
 from armloop.drake.tuning.loop_analysis import (
     LoopMargins,
     SampledArm,
@@ -63,6 +64,14 @@ class Tuning:
     margin: float
     present: TunedLoop
     proposed: TunedLoop
+
+    def missed(self) -> list[tuple[str, int, float, float]]:
+        """What the proposed gains miss once all loops are closed: "Hz" of bandwidth or "deg" of phase margin, of which joint
+        (from 1), what it has and what was wanted."""
+        loops = list(enumerate(self.proposed.margins, 1))
+        found = [("Hz", j, m.bandwidth / (2 * np.pi), self.bandwidth / (2 * np.pi)) for j, m in loops]
+        found += [("deg", j, m.phase_margin, self.margin) for j, m in loops]
+        return [(unit, j, has, wanted) for unit, j, has, wanted in found if has < (1 - CLOSE) * wanted]
 
 
 def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:

@@ -137,7 +137,7 @@ def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
     for log in even_selection(logs):
         if cutoff_hz >= (0.5 - 1e-6) / log.period:
             raise LogError(
-                f"{log.name}: a cutoff of {cutoff_hz:g} Hz is not below {0.5 / log.period:.4g} Hz, half of the "
+                f"log {log.name}: a cutoff of {cutoff_hz:g} Hz is not below {0.5 / log.period:.4g} Hz, half of the "
                 f"{1 / log.period:.4g} samples a second; give a lower one, or 0 for no filter"
             )
 

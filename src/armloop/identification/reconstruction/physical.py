@@ -134,8 +134,8 @@ def physical_solution(
             return PhysicalSolution(theta, binding, where, left)
     if failed is not None:
         raise ExcitationError(
-            "the motion tells too little: no physically possible inertial parameters can be found for it; log "
-            "exciting motion of all joints, each moving apart from the others"
+            f"the search for physically possible inertial parameters ended without any ({failed}), as where the motion "
+            "tells too little: log exciting motion of all joints, each moving apart from the others, or give --no-physical"
         ) from failed
     return PhysicalSolution(solution.theta, 0, FREE)
 

@@ -124,7 +124,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         found.reports.append(StepReport(step, None, size, base.count, counts, samples_per_joint))
     found.notes = [
         "the three steps share one set of parameters, regressed together: a step is a part of that model",
-        "errors are of a model fitted without the held-out blocks; the one that is written was then fitted to all data",
+        "errors are of a model fitted without the held-out blocks; the model itself is fitted to all data",
         *unknown,
         *ladder.notes,
         *laws.notes(final.effects),
