@@ -107,10 +107,7 @@ def _ReferenceTable_(T: type) -> Any:
     class Impl(LeafSystem_[T]):
         """A table, held row by row, whose last n columns are filled in, chunk by chunk, when they are needed."""
 
-        def _construct(
-            self, tables: tuple[Array, Array, Array], period: float, *, converter: Any = None
-        ) -> None:
-            LeafSystem_[T].__init__(self, converter=converter)
+        def _construct(self, tables: tuple[Array, Array, Array], period: float) -> None:
             n = self._n = tables[0].shape[1]
             self._period = period
             self._rows = np.hstack([*tables, np.zeros_like(tables[0])])
@@ -119,7 +116,7 @@ def _ReferenceTable_(T: type) -> Any:
             self.set_model(None, 3)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, **other._given, converter=converter)
+            Impl._construct(self, **{**other._given, "converter": converter})
             self._model, self._step, self._equations = other._model, other._step, other._equations
             self._rows, self._filled = other._rows.copy(), list(other._filled)
 

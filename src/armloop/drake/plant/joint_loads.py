@@ -73,12 +73,10 @@ def JointLoads_(T: type) -> Any:
             servo: ServoGains | None = None,
             X_tool: Array,
             law: Law | None = None,
-            converter: Any = None,
         ) -> None:
             """plant : finalized and discrete, its joints' damping is the viscous friction, a drive on each joint;
             friction : n joints; X_tool : (4, 4) of the tool in the last link's frame, where contacts push;
             law : further torques (n,) that the drives must supply, of positions and velocities as lists"""
-            LeafSystem_[T].__init__(self, converter=converter)
             n = len(friction)
             self._n = n
             # a clone predicts with the same plant, a conversion with one of its own scalar type
