@@ -13,10 +13,9 @@ from pydrake.multibody.plant import MultibodyPlant, MultibodyPlant_
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import LeafSystem_
 
-from armloop.drake.plant.fault_injection import Realisation
+from armloop.drake.plant.fault_injection import Law, Realisation
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
-from armloop.drake.plant.own_effects import Law
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics.model import solve
