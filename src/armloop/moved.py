@@ -32,7 +32,7 @@ _BY_FOLDER = {
     ),
     ("armloop.drake_systems", "armloop.drake.plant"): (
         "beyond_bodies config effect_system exact forward_dynamics friction friction_system implicit "
-        "joint_loads model_expressions nearest_friction own_effects plant sticking"
+        "joint_loads model_expressions nearest_friction plant sticking"
     ),
     ("armloop.drake_systems", "armloop.drake.tuning"): "gain_design loop_analysis step_check tuned_loop",
     ("armloop.drake_systems", "armloop.drake.view"): "live replay scene",
@@ -50,14 +50,20 @@ MOVED = {
     "armloop.diagnosis.apart": "armloop.diagnosis.isolability",
     "armloop.diagnosis.closing": "armloop.diagnosis.compensation",
     "armloop.diagnosis.rivals": "armloop.diagnosis.confounded",
+    "armloop.drake.plant.own_effects": "armloop.drake.plant.fault_injection",
     "armloop.drake_systems": "armloop.drake",
     "armloop.drake_systems.effects": "armloop.drake.plant.fault_injection",
+    "armloop.drake_systems.own_effects": "armloop.drake.plant.fault_injection",
     "armloop.drake_systems.scenario_data": "armloop.schemas.scenarios",
     "armloop.drake_systems.scenario_schema": "armloop.schemas.published",
+    "armloop.dynamics.rigid": "armloop.dynamics.arrays",
     "armloop.effects": "armloop.laws.effects",
     "armloop.export.consistent": "armloop.dynamics.consistent",
     "armloop.export.rereading": "armloop.export.round_trip",
     "armloop.export.said": "armloop.export.expressible",
+    "armloop.goodness.ranges": "armloop.identification.goodness.parts",
+    "armloop.identification.goodness.ranges": "armloop.identification.goodness.parts",
+    "armloop.identification.reconstruction.judged": "armloop.identification.reconstruction.reconstruct",
     "armloop.keeping": "armloop.util.checkpoints",
     "armloop.library": "armloop.features",
     "armloop.library.stribeck": "armloop_paper.stribeck",
@@ -65,6 +71,7 @@ MOVED = {
     "armloop.loop.run": "armloop.workflows.loop",
     "armloop.reconstruction.apart": "armloop.identification.reconstruction.block_length",
     "armloop.reconstruction.friction_ladder": "armloop.identification.reconstruction.friction_selection",
+    "armloop.reconstruction.judged": "armloop.identification.reconstruction.reconstruct",
     "armloop.reconstruction.sorter": "armloop.identification.reconstruction.nearest_regime",
     "armloop.reconstruction.unattenuated": "armloop.identification.reconstruction.attenuation",
     "armloop.regression.refined": "armloop_paper.refined",

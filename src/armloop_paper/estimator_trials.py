@@ -15,9 +15,7 @@ from armloop.features.wave_moments import WaveProducts
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.options import Options
-from armloop.identification.reconstruction.step import regress_step
-from armloop.identification.reconstruction.stepwise import steps
-from armloop.identification.reconstruction.sums import Choice
+from armloop.identification.reconstruction.stepwise import add_step, steps
 from armloop.model.components import SparseTerms
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import ESTIMATORS, Sparse
@@ -135,13 +133,7 @@ def _default(
         motion, tau = as_motion(logs[condition])
         samples = Samples(motion, tau, np.ones_like(tau, dtype=bool), 1.0)
         data = Data.of(samples, options, np.zeros(len(tau), dtype=bool))
-        inherited = Found(arm, list(found.components), [list(law) for law in found.friction])
-        terms, friction, _ = regress_step(
-            data, experiment.revolute, Choice(None, plan.conditions, inherited), plan, options
-        )
-        found.components += terms
-        for law, more in zip(found.friction, friction, strict=True):
-            law += more
+        add_step(found, data, None, plan, options)
     return found
 
 

@@ -20,7 +20,7 @@ from armloop.drake import (
     PreslidingFriction,
     Stop,
 )
-from armloop.drake.control.reference import TableSource
+from armloop.drake.control.reference import held_rows
 from armloop.drake.experiments import collection, metrics, pickup
 from armloop.drake.plant.config import Instruments
 from armloop.drake.tuning.gain_design import _at_crossover
@@ -152,13 +152,9 @@ def test_presliding_elements_stretch_slide_and_come_back() -> None:
 
 
 def test_a_table_is_held_row_by_row() -> None:
-    source = TableSource(2, 0.1)
-    context = source.CreateDefaultContext()
-    assert source.get_output_port().Eval(context).tolist() == [0, 0]
-    source.set_rows(np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]))
+    held = held_rows(np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), 0.1)
     for time, first in ((0.0, 1), (0.04, 1), (0.06, 3), (0.14, 3), (0.2, 5), (9.0, 5)):
-        context.SetTime(time + 1e-12)
-        assert source.get_output_port().Eval(context)[0] == first
+        assert held.value(time + 1e-12).ravel().tolist() == [first, first + 1]
 
 
 def test_an_arm_sampled_and_its_loop() -> None:

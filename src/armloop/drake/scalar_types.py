@@ -14,6 +14,7 @@ from typing import Any
 from unittest.mock import patch
 
 from pydrake.common import cpp_template
+from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
 from pydrake.systems.scalar_conversion import TemplateSystem
 
 
@@ -22,8 +23,9 @@ def scalar_template(
 ) -> Callable[[Callable[[Any], Any]], Any]:
     """Decorator that makes a scalar-convertible system template of a function from T to a ``LeafSystem_[T]``.
 
-    The class's ``_construct`` finds its arguments by name in ``self._given``, from which a clone or a conversion is made
-    anew unless the class has a ``_construct_copy`` of its own.
+    The class's ``_construct`` is called once the ``LeafSystem_`` is there, and finds its arguments by name in
+    ``self._given``, from which a clone or a conversion is made anew unless the class has a ``_construct_copy`` of its own.
+    Where a ``_converts`` of the class says no of its arguments, there is no conversion to another scalar type.
 
     Args:
         name: of the template; ends in an underscore.
@@ -34,7 +36,7 @@ def scalar_template(
 
     def decorator(system: Callable[[Any], Any]) -> Any:
         make = TemplateSystem.define(name, T_list and list(T_list), scope=scope)
-        template = make(lambda T: _remembering(system(T)))
+        template = make(lambda T: _remembering(system(T), LeafSystem_[T]))
         # The templates that pydrake makes inside have no argument for it.
         with patch.object(cpp_template, "_get_module_from_stack", lambda frame=2: scope, create=True):
             template[float]
@@ -43,7 +45,7 @@ def scalar_template(
     return decorator
 
 
-def _remembering(system: Any) -> Any:
+def _remembering(system: Any, base: Any) -> Any:
     construct = system._construct
     signature = inspect.signature(construct)
 
@@ -51,13 +53,16 @@ def _remembering(system: Any) -> Any:
     def remember(self: Any, *arguments: Any, converter: Any = None, **options: Any) -> None:
         self._given = signature.bind(self, *arguments, **options).arguments
         del self._given["self"]
-        construct(self, *arguments, converter=converter, **options)
+        if not getattr(system, "_converts", lambda given: True)(self._given):
+            converter = SystemScalarConverter()
+        base.__init__(self, converter=converter)
+        construct(self, *arguments, **options)
 
     def copy(self: Any, other: Any, converter: Any = None) -> None:
         remember(self, converter=converter, **other._given)
 
     # where `help` and an editor look for the arguments
-    kept = [p for name, p in signature.parameters.items() if name not in ("self", "converter")]
+    kept = [p for name, p in signature.parameters.items() if name != "self"]
     system.__signature__ = signature.replace(parameters=kept)
     system._construct = remember
     if "_construct_copy" not in vars(system):

@@ -1,10 +1,15 @@
 """A reconstructed model as equations of motion: mass matrix, bias, gravity, friction, forward dynamics."""
 
-from armloop.dynamics.arrays import Dynamics, require_mass_matrix, training_range
+from armloop.dynamics.arrays import (
+    Dynamics,
+    nearest_rigid_body,
+    require_mass_matrix,
+    training_range,
+    with_mass_matrix,
+)
 from armloop.dynamics.effects import EffectLaw, effect_law
 from armloop.dynamics.model import ModelEquations
 from armloop.dynamics.physics import PhysicsChecks, check_physics
-from armloop.dynamics.rigid import nearest_rigid_body, with_mass_matrix
 
 __all__ = [
     "Dynamics",

@@ -227,16 +227,19 @@ def solve(A: Rows, b: Sequence[Any]) -> list[Any]:
     """
     n = len(b)
     A, x = [list(row) for row in A], list(b)
-    for k in range(n):
+    for k, row in enumerate(A):
+        pivot, value = row[k], x[k]
         for i in range(k + 1, n):
-            factor = A[i][k] / A[k][k]
+            below = A[i]
+            factor = below[k] / pivot
             for j in range(k + 1, n):
-                A[i][j] = A[i][j] - factor * A[k][j]
-            x[i] = x[i] - factor * x[k]
+                below[j] = below[j] - factor * row[j]
+            x[i] = x[i] - factor * value
     for k in range(n - 1, -1, -1):
+        row, value = A[k], x[k]
         for j in range(k + 1, n):
-            x[k] = x[k] - A[k][j] * x[j]
-        x[k] = x[k] / A[k][k]
+            value = value - row[j] * x[j]
+        x[k] = value / row[k]
     return x
 
 

@@ -1,7 +1,7 @@
 """Elements of friction, the one vocabulary of the program, and their sum as the friction law of an arm.
 
-An element is a function of the state along one direction, per unit of its coefficient: the ladder of a reconstruction
-chooses among them, and the effects of a diagnosis consist of them. It is written once, over
+An element is a function of the state along one direction, per unit of its coefficient: the friction selection of a
+reconstruction chooses among them, and the effects of a diagnosis consist of them. It is written once, over
 :class:`armloop.util.functions.Functions`, for floats, arrays of samples, AutoDiffXd and symbolic Expressions alike. Whoever
 evaluates it hands in the direction of sliding: sign(v), a smooth stand-in, or the state of an elasto-plastic element;
 from the values for +1 and -1 follow the level of dry friction, which a plant needs to stick, and what is smooth.
@@ -72,7 +72,7 @@ class Element:
         way: how the direction of sliding turns: "sharp", as sign(v); "fading", as tanh(v / parameter); "memory", as the
             state of an elasto-plastic element (:mod:`armloop.laws.hysteresis`) of the width ``parameter``.
         by_load: whether it grows with the torque that passes the joint, abs(load).
-        called: what a user calls the friction law that it belongs to, if the ladder has it.
+        called: what a user calls the friction law that it belongs to, if the selection has it.
     """
 
     value: Callable[[Sliding, float, Functions], Any]
@@ -123,7 +123,7 @@ def _direction(x: Sliding, p: float, f: Functions) -> Any:
     return x.sign
 
 
-#: Every kind of friction element by the name that model files give it; first those that the ladder tries, in its order.
+#: Every kind of friction element by the name that model files give it; first those that the selection tries, in its order.
 KINDS: dict[str, Element] = {
     "smooth_sign": Element(_direction, "tanh(v{j}/{p:g})", 1, "fading", called=("coulomb", "coulomb_fading")),
     "viscous": Element(lambda x, p, f: x.v, "v{j}", 2, called=("viscous",)),
@@ -164,7 +164,7 @@ KINDS: dict[str, Element] = {
         lambda x, p, f: (1.0 - stribeck_fall(x.v, p, f)) * x.sign, "(1-exp(-(v{j}/{p:g})^2))*sign(v{j})", 2
     ),
 }
-#: What a user calls the friction laws of the ladder, and the kinds of elements that each consists of. Of the directions
+#: What a user calls the friction laws of the selection, and the kinds of elements that each consists of. Of the directions
 #: that fade in, plain Coulomb friction is the sharpest: the others stand in for what happens before the joint slides.
 FRICTION_LAWS: dict[str, tuple[str, ...]] = {
     name: tuple(kind for kind, element in KINDS.items() if name in element.called)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from armloop.laws.effects import Effect, Estimate
 from armloop.laws.effects.base import entry
 from armloop.monitoring.catalogue import Column, Place, groups, stays_nonlinear
-from armloop.regression.embedded import Linear, solve
+from armloop.regression.embedded import Linear, ridge, solve
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 
-#: Ridge on columns of unit length, and those tried of what the model leaves on healthy units: where it is no more than
-#: noise, or the motion goes on to others, its weak directions would put more into the window than they take out.
-_RIDGE, _HEALTHY_RIDGES = 1e-8, (1e-3, 1e-2, 0.1, 1.0, 10.0)
+#: Ridges tried of what the model leaves on healthy units: where it is no more than noise, or the motion goes on to others,
+#: its weak directions would put more into the window than they take out.
+_HEALTHY_RIDGES = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 #: An effect must explain twice its standard error over the units, a further one this part of what the others do.
 _WORTH = 0.02
 #: A column this small beside the largest, squared, is none.
@@ -247,11 +247,3 @@ def _named(
 ) -> Named:
     effect, parameters = _estimates(arm, columns, rest, chosen, place)
     return Named(place, parameters, share, effect.sentence(parameters), others)
-
-
-def ridge(G: Array, b: Array, part: float = _RIDGE) -> Array:
-    """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
-    size = np.diag(G)
-    scale = np.where(size > _NOTHING * size.max(initial=0.0), 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
-    scaled = G * np.outer(scale, scale) + part * np.eye(len(G))
-    return np.asarray(scale * np.linalg.solve(scaled, scale * b))

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from armloop.laws.effects import REGISTRY
 from armloop.monitoring.catalogue import Column
-from armloop.monitoring.naming import Normal, ridge
+from armloop.monitoring.naming import Normal
 from armloop.monitoring.units import ENERGY, Stream, Units
+from armloop.regression.embedded import ridge
 from armloop.util.arrays import Array
 
 #: What a change of friction leaks into.

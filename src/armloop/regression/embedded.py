@@ -50,8 +50,8 @@ def solve(
         return np.zeros(0), [], np.zeros((0, 0))
     edges, found = np.cumsum(sizes)[:-1], []
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
-    for ridge in (_RIDGE, _STRONG_RIDGE):
-        free = np.split(_ridge(moments.G, moments.b, ridge), edges)
+    for part in (_RIDGE, _STRONG_RIDGE):
+        free = np.split(ridge(moments.G, moments.b, part), edges)
         x = [effect.start(own) for effect, own in zip(effects, free, strict=True)]
         found.append(_gauss_newton(moments, effects, x))
         if np.array_equal(found[0][3], np.eye(len(moments.b))):
@@ -66,7 +66,7 @@ def _gauss_newton(
     beta, J = _embed(effects, x)
     error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
     for _ in range(_ITERATIONS):
-        step = _ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
+        step = ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
         for damping in (1.0, 0.3, 0.1, 0.03):
             trial = list(np.split(np.concatenate(x) + damping * step, edges))
             new_beta, new_J = _embed(effects, trial)
@@ -87,10 +87,11 @@ def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Arr
     return np.concatenate(betas), np.asarray(block_diag(*slopes))
 
 
-def _ridge(G: Array, b: Array, ridge: float = _RIDGE) -> Array:
+def ridge(G: Array, b: Array, part: float = _RIDGE) -> Array:
+    """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
     scale = unit_scale(G)
-    scaled = G * np.outer(scale, scale) + ridge * np.eye(len(G))
-    return scale * np.linalg.solve(scaled, scale * b)
+    scaled = G * np.outer(scale, scale) + part * np.eye(len(G))
+    return np.asarray(scale * np.linalg.solve(scaled, scale * b))
 
 
 def unit_scale(G: Array) -> Array:

@@ -55,25 +55,31 @@ class PlantData(Struct, forbid_unknown_fields=True):
     )
 
 
-class PlanData(Struct, forbid_unknown_fields=True):
-    """How much is collected; see `CollectionPlan`."""
+class PlanData(Struct, forbid_unknown_fields=True, frozen=True):
+    """How much is collected: every segment settles, then is logged."""
 
     rate: Annotated[float, Meta(ge=10, le=1e4)] = 250.0  # Hz of the logs
     segment_time_step: Annotated[float, Meta(ge=1e-4, le=5e-3)] = (
         0.002  # s, of the plant during segments of constant velocity
     )
-    dwell: bool = False  # stand still at the static poses instead of creeping
-    static_poses: Annotated[int, Meta(ge=0, le=10_000)] = 48  # each in both directions
-    static_speed: Positive = 0.0017453292519943296  # rad/s (0.1 deg/s)
+    dwell: bool = False  # stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
+    static_poses: Annotated[int, Meta(ge=0, le=10_000)] = (
+        48  # creeping segments go through each in both directions
+    )
+    static_speed: Positive = 0.0017453292519943296  # rad/s: 0.1 deg/s, as in the paper
     static_speed_prismatic: Positive = 0.0001  # m/s
-    static_settle: Annotated[float, Meta(ge=0, le=600)] = 0.09  # s before the log of a segment starts
+    static_settle: Annotated[float, Meta(ge=0, le=600)] = (
+        0.09  # s before the log of a segment starts: long enough for the servo to take over the weight of a sliding joint
+    )
     static_hold: Annotated[float, Meta(ge=0.02, le=600)] = 0.35  # s that are logged
-    velocity_segments: Annotated[int, Meta(ge=0, le=10_000)] = 100
+    velocity_segments: Annotated[int, Meta(ge=0, le=10_000)] = (
+        100  # from `slowest` to the range's largest speed
+    )
     slowest: Positive = 0.01  # rad/s
     slowest_prismatic: Positive = 0.001  # m/s
     velocity_settle: Annotated[float, Meta(ge=0, le=600)] = 0.08  # s
     velocity_hold: Annotated[float, Meta(ge=0.02, le=600)] = 0.4  # s
-    trajectories: Annotated[int, Meta(ge=0, le=1000)] = 3  # Fourier-series trajectories
+    trajectories: Annotated[int, Meta(ge=0, le=1000)] = 3  # Fourier-series trajectories, Eq. (31)
     trajectory_duration: Annotated[float, Meta(ge=5, le=600)] = 20.0  # s each
 
 
@@ -107,7 +113,7 @@ class PickupData(Struct, forbid_unknown_fields=True):
     )  # m, in the frame of the link `tool`, else the last
 
 
-class WearData(Struct, forbid_unknown_fields=True):
+class WearData(Struct, forbid_unknown_fields=True, frozen=True):
     """Friction that is drawn many times over; the model stays."""
 
     samples: Annotated[int, Meta(ge=2, le=10_000)] = 24

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armloop.monitoring.sums import log_sums
+from armloop.regression.moments import Sums
 from armloop.util.doubts import warn
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
@@ -32,15 +33,12 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Counts:
+class Counts(Sums):
     """How many logs were read, were known before, and were set aside."""
 
     read: int = 0
     known: int = 0
     aside: int = 0
-
-    def __add__(self, other: Counts) -> Counts:
-        return Counts(self.read + other.read, self.known + other.known, self.aside + other.aside)
 
 
 def ingest(

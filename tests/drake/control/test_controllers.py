@@ -8,7 +8,7 @@ from exact_parts import STRIBECK, model_of
 from numpy.testing import assert_allclose
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
+from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, TrajectorySource
 
 from armloop.drake import (
     AccelerationGains,
@@ -22,7 +22,7 @@ from armloop.drake import (
     add_arm_with_controller,
     presliding_of,
 )
-from armloop.drake.control.reference import TableSource
+from armloop.drake.control.reference import held_rows
 from armloop.drake.experiments.scenarios import load_plant
 from armloop.experiment.excitation import paper_reference
 from armloop.laws.friction import FrictionTerm
@@ -152,8 +152,7 @@ def test_presliding_remembers_like_the_library():
     q = np.cumsum(np.random.default_rng(2).normal(scale=0.004, size=(300, 2)), axis=0)
     elements = [Stop(1, 0.5, 0.01), Stop(2, 0.2, 0.003), Stop(1, 0.1, 0.05)]
     builder = DiagramBuilder()
-    table = builder.AddSystem(TableSource(4, 0.01))
-    table.set_rows(np.hstack([q, np.zeros_like(q)]))
+    table = builder.AddSystem(TrajectorySource(held_rows(np.hstack([q, np.zeros_like(q)]), 0.01)))
     friction = builder.AddSystem(PreslidingFriction(2, elements, 0.01))
     builder.Connect(table.get_output_port(), friction.GetInputPort("state"))
     log = LogVectorOutput(friction.get_output_port(), builder, 0.01)

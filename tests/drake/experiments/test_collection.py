@@ -3,6 +3,7 @@
 import dataclasses
 import warnings
 
+import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -22,7 +23,7 @@ from armloop.robot.kinematics import nominal_parameters, regressor
 from armloop.util.errors import InputWarning
 from armloop.util.resources import urdf_path
 
-TINY = dataclasses.replace(
+TINY = msgspec.structs.replace(
     load_plan("quick"), static_poses=4, velocity_segments=8, trajectories=1, trajectory_duration=5.0
 )
 IDEAL = Instruments(encoder_counts=0, torque_noise=0.0)
@@ -81,7 +82,7 @@ def test_instruments_add_what_they_say():
 
 def test_collection_is_repeatable_tells_its_progress_and_can_be_written(tmp_path):
     plant = load_plant("three_axis")
-    plan = dataclasses.replace(TINY, static_poses=1, velocity_segments=2, trajectories=0)
+    plan = msgspec.structs.replace(TINY, static_poses=1, velocity_segments=2, trajectories=0)
     seen = []
     logs = collect(plant.arm, plant.config, plan, 1, lambda what, done: seen.append((what, done)))
     assert [what for what, _ in seen] == ["constant_velocity"] * 2 + ["static"] * 2
@@ -96,7 +97,7 @@ def test_collection_is_repeatable_tells_its_progress_and_can_be_written(tmp_path
 
 def test_dwelling_hides_friction():
     plant = load_plant("three_axis")
-    plan = dataclasses.replace(TINY, dwell=True, velocity_segments=0, trajectories=0)
+    plan = msgspec.structs.replace(TINY, dwell=True, velocity_segments=0, trajectories=0)
     logs = collect(plant.arm, plant.config, plan, 1)
     assert list(logs) == ["static"]
     assert len(logs["static"].runs()) == 4
@@ -198,7 +199,7 @@ class TestPieces:
 
     def test_the_longest_segments_come_first_and_each_time_step_has_one_rig(self, rigs):
         plant = load_plant("three_axis")
-        plan = dataclasses.replace(
+        plan = msgspec.structs.replace(
             TINY, static_poses=1, velocity_segments=2, trajectories=2, trajectory_duration=5.0, rate=7.0
         )
         told = []
@@ -217,7 +218,7 @@ class TestPieces:
 
     def test_trajectories_differ_by_seed_and_number(self):
         plant = load_plant("three_axis")
-        plan = dataclasses.replace(TINY, static_poses=1, velocity_segments=2, trajectories=2)
+        plan = msgspec.structs.replace(TINY, static_poses=1, velocity_segments=2, trajectories=2)
         parts = {part.name: part for part in collection._parts(plant.arm, plant.config, plan, 3)}
         for k, reference in enumerate(parts["varying"].references):
             expected = fourier_reference(plant.config.ranges, plan.trajectory_duration, 3000 + k)
@@ -225,7 +226,7 @@ class TestPieces:
         assert (parts["varying"].settle, parts["static"].settle) == (0.0, plan.static_settle)
         creep = np.abs(parts["static"].references[0].evaluate([0.1])[1][0])
         assert_allclose(creep, np.deg2rad(0.1))
-        dwelling = collection._parts(plant.arm, plant.config, dataclasses.replace(plan, dwell=True), 3)[0]
+        dwelling = collection._parts(plant.arm, plant.config, msgspec.structs.replace(plan, dwell=True), 3)[0]
         assert len(dwelling.references) == 1 and not dwelling.references[0].evaluate([0.1])[1].any()
 
     def test_a_measured_run_is_of_fifty_seconds_and_five_harmonics_at_half_a_kilohertz(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from exact_parts import model_of
@@ -235,5 +235,5 @@ def test_the_parts_of_a_collection() -> None:
     assert np.array_equal(again, two)
     # it creeps through each pose, or stands there
     assert_allclose(np.abs(static.references[0].evaluate([0.2])[1]), np.deg2rad(0.1))
-    dwelling = collection._parts(ARM, config, replace(plan, dwell=True), 7)[0].references[0]
+    dwelling = collection._parts(ARM, config, msgspec.structs.replace(plan, dwell=True), 7)[0].references[0]
     assert not dwelling.evaluate([0.2])[1].any()

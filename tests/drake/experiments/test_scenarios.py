@@ -2,14 +2,12 @@
 
 import runpy
 
-import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from armloop.drake.control.controllers import LISTED
 from armloop.drake.experiments import scenarios
-from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenarios import (
     load_plan,
     load_plant,
@@ -19,7 +17,7 @@ from armloop.drake.experiments.scenarios import (
 )
 from armloop.drake.plant.config import Instruments, PlantConfig
 from armloop.experiment.excitation import fourier_reference, write_reference
-from armloop.schemas.scenarios import PlanData, PlantData
+from armloop.schemas.scenarios import PlantData
 from armloop.util.errors import ScenarioError
 from armloop.util.resources import scenario_path, urdf_path
 
@@ -233,7 +231,6 @@ def test_the_diagram_to_copy_follows_its_reference_better_with_a_model(capsys):
 
 
 def test_what_a_file_leaves_out_is_as_in_python():
-    assert CollectionPlan(**msgspec.structs.asdict(PlanData())) == CollectionPlan()
     given, instruments = PlantData(), Instruments()
     for name in ("encoder_counts", "prismatic_lead", "torque_noise"):
         assert getattr(given, name) == getattr(instruments, name)

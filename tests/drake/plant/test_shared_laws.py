@@ -9,9 +9,10 @@ from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from armloop.drake.plant.implicit import STICKING_GAIN, ClampedLaw, _solve, implicit_torques
+from armloop.drake.plant.implicit import STICKING_GAIN, ClampedLaw, implicit_torques
 from armloop.drake.plant.nearest_friction import _fitted
 from armloop.drake.view import scene
+from armloop.dynamics.model import solve
 from armloop.laws.friction import Direction
 from armloop.robot.arm import load_arm
 
@@ -49,9 +50,9 @@ def test_a_small_linear_system() -> None:
     for n in (1, 2, 5):
         root, b = rng.normal(size=(n, n)), rng.normal(size=n)
         A = root @ root.T + np.eye(n)
-        assert_allclose(_solve(A.tolist(), b.tolist()), np.linalg.solve(A, b))
+        assert_allclose(solve(A.tolist(), b.tolist()), np.linalg.solve(A, b))
     # joints that do not act on each other
-    assert _solve([[2.0, 0.0], [0.0, 4.0]], [1.0, 2.0]) == [0.5, 0.5]
+    assert solve([[2.0, 0.0], [0.0, 4.0]], [1.0, 2.0]) == [0.5, 0.5]
 
 
 def test_a_stribeck_curve_is_fitted_by_its_own_numbers() -> None:

@@ -41,7 +41,7 @@ def test_files_left_out_are_predicted(logs: list[MotionLog]):
     q = logs[0].q[::100]
     M = mass_matrix(model, q)
     np.testing.assert_allclose(M, M.transpose(0, 2, 1), atol=1e-8)
-    assert check_mass_matrix(model, q).least > 0
+    assert check_mass_matrix([model], q).least > 0
 
 
 def test_the_command_answers_for_blocks(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
+from pydrake.systems.framework import LeafSystem_
 
+from armloop.drake.control.feedforward import HoldsModel, require_finite
 from armloop.drake.control.pid import check_gains
 from armloop.drake.given import require_joints, require_model, require_of, require_predicts
 from armloop.drake.scalar_types import scalar_template
@@ -61,7 +61,7 @@ class AccelerationGains:
 def ComputedTorque_(T: type) -> Any:
     """Return the class for one scalar type."""
 
-    class Impl(LeafSystem_[T]):
+    class Impl(HoldsModel, LeafSystem_[T]):
         """Inverse dynamics of the state, with the acceleration that a linear law wants.
 
         tau = M(q) a + C(q, v) v + tau_g(q) + f(v_f),
@@ -96,7 +96,6 @@ def ComputedTorque_(T: type) -> Any:
             *,
             friction_at: str = "reference",
             period: float | None = None,
-            converter: Any = None,
         ) -> None:
             """model : such as one of `armloop.model.load_model`; gains : of its n joints; period : s.
 
@@ -109,10 +108,6 @@ def ComputedTorque_(T: type) -> Any:
                 require("a number above 0", period=period)
             if not isinstance(friction_at, str) or friction_at not in FRICTION_SOURCES:
                 raise InputError(f"friction_at is {friction_at!r}; it must be {', '.join(FRICTION_SOURCES)}")
-            if not isinstance(model, ReconstructedModel):
-                # Numbers alone can be neither differentiated nor written out.
-                converter = SystemScalarConverter()
-            LeafSystem_[T].__init__(self, converter=converter)
             n = self._n = len(gains.kp)
             self._friction_at = friction_at
             self._take(model)
@@ -132,17 +127,6 @@ def ComputedTorque_(T: type) -> Any:
             # Named, or Drake would find out by writing all the formulas out.
             sources = {self.all_input_ports_ticket(), self.all_state_ticket()}
             self.DeclareVectorOutputPort("tau", n, self._calc_tau, sources)
-
-        def set_model(self, model: InverseDynamicsModel) -> None:
-            """Take another model of the same arm from the next step on, between two `AdvanceTo`.
-
-            Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
-            `ReconstructedModel`.
-            """
-            require_predicts(model)
-            require_joints(model, self._n, "this controller is for")
-            self._take(model)
-            self._given["model"] = model
 
         def _take(self, model: InverseDynamicsModel) -> None:
             if T is float:
@@ -171,9 +155,7 @@ def ComputedTorque_(T: type) -> Any:
         def _torque(self, q: list, v: list, vdot: list, sliding: list, context: Any) -> np.ndarray:
             if T is float:
                 tau = self._drive(np.array(q), np.array(v), np.array(vdot), np.array(sliding))
-                if not isfinite(sum(tau.tolist())):
-                    time = context.get_time()
-                    raise RuntimeError(f"the model's torque is not finite at t = {time:.4f} s: {tau}")
+                require_finite(tau.tolist(), context)
                 return tau
             equations = self._equations
             load = equations.load(q, v, vdot) if equations.load_matters else None

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-from pydrake.systems.framework import LeafSystem_, SystemScalarConverter
+from pydrake.systems.framework import LeafSystem_
 
 from armloop.drake.given import require_joints, require_model, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
@@ -30,11 +30,43 @@ Models = Mapping[str, FeedforwardModel]
 """Models by the names that controllers know them by."""
 
 
+class HoldsModel:
+    """A system whose model can be exchanged: in float for any that predicts, else for a `ReconstructedModel` alone."""
+
+    _n: int
+    _given: dict[str, Any]
+
+    @staticmethod
+    def _converts(given: Mapping[str, Any]) -> bool:
+        # numbers alone can be neither differentiated nor written out
+        return isinstance(given["model"], ReconstructedModel)
+
+    def set_model(self, model: Any) -> None:
+        """Take another model of the same arm from the next step on, between two `AdvanceTo`.
+
+        Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
+        `ReconstructedModel`.
+        """
+        require_predicts(model)
+        require_joints(model, self._n, "this system is for")
+        self._take(model)
+        self._given["model"] = model
+
+    def _take(self, model: Any) -> None:
+        raise NotImplementedError
+
+
+def require_finite(tau: Sequence[float], context: Any) -> None:
+    """Raise `RuntimeError` for a torque with a number that is not: the sum shows it, sooner than numpy's test does."""
+    if not isfinite(sum(tau)):
+        raise RuntimeError(f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}")
+
+
 @scalar_template("Feedforward_", __name__)
 def Feedforward_(T: type) -> Any:
     """Return the class for one scalar type."""
 
-    class Impl(LeafSystem_[T]):
+    class Impl(HoldsModel, LeafSystem_[T]):
         """Torque that a model says the reference needs: the sum of Y^S Xi^S over steps in Eqs. (35), (36).
 
         tau_ff = model(q_ref, v_ref, vdot_ref), by its terms up to `step`: 1 gravity and dry friction, 2 with
@@ -60,7 +92,6 @@ def Feedforward_(T: type) -> Any:
             *,
             n: int | None = None,
             stacked: bool = False,
-            converter: Any = None,
         ) -> None:
             """model : see `FeedforwardModel`; step : 1, 2 or 3; n : joints of a model without an arm; stacked : one port.
 
@@ -69,27 +100,12 @@ def Feedforward_(T: type) -> Any:
             require_predicts(model)
             require_step(step, " (a model knows its joints)")
             n = _joints(model, n)
-            if not isinstance(model, ReconstructedModel):
-                # Numbers alone can be neither differentiated nor written out.
-                converter = SystemScalarConverter()
-            LeafSystem_[T].__init__(self, converter=converter)
             self._n, self._step = n, step
             self._take(model)
             names, size = (("motion_ref",), 3 * n) if stacked else (("q_ref", "v_ref", "vdot_ref"), n)
             self._inputs = [self.DeclareVectorInputPort(name, size) for name in names]
             # Named, or Drake would find out by writing all the formulas out.
             self.DeclareVectorOutputPort("tau_ff", n, self._calc_tau_ff, {self.all_input_ports_ticket()})
-
-        def set_model(self, model: FeedforwardModel) -> None:
-            """Take another model of the same arm from the next step on, between two `AdvanceTo`.
-
-            Raises `ModelError` for a model of other joints and, unless the scalar type is float, for one that is no
-            `ReconstructedModel`.
-            """
-            require_predicts(model)
-            require_joints(model, self._n, "this feedforward is for")
-            self._take(model)
-            self._given["model"] = model
 
         def _take(self, model: FeedforwardModel) -> None:
             if T is float:
@@ -106,11 +122,7 @@ def Feedforward_(T: type) -> Any:
                 output.SetFromVector(vector(T, self._equations.torque(q, v, vdot)))
                 return
             tau = self._drive(x)
-            # A NaN or an infinity shows in the sum; several times faster than numpy's test.
-            if not isfinite(sum(tau)):
-                raise RuntimeError(
-                    f"the model's torque is not finite at t = {context.get_time():.4f} s: {tau}"
-                )
+            require_finite(tau, context)
             output.SetFromVector(tau)
 
     return Impl

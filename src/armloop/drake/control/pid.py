@@ -94,10 +94,9 @@ def _law(T: type) -> Any:
     class Impl(LeafSystem_[T]):
         """The law without its memory. Output port: (2n,) torques, then e; one port, so that e is found once."""
 
-        def _construct(self, gains: PidGains, resolution: ArrayLike, *, converter: Any = None) -> None:
+        def _construct(self, gains: PidGains, resolution: ArrayLike) -> None:
             n = len(gains.kp)
             counts = np.broadcast_to(np.asarray(resolution, dtype=float), (n,)).tolist()
-            LeafSystem_[T].__init__(self, converter=converter)
             self._joints = list(
                 zip(gains.kp.tolist(), gains.ki.tolist(), gains.kd.tolist(), counts, strict=True)
             )

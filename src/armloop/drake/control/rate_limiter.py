@@ -29,9 +29,7 @@ def RateLimiter_(T: type) -> Any:
         telling the controller, whose integral goes on growing behind the limits.
         """
 
-        def _construct(
-            self, effort: ArrayLike, rate: ArrayLike, period: float, *, converter: Any = None
-        ) -> None:
+        def _construct(self, effort: ArrayLike, rate: ArrayLike, period: float) -> None:
             """effort : (n,) N*m (N); rate : (n,) N*m/s (N/s); period : s.
 
             Raises `InputError` when they are not above 0, or not for the same joints.
@@ -44,7 +42,6 @@ def RateLimiter_(T: type) -> Any:
                 raise InputError(f"effort is for {limits.size} joints, rate for {rates.size}")
             if not (np.all(limits > 0) and np.all(rates > 0)):
                 raise InputError("effort and rate must be above 0")
-            LeafSystem_[T].__init__(self, converter=converter)
             self._limits = list(zip(limits.tolist(), (period * rates).tolist(), strict=True))
             self._u = self.DeclareVectorInputPort("u", limits.size)
             self.DeclareDiscreteState(limits.size)

@@ -7,15 +7,9 @@ from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.systems.framework import (
-    BasicVector,
-    Context,
-    Diagram,
-    DiagramBuilder,
-    LeafSystem,
-    LeafSystem_,
-)
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import Demultiplexer
+from pydrake.trajectories import PiecewisePolynomial
 
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.given import require_joints, require_predicts, require_reference, require_step
@@ -31,26 +25,10 @@ from armloop.util.given import numbers_of, require
 _CHUNK = 1000  # rows of feedforward evaluated at once, when the first of them is needed
 
 
-class TableSource(LeafSystem):
-    """Hold a table, one row per period.
-
-    Output port `row`: (width,), row k around k periods; the last row afterwards.
-    """
-
-    def __init__(self, width: int, period: float) -> None:
-        """width : of the rows, all zero until `set_rows`; period : s."""
-        super().__init__()
-        self._rows = np.zeros((1, width))
-        self._period = period
-        self.DeclareVectorOutputPort("row", width, self._calc_row)
-
-    def set_rows(self, rows: Array) -> None:
-        """Replace the table; `rows` is (K, width). Reset the context's time afterwards."""
-        self._rows = rows
-
-    def _calc_row(self, context: Context, output: BasicVector) -> None:
-        row = min(int(context.get_time() / self._period + 0.5), len(self._rows) - 1)
-        output.SetFromVector(self._rows[row])
+def held_rows(rows: Array, period: float) -> PiecewisePolynomial:
+    """Return rows (K, m) as a trajectory that holds row k around k periods, and the last one afterwards."""
+    breaks = period * (np.arange(len(rows) + 1) - 0.5)
+    return PiecewisePolynomial.ZeroOrderHold(breaks, np.vstack([rows, rows[-1:]]).T)
 
 
 class ReferenceSource(Diagram):
@@ -107,10 +85,7 @@ def _ReferenceTable_(T: type) -> Any:
     class Impl(LeafSystem_[T]):
         """A table, held row by row, whose last n columns are filled in, chunk by chunk, when they are needed."""
 
-        def _construct(
-            self, tables: tuple[Array, Array, Array], period: float, *, converter: Any = None
-        ) -> None:
-            LeafSystem_[T].__init__(self, converter=converter)
+        def _construct(self, tables: tuple[Array, Array, Array], period: float) -> None:
             n = self._n = tables[0].shape[1]
             self._period = period
             self._rows = np.hstack([*tables, np.zeros_like(tables[0])])
@@ -119,7 +94,7 @@ def _ReferenceTable_(T: type) -> Any:
             self.set_model(None, 3)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, **other._given, converter=converter)
+            Impl._construct(self, **{**other._given, "converter": converter})
             self._model, self._step, self._equations = other._model, other._step, other._equations
             self._rows, self._filled = other._rows.copy(), list(other._filled)
 

@@ -11,6 +11,7 @@ from armloop.drake.plant.config import PlantConfig
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.experiment.excitation import Reference
 from armloop.robot.arm import Arm
+from armloop.schemas.scenarios import WearData
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +32,8 @@ class Pickup:
     payload: UndeclaredEffect
 
 
-@dataclass(frozen=True)
-class Wear:
-    """How often friction is drawn, and the standard deviation of its parameters' logarithms."""
-
-    samples: int
-    spread: float
+Wear = WearData
+"""How often friction is drawn, and the standard deviation of its parameters' logarithms."""
 
 
 @dataclass(frozen=True, eq=False)

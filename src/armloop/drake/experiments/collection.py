@@ -25,6 +25,7 @@ from armloop.experiment.excitation import (
     static_segments,
 )
 from armloop.robot.arm import Arm
+from armloop.schemas.scenarios import PlanData
 from armloop.util.workers import Processes
 
 Progress = Callable[[str, float], None]
@@ -35,37 +36,8 @@ def silent(what: str, done: float) -> None:
     """Report nothing."""
 
 
-@dataclass(frozen=True)
-class CollectionPlan:
-    """How much is collected: every segment settles, then is logged.
-
-    Times in s, speeds in rad/s (`_prismatic`: m/s).
-
-    rate : Hz of the logs
-    segment_time_step : of the plant during segments of constant velocity, where nothing changes fast
-    dwell : stand still at the static poses instead of creeping; friction then hides up to f_s of the torque
-    static_settle : long enough for the servo to take over the weight of a sliding joint
-    static_poses : creeping segments go through each in both directions, at `static_speed` (0.1 deg/s in the
-        paper)
-    velocity_segments : constant velocities from `slowest` to the range's largest
-    trajectories : Fourier-series trajectories, Eq. (31), of `trajectory_duration` each
-    """
-
-    rate: float = 250.0
-    segment_time_step: float = 2e-3
-    dwell: bool = False
-    static_poses: int = 48
-    static_speed: float = float(np.deg2rad(0.1))
-    static_speed_prismatic: float = 1e-4
-    static_settle: float = 0.09
-    static_hold: float = 0.35
-    velocity_segments: int = 100
-    slowest: float = 0.01
-    slowest_prismatic: float = 1e-3
-    velocity_settle: float = 0.08
-    velocity_hold: float = 0.4
-    trajectories: int = 3
-    trajectory_duration: float = 20.0
+CollectionPlan = PlanData
+"""How much is collected, as `scenarios/collection.yaml` says it."""
 
 
 def collect(

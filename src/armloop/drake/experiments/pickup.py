@@ -64,24 +64,24 @@ def run_pickup(
     if pickup is None:
         raise ValueError(f"{scenario.name} has no pickup")
     free = _Run(scenario, model, (), view)
-    free.systems.start_on_reference(free.context)
+    free.arm.systems.start_on_reference(free.context)
     free.advance(pickup.at)
     loaded = _Run(scenario, model, (pickup.payload,) if changes is None else tuple(changes), view)
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)
-    log = _log(scenario, *loaded.recorded()[:3])
-    loaded.systems.set_model(learn(log))
-    loaded.set_integral(free.integral())
+    log = _log(scenario, *loaded.arm.recorded(loaded.context)[:3])
+    loaded.arm.systems.set_model(learn(log))
+    loaded.integrator().SetDiscreteState(free.integrator().get_discrete_state_vector().CopyToVector())
     loaded.advance(scenario.reference.duration)
-    first, second = free.recorded(), loaded.recorded()
+    first, second = (run.arm.recorded(run.context) for run in (free, loaded))
     # both recorded the moment of the grasp
     time, state, tau, asked = (np.concatenate([a[:-1], b]) for a, b in zip(first, second, strict=True))
     ends = (0.0, pickup.at, pickup.diagnose_at, scenario.reference.duration)
     phases = {}
     for k, name in enumerate(PHASES):
         part = replace(scenario, score=(ends[k], ends[k + 1]))
-        phases[name] = score(part, CONTROLLER, time, free.systems.reference.tables, state, tau, asked)
+        phases[name] = score(part, CONTROLLER, time, free.arm.systems.reference.tables, state, tau, asked)
     return PickupResult(phases, log)
 
 
@@ -95,12 +95,11 @@ class _Run:
         effects: tuple[UndeclaredEffect, ...],
         view: LiveView | None,
     ) -> None:
-        self._arm = RecordedArm(scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
-        self.systems = self._arm.systems
+        self.arm = RecordedArm(scenario, CONTROLLER, {MAIN_MODEL: model}, effects)
         builder = DiagramBuilder()
-        builder.AddNamedSystem(CONTROLLER, self._arm.diagram)
+        builder.AddNamedSystem(CONTROLLER, self.arm.diagram)
         if view is not None:
-            view.add_to(builder, {CONTROLLER: self._arm.diagram})
+            view.add_to(builder, {CONTROLLER: self.arm.diagram})
         self._simulator = Simulator(builder.Build())
         if view is not None:
             view.pace(self._simulator)
@@ -109,24 +108,14 @@ class _Run:
     def advance(self, until: float) -> None:
         # real time goes on from here, however long the diagnosis took
         self._simulator.ResetStatistics()
-        with refusing_divergence({CONTROLLER: self._arm}, self.context):
+        with refusing_divergence({CONTROLLER: self.arm}, self.context):
             self._simulator.AdvanceTo(until)
 
-    def integral(self) -> Array:
-        """Return what PID's integrator holds, (n,)."""
-        return np.asarray(self._integrator().get_discrete_state_vector().CopyToVector())
-
-    def set_integral(self, value: Array) -> None:
-        self._integrator().SetDiscreteState(value)
-
-    def _integrator(self) -> Context:
-        controller = self.systems.controller
+    def integrator(self) -> Context:
+        """Return the context of PID's integrator, whose state is (n,)."""
+        controller = self.arm.systems.controller
         assert isinstance(controller, PidController)
         return controller.GetSubsystemByName("integral").GetMyMutableContextFromRoot(self.context)
-
-    def recorded(self) -> tuple[Array, Array, Array, Array]:
-        """Return time (N,), state (N, 2n), the drives' torques (N, n) and those that the controller asked for."""
-        return self._arm.recorded(self.context)
 
 
 def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> MotionLog:

@@ -27,7 +27,6 @@ from armloop.robot.arm import Arm, load_arm
 from armloop.schemas.scenarios import (
     LimitsData,
     PickupData,
-    PlanData,
     PlantData,
     TrackingData,
 )
@@ -113,12 +112,12 @@ def plan_names() -> list[str]:
 def load_plan(name: str) -> CollectionPlan:
     """Return a plan of collection.yaml; raises `ScenarioError` when there is none of that name."""
     path = scenario_path("collection")
-    data = entry(path, name, PlanData)
+    plan = entry(path, name, CollectionPlan)
     where = f"{path}: {name}"
     for key in ("static_settle", "velocity_settle"):
-        if getattr(data, key) <= 10.0 / data.rate:
-            raise ScenarioError(f"{where}: {key} must be above 10 sample periods, {10.0 / data.rate} s")
-    return CollectionPlan(**asdict(data))
+        if getattr(plan, key) <= 10.0 / plan.rate:
+            raise ScenarioError(f"{where}: {key} must be above 10 sample periods, {10.0 / plan.rate} s")
+    return plan
 
 
 def load_tracking(spec: str | Path, arm: str | Path | Arm | None = None) -> TrackingScenario:
@@ -170,7 +169,7 @@ def load_tracking(spec: str | Path, arm: str | Path | Arm | None = None) -> Trac
         data.random_seed,
         data.bandwidth,
         _pickup(data.pickup, plant.arm, reference, where),
-        None if data.wear is None else Wear(data.wear.samples, data.wear.spread),
+        data.wear,
         rate,
         used,
     )

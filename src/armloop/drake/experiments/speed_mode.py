@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 
-from armloop.drake.control.reference import TableSource
+from armloop.drake.control.reference import held_rows
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.friction import JointFriction
@@ -58,7 +58,7 @@ class SpeedModeArm:
         self.plant = builder.AddSystem(
             ArmPlant(arm, friction, effects=effects, time_step=time_step, servo=servo, law=law)
         )
-        self._source = builder.AddSystem(TableSource(2 * arm.n, time_step))
+        self._source = builder.AddSystem(TrajectorySource(held_rows(np.zeros((1, 2 * arm.n)), time_step)))
         builder.Connect(self._source.get_output_port(), self.plant.GetInputPort("desired_state"))
         self._logger = LogVectorOutput(self.plant.GetOutputPort("state"), builder, time_step)
         self._simulator = Simulator(builder.Build())
@@ -78,7 +78,7 @@ class SpeedModeArm:
         t: Array = self._step * np.arange(steps + 1, dtype=float)
         q_d, v_d, _ = reference.evaluate(t)
         desired = np.hstack([q_d, v_d])
-        self._source.set_rows(desired[1:])
+        self._source.UpdateTrajectory(held_rows(desired[1:], self._step))
         context.SetTime(0.0)
         self.plant.set_state(context, q_d[0], v_d[0])
         log = self._logger.FindMutableLog(context)
@@ -95,6 +95,8 @@ class SpeedModeArm:
         v = (q[rows + half] - q[rows - half]) / (2 * half * self._step)
         tau = 0.5 * (torque[:-1] + torque[1:])
         q = q[:-1]
-        for fault in self.plant.effects.faults:
-            q, tau = fault(t[:-1], q, tau)
+        for effect, parameters in self.plant.effects.faults:
+            falsified = effect.falsified(t[:-1], q, tau, parameters)
+            assert falsified is not None
+            q, tau = falsified
         return Recording(t[rows], q[rows], v, tau[rows])

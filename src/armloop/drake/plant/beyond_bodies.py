@@ -48,14 +48,11 @@ def BeyondBodies_(T: type) -> Any:
             self,
             model: ReconstructedModel,
             smoothing: float | Sequence[float] = 0.02,
-            *,
-            converter: Any = None,
         ) -> None:
             """model : of n joints; smoothing : rad/s (m/s), of all joints or of each."""
             require_model(model)
             n = self._n = model.arm.n
             widths = per_joint(smoothing, n)
-            LeafSystem_[T].__init__(self, converter=converter)
             self.arm = model.arm
             functions = functions_of(T)
             sliding = explicit_part(model, widths)

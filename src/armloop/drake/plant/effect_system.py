@@ -56,7 +56,6 @@ def EffectTorque_(T: type) -> Any:
             other_joint: int | None = None,
             inertial: Any = None,
             smoothing: float = 0.01,
-            converter: Any = None,
         ) -> None:
             """arm : of n joints; name, joint, other_joint (from 1), parameters : as in `diagnosis.json`, SI units;
             inertial : (10 n,) link parameters of the known model, for `gravity_tilt` (`model.inertial_parameters()`).
@@ -66,7 +65,6 @@ def EffectTorque_(T: type) -> Any:
             require("a number above 0", smoothing=smoothing)
             require_of(Arm, arm=arm)
             require_of(Mapping, parameters=parameters)
-            LeafSystem_[T].__init__(self, converter=converter)
             self.arm = arm
             self._given["parameters"] = dict(parameters)
             self._smoothing = smoothing

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from armloop.drake.plant.own_effects import Law, own_law
+from armloop.dynamics.own_effects import OwnEffectEquations
 from armloop.laws.effects import EFFECTS as LISTED
 from armloop.laws.effects import REGISTRY, Effect, effect, effect_kind, misplaced, misstated
 from armloop.laws.effects.base import Placed, number
@@ -23,11 +22,12 @@ from armloop.laws.effects.gravity_tilt import GravityTilt, base_rotation
 from armloop.laws.effects.payload import Payload
 from armloop.laws.friction import KINDS
 from armloop.robot.arm import Arm
+from armloop.robot.kinematics import nominal_parameters
 from armloop.util.arrays import Array
 from armloop.util.errors import ModelError, ScenarioError
 
-Fault = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""What a sensor makes of q and tau (N, n), recorded at times (N,)."""
+Law = Callable[[list[float], list[float]], Sequence[float]]
+"""Further torques (n,) that the drives must supply, of positions and velocities."""
 
 EFFECTS: tuple[str, ...] = tuple(name for name, kind in LISTED.items() if kind.simulated)
 """The listed effects that can be put into a plant; a user's own can, too. A torque from outside on one joint cannot."""
@@ -98,7 +98,7 @@ class Realisation:
 
     viscous, rotor_inertia : (n,), which Drake's joints and drives take
     laws : all other laws along a direction
-    faults : of the sensors, in the order in which they falsify a record
+    faults : of the sensors, with their parameters, in the order in which they falsify a record
     contacts : start, end and force (3,) in the base frame
     payloads : mass, centre of mass (3,) in the last link's frame, own inertia or None for that of a steel ball
     R_WB : (3, 3) rotation of the base in the level world
@@ -108,7 +108,7 @@ class Realisation:
     viscous: Array
     rotor_inertia: Array
     laws: list[Placed] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[tuple[Effect, Mapping[str, Any]]] = field(default_factory=list)
     contacts: list[tuple[float, float, Array]] = field(default_factory=list)
     payloads: list[tuple[float, Array, float | None]] = field(default_factory=list)
     R_WB: Array = field(default_factory=lambda: np.eye(3))
@@ -127,7 +127,7 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
             raise ScenarioError(f"effect {given.name}: {fault}")
         law = None if kind.sensor else kind.placed(p)
         if kind.sensor:
-            made.faults.append(partial(_falsified, kind, p))
+            made.faults.append((kind, p))
         elif isinstance(kind, Payload):
             com = arm.X_tool[:3, :3] @ np.asarray(p["com"], dtype=float) + arm.X_tool[:3, 3]
             ball = p.get("own_inertia")
@@ -153,9 +153,21 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
     return made
 
 
-def _falsified(
-    kind: Effect, parameters: Mapping[str, Any], time: Array, q: Array, tau: Array
-) -> tuple[Array, Array]:
-    found = kind.falsified(time, q, tau, parameters)
-    assert found is not None
-    return found
+def own_law(arm: Arm, effect: Effect, parameters: Mapping[str, Any]) -> Law:
+    """Return the torque that the drives must supply because of an effect, of positions and velocities.
+
+    The law is explicit, at the state of the step's start: a jump at zero velocity, as dry friction has, would chatter. One
+    written as elements (`armloop.laws.effects.Law`) is taken implicitly, and sticks.
+
+    Raises `ScenarioError` when the parameters are not the effect's, or its torque depends on the acceleration.
+    """
+    values = {key: np.asarray(value, dtype=float).tolist() for key, value in parameters.items()}
+    try:
+        equations = OwnEffectEquations(arm, effect, values, nominal_parameters(arm))
+    except ModelError as error:
+        raise ScenarioError(str(error)) from error
+    if equations.has_inertia:
+        raise ScenarioError(
+            f"effect {effect.name}: its torque depends on the acceleration; the plant takes torques of q and v"
+        )
+    return equations.rest

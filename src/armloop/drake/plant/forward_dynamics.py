@@ -55,7 +55,6 @@ def ForwardDynamics_(T: type) -> Any:
             smoothing: float = SMOOTHING,
             symmetric: bool = False,
             check: bool = True,
-            converter: Any = None,
         ) -> None:
             """model : of n joints; smoothing : rad/s (m/s); check : whether to try M over the training range."""
             require_model(model)
@@ -63,7 +62,6 @@ def ForwardDynamics_(T: type) -> Any:
             equations = ModelEquations(model, functions_of(T), smoothing=smoothing, symmetric=symmetric)
             if check:
                 require_mass_matrix(model)
-            LeafSystem_[T].__init__(self, converter=converter)
             # What is converted has been checked: M does not change with the scalar type.
             self._given["check"] = False
             self._equations = equations

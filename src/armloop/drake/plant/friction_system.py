@@ -33,14 +33,11 @@ def JointFrictionSystem_(T: type) -> Any:
         `StickingForwardDynamics` stick. Not supported: friction that grows with the load (`EffectTorque` has it).
         """
 
-        def _construct(
-            self, friction: Sequence[JointFriction], smoothing: float = 0.01, *, converter: Any = None
-        ) -> None:
+        def _construct(self, friction: Sequence[JointFriction], smoothing: float = 0.01) -> None:
             """friction : n joints; smoothing : rad/s (m/s)."""
             require("a number above 0", smoothing=smoothing)
             require_of(Sequence, friction=friction)
             require_each(JointFriction, friction, "friction")
-            LeafSystem_[T].__init__(self, converter=converter)
             self._friction, self._smoothing, self._n = tuple(friction), smoothing, len(friction)
             self._state = self.DeclareVectorInputPort("state", 2 * self._n)
             self.DeclareVectorOutputPort("force", self._n, self._calc_force, {self.all_input_ports_ticket()})
@@ -88,9 +85,7 @@ def PreslidingFriction_(T: type) -> Any:
         Not supported: levels that depend on the speed or the load; add `JointFrictionSystem` for what slides.
         """
 
-        def _construct(
-            self, n: int, elements: Sequence[Stop], period: float, *, converter: Any = None
-        ) -> None:
+        def _construct(self, n: int, elements: Sequence[Stop], period: float) -> None:
             """n : joints; elements : any number of `Stop`; period : s."""
             require("a whole number above 0", n=n)
             require("a number above 0", period=period)
@@ -102,7 +97,6 @@ def PreslidingFriction_(T: type) -> Any:
                 require("a finite number", level=e.level)
                 if not 1 <= e.joint <= n or e.level < 0:
                     raise InputError(f"{e}: joint must be from 1 to {n}, level at least 0 and width above 0")
-            LeafSystem_[T].__init__(self, converter=converter)
             self._n, self._elements = n, tuple(elements)
             self._state = self.DeclareVectorInputPort("state", 2 * n)
             self.DeclareDiscreteState(n + len(elements))

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from armloop.dynamics.model import solve
 from armloop.laws.friction import Direction
 
 STICKING_GAIN = 1e8
@@ -86,7 +87,7 @@ def implicit_torques(
                     left[joint][other] += shared
                     left[other][joint] += shared
                     left[other][other] += ratio * shared
-        w = _solve(left, right)
+        w = solve(left, right)
         total = [0.0 for _ in joints]
         settled = True
         for index, (joint, command, slope, limit, other, ratio) in enumerate(laws):
@@ -111,23 +112,3 @@ def implicit_torques(
         if settled:
             return total
     raise RuntimeError(f"the step found no torques for {len(laws)} laws on {len(p)} joints")
-
-
-def _solve(A: Matrix, b: list[float]) -> list[float]:
-    """Return the solution of A x = b, A symmetric positive definite; both are overwritten."""
-    n = len(b)
-    for k in range(n):
-        row, pivot, value = A[k], A[k][k], b[k]
-        for i in range(k + 1, n):
-            factor = row[i] / pivot
-            if factor:
-                below = A[i]
-                for j in range(i, n):
-                    below[j] -= factor * row[j]
-                b[i] -= factor * value
-    for k in range(n - 1, -1, -1):
-        row, value = A[k], b[k]
-        for j in range(k + 1, n):
-            value -= row[j] * b[j]
-        b[k] = value / row[k]
-    return b

@@ -13,10 +13,9 @@ from pydrake.multibody.plant import MultibodyPlant, MultibodyPlant_
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import LeafSystem_
 
-from armloop.drake.plant.fault_injection import Realisation
+from armloop.drake.plant.fault_injection import Law, Realisation
 from armloop.drake.plant.friction import JointFriction
 from armloop.drake.plant.implicit import ClampedLaw, implicit_torques
-from armloop.drake.plant.own_effects import Law
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
 from armloop.dynamics.model import solve
@@ -73,12 +72,10 @@ def JointLoads_(T: type) -> Any:
             servo: ServoGains | None = None,
             X_tool: Array,
             law: Law | None = None,
-            converter: Any = None,
         ) -> None:
             """plant : finalized and discrete, its joints' damping is the viscous friction, a drive on each joint;
             friction : n joints; X_tool : (4, 4) of the tool in the last link's frame, where contacts push;
             law : further torques (n,) that the drives must supply, of positions and velocities as lists"""
-            LeafSystem_[T].__init__(self, converter=converter)
             n = len(friction)
             self._n = n
             # a clone predicts with the same plant, a conversion with one of its own scalar type

@@ -48,14 +48,12 @@ def StickingForwardDynamics_(T: type) -> Any:
             time_step: float = 1e-3,
             *,
             check: bool = True,
-            converter: Any = None,
         ) -> None:
             """model : of n joints; time_step : h in s; check : whether to try M over the training range."""
             require_model(model)
             require("a number above 0", time_step=time_step)
             if check:
                 require_mass_matrix(model)
-            LeafSystem_[T].__init__(self, converter=converter)
             # What is converted has been checked: M does not change with the scalar type.
             self._given["check"] = False
             self._equations = ModelEquations(model, functions_of(T), sharp=True, symmetric=True)

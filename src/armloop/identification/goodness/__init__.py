@@ -4,8 +4,7 @@ Only motions, torques and residuals come in, so that a reconstruction and the di
 measure.
 """
 
-from armloop.identification.goodness.parts import Parts, merged, parts_of, unjudged
-from armloop.identification.goodness.ranges import outside_trained_range
+from armloop.identification.goodness.parts import Parts, merged, outside_trained_range, parts_of, unjudged
 from armloop.identification.goodness.witness import Witness, witness
 
 __all__ = ["Parts", "Witness", "merged", "outside_trained_range", "parts_of", "unjudged", "witness"]

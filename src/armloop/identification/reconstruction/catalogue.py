@@ -11,8 +11,8 @@ Which order a ripple has is read off the spectrum of what the model leaves, over
 than can be tried one by one. What the base parameters soaked up may have moved the peak, so the orders next to it are
 tried too. A joint may ripple with several orders.
 
-Laws that the model can say already are not asked for: a rotor's inertia is a base parameter, Coulomb friction a rung
-of the friction ladder. Nor are those that depend on the time: within a run they fit, on another run they fail.
+Laws that the model can say already are not asked for: a rotor's inertia is a base parameter, Coulomb friction an
+extension of the friction selection. Nor are those that depend on the time: within a run they fit, on another run they fail.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ class Laws:
 def permanent(arm: Arm) -> list[Effect]:
     """Laws that an arm may have had all along and that fit beside others as linear columns.
 
-    A joint's friction is none of them: it has rungs of the friction ladder, which has had its say.
+    A joint's friction is none of them: it has the friction selection, which has had its say.
     """
     return [e for e in hypotheses(arm) if not (e.rubs or e.memory or e.name in _OF_A_RUN)]
 

@@ -60,47 +60,47 @@ class Fitting:
     def chosen(self) -> tuple[FrictionSelection, Laws]:
         """The laws that the training data show, and every joint's friction chosen beside them."""
         self._progress("choosing each joint's friction on held-out data")
-        ladder, samples = self._selected(), self._training.window.samples
-        laws = search(self._arm, samples, self._bench(ladder), self._progress)
+        selection, samples = self._selected(), self._training.window.samples
+        laws = search(self._arm, samples, self._bench(selection), self._progress)
         while laws.chosen:
-            ladder = self._beside(laws, ladder)
-            fewer = pruned(laws, self._bench(ladder), self._arm, samples)
+            selection = self._beside(laws, selection)
+            fewer = pruned(laws, self._bench(selection), self._arm, samples)
             if len(fewer.chosen) == len(laws.chosen):
                 break
             laws = fewer
         if laws.chosen:
-            trial = self._bench(ladder)([]).trial(laws.columns(self._arm, samples))
+            trial = self._bench(selection)([]).trial(laws.columns(self._arm, samples))
             assert trial is not None
             self.covariance = trial.covariance
         elif self._design.laws.chosen:
-            ladder = self._beside(laws, ladder)
-        return ladder, laws
+            selection = self._beside(laws, selection)
+        return selection, laws
 
-    def _beside(self, laws: Laws, ladder: FrictionSelection) -> FrictionSelection:
-        """Friction chosen anew beside some laws, by the load of what is solved with that of a ladder before."""
+    def _beside(self, laws: Laws, selection: FrictionSelection) -> FrictionSelection:
+        """Friction chosen anew beside some laws, by the load of what is solved with that of a selection before."""
         design = self._own.with_laws(laws)
-        self._design = design.loaded(self._window_solution(design, ladder).theta)
+        self._design = design.loaded(self._window_solution(design, selection).theta)
         self._progress("choosing each joint's friction anew beside the laws found")
         return without_offsets(self._selected(), laws.constant_at())
 
     def _selected(self) -> FrictionSelection:
         extra = self._design.laws.count
         priors = {name: padded(prior, extra) for name, prior in self._priors.items()}
-        ladder = select_friction(
+        selection = select_friction(
             self._arm, self._training, self._design, self._options, priors, self._progress
         )
-        return without_offsets(ladder, constant_weights(self._arm))
+        return without_offsets(selection, constant_weights(self._arm))
 
-    def _window_solution(self, design: Design, ladder: FrictionSelection) -> Solution:
-        """The coefficients of a design and of a ladder's friction, on the window."""
-        pooled = self._training.window_pooled(design, ladder.laws, self._options.physical)
-        return pooled.solve(pooled.everything, self._prior(ladder, design.laws.count))
+    def _window_solution(self, design: Design, selection: FrictionSelection) -> Solution:
+        """The coefficients of a design and of a selection's friction, on the window."""
+        pooled = self._training.window_pooled(design, selection.laws, self._options.physical)
+        return pooled.solve(pooled.everything, self._prior(selection, design.laws.count))
 
-    def _prior(self, ladder: FrictionSelection, extra: int) -> Prior | None:
-        return None if ladder.prior is None else padded(cut(ladder.prior, self._own.count), extra)
+    def _prior(self, selection: FrictionSelection, extra: int) -> Prior | None:
+        return None if selection.prior is None else padded(cut(selection.prior, self._own.count), extra)
 
-    def _bench(self, ladder: FrictionSelection) -> Callable[[Sequence[Law]], Projected]:
-        """Regressions of the shared columns and some laws', with the friction of a ladder that is not zero."""
+    def _bench(self, selection: FrictionSelection) -> Callable[[Sequence[Law]], Projected]:
+        """Regressions of the shared columns and some laws', with the friction of a selection that is not zero."""
         chunk = self._training.window
         samples, usable, r = chunk.samples, fitted_rows(chunk), self._own.count
         used = np.asarray(usable.any(axis=1))
@@ -112,7 +112,7 @@ class Fitting:
         sample, joint = sample[::every], joint[::every]
         order = np.lexsort((sample, fold[sample], joint))
         sample, joint = sample[order], joint[order]
-        shared, friction = _picked(self._design, samples, ladder.candidates, sample, joint)
+        shared, friction = _picked(self._design, samples, selection.candidates, sample, joint)
         shared = shared[:, :r]
 
         def stacked(columns: Array, places: list[list[int]]) -> Array:
@@ -125,19 +125,19 @@ class Fitting:
                 start += len(own)
             return X
 
-        sayable = stacked(shared, [list(range(len(terms))) for terms in ladder.candidates])
+        sayable = stacked(shared, [list(range(len(terms))) for terms in selection.candidates])
 
         def bench(laws: Sequence[Law]) -> Projected:
             extra = Laws(list(laws))
             columns = np.hstack([shared, extra.columns(self._arm, samples)[sample, joint]])
-            prior = self._prior(ladder, extra.count)
-            if not laws and ladder.pooled.shared == r:
-                solution = ladder.solved()
+            prior = self._prior(selection, extra.count)
+            if not laws and selection.pooled.shared == r:
+                solution = selection.solved()
             else:
-                solution = self._window_solution(self._design.with_laws(extra), ladder)
+                solution = self._window_solution(self._design.with_laws(extra), selection)
             size = columns.shape[1]
             active, start = [], size
-            for law, terms in zip(ladder.laws, ladder.candidates, strict=True):
+            for law, terms in zip(selection.laws, selection.candidates, strict=True):
                 own = solution.theta[start : start + len(law)]
                 active.append([terms.index(term) for term, c in zip(law, own, strict=True) if c != 0])
                 start += len(law)
@@ -171,13 +171,13 @@ def _picked(
     return shared, friction
 
 
-def without_offsets(ladder: FrictionSelection, joints: Collection[int]) -> FrictionSelection:
-    """The ladder without the constant torque of joints (0-based) where a law or a weight is one: none tells them apart."""
+def without_offsets(selection: FrictionSelection, joints: Collection[int]) -> FrictionSelection:
+    """The same without the constant torque of joints (0-based) where a law or a weight is one: none tells them apart."""
 
     def rest(terms: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
         return [[t for t in own if j not in joints or t.kind != "offset"] for j, own in enumerate(terms)]
 
-    return replace(ladder, laws=rest(ladder.laws), candidates=rest(ladder.candidates))
+    return replace(selection, laws=rest(selection.laws), candidates=rest(selection.candidates))
 
 
 def padded(prior: Prior, more: int) -> Prior:

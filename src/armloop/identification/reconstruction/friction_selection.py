@@ -1,18 +1,18 @@
 """Nested model selection of friction: each larger law must earn its place on held-out data; then backward elimination.
 
-The rungs go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
+The extensions go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
 Coulomb level it makes levels that differ with the direction), the Stribeck fall, nonlinear viscous friction,
 viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with memory
-before the joint slides, with and without load. A rung brings a row of elements (widths, speeds, powers), of which a
+before the joint slides, with and without load. An extension brings a row of elements (widths, speeds, powers), of which a
 passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
-must be likelier by a factor that chance reaches with one of twenty ladders at most (the likelihood ratio of data that
+must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
-2020). At the end, each joint hands back the rungs it does not miss, and of the others the elements.
+2020). At the end, each joint hands back the extensions it does not miss, and of the others the elements.
 
-Friction that depends on the position or drifts with time is no rung: within a run it fits, on another run it fails.
+Friction that depends on the position or drifts with time is no extension: within a run it fits, on another run it fails.
 
-A user may restrict the ladder to some laws, by the names in :data:`armloop.laws.friction.FRICTION_LAWS`.
+A user may restrict the selection to some laws, by the names in :data:`armloop.laws.friction.FRICTION_LAWS`.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from armloop.util.arrays import TINY, Array
 from armloop.util.errors import InputError
 from armloop.util.progress import Progress, paced, silent
 
-#: Part of the squared error that a rung must remove, and how often its scatter that must be: for all, for one joint.
+#: Part of the squared error that an extension must remove, and how often its scatter that must be: for all, for one joint.
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
-#: Chance that a ladder has a rung which nothing calls for.
+#: Chance that a selection has an extension which nothing calls for.
 _LEVEL = 0.05
-#: Part of a joint's squared error that a rung must be worth for the joint to keep it.
+#: Part of a joint's squared error that an extension must be worth for the joint to keep it.
 _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
 _FADES = (0.003, 0.01, 0.03, 0.1)
@@ -63,7 +63,7 @@ class Comparison:
     """What the comparison of two nested laws came to.
 
     Attributes:
-        rung: its name.
+        rung: the name of the extension, or of the elimination, as model files have it.
         before, after: held-out nRMSE, mean over the joints.
         refused: held-out nRMSE that it would have led to, where it was not taken.
         joints: those that took it (0-based), or, of the last entry, that dropped extensions.
@@ -82,7 +82,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class FrictionSelection:
-    """The laws chosen, the prior of the shared coefficients, what each rung brought, all candidates, and the sums."""
+    """The laws chosen, the prior of the shared coefficients, what each extension brought, all candidates, and the sums."""
 
     laws: list[list[FrictionTerm]]
     prior: Prior | None
@@ -153,10 +153,10 @@ def check_laws(names: Sequence[str] | None) -> None:
         raise InputError(f"no friction law is named; there are: {', '.join(FRICTION_LAWS)}")
 
 
-def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Extension]:
-    """The rungs with the elements of some laws alone; all of them for None. Rungs left empty are dropped."""
+def restricted(nested: list[Extension], names: Sequence[str] | None) -> list[Extension]:
+    """The extensions with the elements of some laws alone; all of them for None. Extensions left empty are dropped."""
     if names is None:
-        return ladder
+        return nested
     kinds = {kind: name for name in names for kind in FRICTION_LAWS[name]}
 
     def allowed(own: list[FrictionTerm]) -> list[FrictionTerm]:
@@ -166,7 +166,7 @@ def restricted(ladder: list[Extension], names: Sequence[str] | None) -> list[Ext
         return [t for t in named if fading or t.kind != "smooth_sign" or t.parameter == sharpest]
 
     kept = []
-    for extension in ladder:
+    for extension in nested:
         elements = [allowed(own) for own in extension.elements]
         whole = elements == extension.elements
         called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
@@ -191,15 +191,15 @@ def select_friction(
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    ladder = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
-    candidates = [[term for extension in ladder for term in extension.elements[j]] for j in range(arm.n)]
+    nested = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
+    candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
     pooled = data.pooled(design, candidates, options.physical)
-    ends = np.cumsum([0] + [len(extension.elements[0]) for extension in ladder])
+    ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])
     places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
     state = _State(pooled, places, priors)
     comparisons, tell = [], paced(progress)
-    for level, extension in enumerate(ladder):
-        tell(f"friction: extension {level + 1} of {len(ladder)}")
+    for level, extension in enumerate(nested):
+        tell(f"friction: extension {level + 1} of {len(nested)}")
         comparisons.append(state.take(level, extension.name, one_by_one=data.plenty))
     if data.plenty:
         comparisons += [state.eliminate_backward(), state.drop_elements()]
@@ -225,14 +225,14 @@ class _State:
         self._weights, self._errors = self._judged()
 
     def choice(self, taken: list[list[int]]) -> Choice:
-        """Places of the elements of some rungs per joint, without those that were dropped."""
+        """Places of the elements of some extensions per joint, without those that were dropped."""
         return [
             [place for level in own for place in self._places[level] if place not in dropped]
             for own, dropped in zip(taken, self._dropped, strict=True)
         ]
 
     def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
-        """Take a rung for all joints or for some if it earns its place; the first, what every drive has, anyway."""
+        """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway."""
         before = self._error(self._errors)
         everyone = [[*own, level] for own in self.taken]
         errors = self._held_out(everyone)
@@ -323,7 +323,7 @@ class _State:
 
 
 def _notes(comparisons: list[Comparison]) -> list[str]:
-    """What each rung brought, in a line each."""
+    """What each extension brought, in a line each."""
     notes = []
     for one in comparisons:
         who = "joints " + ", ".join(str(joint + 1) for joint in one.joints) if one.joints else "no joint"

@@ -91,7 +91,7 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     design = Design(arm, energy.columns, energy.count)
     design = design.loaded(data.sum(partial(Survey.of, design=design), "load").load(energy.count))
     fitting = Fitting(arm, training, design, {}, options, progress)
-    ladder, laws = fitting.chosen()
+    selection, laws = fitting.chosen()
     r = energy.count + laws.count
 
     def columns(q: Array) -> Array:
@@ -106,20 +106,20 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     )
 
     def regressed(held_out: bool) -> tuple[Found, Array]:
-        solution = ladder.solved(held_out)
+        solution = selection.solved(held_out)
         theta, physics = solution.theta, {}
         if options.physical:
             try:
-                physical = physical_solution(solution, shape, ladder.laws, options.insist, training.memory)
+                physical = physical_solution(solution, shape, selection.laws, options.insist, training.memory)
                 theta = physical.theta
                 physics = physical.to_dict()
             except ExcitationError:
                 # terms found in little data may leave no room for M
                 physics = {"kept_positive": UNKNOWN}
         body = Lagrangian(energy, theta[: energy.count])
-        history = {"friction_ladder": [one.to_dict() for one in ladder.comparisons], **physics}
+        history = {"friction_ladder": [one.to_dict() for one in selection.comparisons], **physics}
         effects = tuple(laws.added(arm, theta[energy.count : r], fitting.covariance))
-        friction = found_friction(ladder.laws, theta[r:])
+        friction = found_friction(selection.laws, theta[r:])
         return Found(arm, [body], friction, history=history, effects=effects), theta
 
     found, theta = regressed(held_out=False)
@@ -138,10 +138,10 @@ def lagrangian(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         "the steps are told apart on prediction"
     ]
     notes += [
-        *ladder.notes,
+        *selection.notes,
         *laws.notes(final.effects),
         *physics_notes(final.history),
-        *_warnings(final, motion, ladder.errors(theta)),
+        *_warnings(final, motion, selection.errors(theta)),
     ]
     found.reports, found.notes = reports, notes
     return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from armloop.data.pieces import LogSource
@@ -14,25 +13,10 @@ from armloop.identification.reconstruction.options import Options
 from armloop.robot.arm import Arm
 from armloop.util.progress import Progress
 
-
-@dataclass(frozen=True)
-class Method:
-    """A way of regressing a library.
-
-    Attributes:
-        streams: whether it passes over the samples, so that not all of them need be in memory.
-        reference: whether it is a reference method, there to be beaten: nothing beyond its terms is looked for.
-    """
-
-    name: str
-    streams: bool = True
-    reference: bool = False
-
-
-#: The default first.
-METHODS: dict[str, Method] = {
-    method.name: method for method in (Method("stepwise"), Method("sindy", streams=False, reference=True))
-}
+#: The reference method, there to be beaten: it needs all samples in memory, and nothing beyond its terms is looked for.
+REFERENCE = "sindy"
+#: Ways of regressing a library, the default first.
+METHODS = ("stepwise", REFERENCE)
 
 Find = Callable[[Arm, Data, Options, Progress], Found]
 

@@ -26,7 +26,7 @@ class Options:
             coefficients are corrected for the noise after the terms are chosen.
         physical: keep friction from driving, and M(q) positive definite unless the data contradict that, where the
             library knows how to.
-        friction: the laws of the friction ladder that may be chosen, by their names
+        friction: the friction laws that may be chosen, by their names
             (:data:`armloop.laws.friction.FRICTION_LAWS`); None for all. The double feature set has its own.
         insist: keep M(q) positive definite even then.
         standard_errors: estimate those of the coefficients, which takes longer than the coefficients do.

@@ -7,12 +7,16 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from armloop.data.log import MotionLog
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
 from armloop.data.signals import Conditioning, too_short
 from armloop.dynamics.physics import check_physics
-from armloop.identification.goodness import Parts, merged
+from armloop.identification.goodness import Parts, merged, parts_of, witness
+from armloop.identification.goodness.features import Scales
+from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import (
     Bandwidth,
     check_nyquist,
@@ -20,13 +24,12 @@ from armloop.identification.reconstruction.bandwidth import (
     highest_corner,
 )
 from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks, independent_blocks
-from armloop.identification.reconstruction.data import Data
+from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.encoder_zeros import encoder_zeros
 from armloop.identification.reconstruction.excitation import check_recorded, determined
 from armloop.identification.reconstruction.fitted import uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
 from armloop.identification.reconstruction.held_out import held_out_intervals
-from armloop.identification.reconstruction.judged import held_out_parts
 from armloop.identification.reconstruction.libraries import (
     Attempt,
     Contender,
@@ -37,24 +40,26 @@ from armloop.identification.reconstruction.libraries import (
     contender,
     named,
 )
-from armloop.identification.reconstruction.library import METHODS, Library
+from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
 from armloop.identification.reconstruction.options import Options, StepReport
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.identification.scoring import Score
+from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.errors import InputError
-from armloop.util.progress import Progress, silent
+from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Workers, one_thread
 
 #: Samples as recorded in which ripples are looked for, where the logs are not kept in memory.
 _RIPPLE = 300_000
+#: Of streamed logs, so many chunks stand for all where the torque is parted.
+_CHUNKS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +156,7 @@ def reconstruct(
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
     large = sum(log.samples for log in logs) > in_memory
-    streamed = large and METHODS[method].streams
+    streamed = large and method != REFERENCE
     kept = [] if streamed else [log.read() for log in logs]
     require_different(kept)
     say_beyond_limits(arm, kept)
@@ -163,7 +168,7 @@ def reconstruct(
     bandwidth, blocks = filter_and_blocks(kept or logs, arm, usual, settings, conditioning is None, progress)
     settings = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
     zeros = None
-    if kept and bandwidth.cutoff_hz > 0 and not METHODS[method].reference:
+    if kept and bandwidth.cutoff_hz > 0 and method != REFERENCE:
         filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
         aside = held_out_intervals(kept, filters, settings)
         zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
@@ -272,7 +277,7 @@ def _finished(
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
-    if not METHODS[method].reference:
+    if method != REFERENCE:
         bare = found.model(conditioning=tried.conditioning)
         if data.in_memory:
             recorded_logs, chunk = [log.read() for log in logs], data.reference
@@ -326,3 +331,23 @@ def _finished(
         notes += between_logs_notes(model)
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
+
+
+def held_out_parts(model: ReconstructedModel, data: Data, part: Part, progress: Progress) -> list[Parts]:
+    """Parts of each joint's torque that a model explains, could explain, and cannot, on the held-out blocks.
+
+    Args:
+        model: one that has not been fitted on them.
+        part: which of the held-out blocks.
+    """
+    data = data.sampled(_CHUNKS)
+    scales = Scales.of(data.reference.samples.motion)
+    most = max(1, MOST // len(data.parts))
+    rows = data.sum(partial(_witness, model=model, part=part, scales=scales, most=most))
+    return parts_of(rows, paced(progress))
+
+
+def _witness(chunk: Chunk, model: ReconstructedModel, part: Part, scales: Scales, most: int) -> Witness:
+    samples = chunk.samples
+    load = model.rigid_body(samples.motion)
+    return witness(residual(model, samples), samples, load, np.asarray(chunk.judging(part)), scales, most)

@@ -57,7 +57,7 @@ _SPREADS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Found:
     """Regress base parameters and friction on all moving samples at once.
 
-    Which friction each joint has is chosen on a ladder (:mod:`reconstruction.friction_selection`). The torque
+    Which friction each joint has is a nested model selection (:mod:`reconstruction.friction_selection`). The torque
     that passes a joint, on which its friction may depend, is known after a first pass with plain friction.
     What physics demands (links that can exist or, where the data contradict those, M(q) positive definite; friction that
     never drives) is kept as constraints.
@@ -76,7 +76,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     nominal = np.concatenate([nominal_parameters(arm), np.zeros(arm.n)])
     design = design.loaded(survey.load(base.count))
     fitting = Fitting(arm, training, design, _priors(arm, base, nominal), options, progress)
-    ladder, laws = fitting.chosen()
+    selection, laws = fitting.chosen()
     r = base.count + laws.count
     shape = body_of(arm, base, laws, motion)
 
@@ -94,11 +94,11 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         return found.theta, base.to_full(found.theta[: base.count], nominal), {**found.to_dict(), **said}
 
     def regressed(held_out: bool) -> Found:
-        solution = ladder.solved(held_out)
+        solution = selection.solved(held_out)
         theta, physics = solution.theta, dict[str, Any]()
         full = base.to_full(theta[: base.count], nominal)
         if options.physical:
-            theta, full, physics = physical(solution, ladder.laws)
+            theta, full, physics = physical(solution, selection.laws)
             held = np.flatnonzero(
                 base.positive & (solution.theta[: base.count] < 0) & (theta[: base.count] >= 0)
             )
@@ -108,16 +108,16 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         body = RigidBody(full, tuple(base.names), theta[: base.count])
         history = {
             "inertial": full[: 10 * arm.n].tolist(),
-            "friction_ladder": [one.to_dict() for one in ladder.comparisons],
+            "friction_ladder": [one.to_dict() for one in selection.comparisons],
             **physics,
         }
         effects = tuple(laws.added(arm, theta[base.count : r], fitting.covariance))
-        return Found(arm, [body], found_friction(ladder.laws, theta[r:]), history=history, effects=effects)
+        return Found(arm, [body], found_friction(selection.laws, theta[r:]), history=history, effects=effects)
 
     found = regressed(held_out=False)
     found.final = final = regressed(held_out=True)
     body, samples_per_joint = final.components[0], survey.sliding.tolist()
-    size = base.count + sum(len(law) for law in ladder.laws)
+    size = base.count + sum(len(law) for law in selection.laws)
     for step in (1, 2, 3):
         friction = [sum(term.step <= step for term in terms) for terms in final.friction]
         counts = [len(body.terms(arm, j)) + friction[j] for j in range(arm.n)]
@@ -126,7 +126,7 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
         "the three steps share one set of parameters, regressed together: a step is a part of that model",
         "errors are of a model fitted without the held-out blocks; the model itself is fitted to all data",
         *unknown,
-        *ladder.notes,
+        *selection.notes,
         *laws.notes(final.effects),
     ]
     found.notes += physics_notes(final.history)

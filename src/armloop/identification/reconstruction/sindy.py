@@ -40,7 +40,7 @@ def sindy(arm: Arm, samples: Samples, held_out: Mask, options: Options, progress
         ExcitationError: a joint hardly moves, or the joints never move together.
     """
     check_excitation(arm, samples)
-    revolute = tuple(bool(r) for r in arm.revolute)
+    revolute = tuple(arm.revolute.tolist())
     rows = np.flatnonzero(samples.moving.all(axis=1) & ~held_out)
     if len(rows) < _FEWEST_SAMPLES:
         raise ExcitationError(

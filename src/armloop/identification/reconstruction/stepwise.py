@@ -49,7 +49,7 @@ def stepwise_on(arm: Arm, data: Data, options: Options, progress: Progress) -> F
     clusters = sort_samples(motion, seed=options.seed)
     note = _impure(motion, clusters)
     sorter = Sorter(samples, clusters.condition)
-    revolute = tuple(bool(r) for r in arm.revolute)
+    revolute = tuple(arm.revolute.tolist())
     if not note:
         try:
             found = _in_steps(arm, data, steps(revolute, options), sorter, clusters, options, progress)
@@ -75,19 +75,23 @@ def _in_steps(
 ) -> Found:
     """One regression after the other, each on the samples of its condition; on all of them without a sorter."""
     found = Found(arm, friction=[[] for _ in arm.joints])
-    revolute = tuple(bool(r) for r in arm.revolute)
     for plan in plans:
         share = float(np.isin(clusters.condition, plan.conditions).mean())
         progress(f"{plan.name}: {share:.0%} of the samples")
-        # A copy: what is found now must not be inherited by itself.
-        inherited = Found(arm, list(found.components), [list(law) for law in found.friction])
-        choice = Choice(sorter, plan.conditions, inherited)
-        terms, friction, report = regress_step(data, revolute, choice, plan, options)
-        found.components += terms
-        for law, more in zip(found.friction, friction, strict=True):
-            law += more
-        found.reports += report
+        add_step(found, data, sorter, plan, options)
     return found
+
+
+def add_step(found: Found, data: Data, sorter: Sorter | None, plan: StepPlan, options: Options) -> None:
+    """Regress one step on what the steps found so far leave, and add it to them."""
+    # A copy: what is found now must not be inherited by itself.
+    inherited = Found(found.arm, list(found.components), [list(law) for law in found.friction])
+    choice = Choice(sorter, plan.conditions, inherited)
+    terms, friction, reports = regress_step(data, tuple(found.arm.revolute.tolist()), choice, plan, options)
+    found.components += terms
+    for law, more in zip(found.friction, friction, strict=True):
+        law += more
+    found.reports += reports
 
 
 def steps(revolute: tuple[bool, ...], options: Options) -> list[StepPlan]:

@@ -46,8 +46,7 @@ class Survey(Sums):
     @staticmethod
     def of(chunk: Chunk, design: Design) -> Survey:
         """Survey of a chunk."""
-        sliding = sliding_rows(chunk.samples)
-        fitted = sliding & ~chunk.held_out[:, None]
+        sliding, fitted = sliding_rows(chunk.samples), fitted_rows(chunk)
         used = np.asarray(fitted.any(axis=1))
         return Survey(
             JointSums.of(chunk, design, [list(PLAIN_FRICTION)] * sliding.shape[1], _by_speed),
@@ -158,10 +157,10 @@ def _at_once(chunk: Chunk) -> Dealt:
 
 
 def _by_fold(chunk: Chunk, folds: dict[int, InnerFolds]) -> Dealt:
-    rows, own = sliding_rows(chunk.samples), folds[int(chunk.blocks[0])]
-    fold, judges = own.deal(chunk.samples, np.asarray((rows & ~chunk.held_out[:, None]).any(axis=1)))
+    own = folds[int(chunk.blocks[0])]
+    fold, judges = own.deal(chunk.samples, np.asarray(fitted_rows(chunk).any(axis=1)))
     label = np.where(chunk.held_out, own.count, fold)[:, None]
-    return Dealt(np.where(rows, label, -1), own.count + 1, judges)
+    return Dealt(np.where(sliding_rows(chunk.samples), label, -1), own.count + 1, judges)
 
 
 def _used(chunk: Chunk, folds: InnerFolds) -> tuple[int, int]:

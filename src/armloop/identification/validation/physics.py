@@ -95,22 +95,17 @@ def compare_physical(
     q = preprocess(logs, runs["physical"].results[0][1].model.conditioning).motion.q
     near, far = _postures(arm, q, seed)
     within, beyond = (
-        {key: _worst([result.model for _, result in run.results], at) for key, run in runs.items()}
+        {key: check_mass_matrix([result.model for _, result in run.results], at) for key, run in runs.items()}
         for at in (near, far)
     )
     return PhysicalComparison(runs, within, beyond, constraints)
 
 
-def check_mass_matrix(model: ReconstructedModel, q: Array) -> MassMatrixCheck:
-    """The symmetric part of the mass matrix at postures q (P, n)."""
-    M = mass_matrix(model, q)
-    least = np.linalg.eigvalsh(0.5 * (M + M.transpose(0, 2, 1)))[:, 0]
-    return MassMatrixCheck(float(least.min()), float(np.mean(least <= 0)))
-
-
-def _worst(models: list[ReconstructedModel], q: Array) -> MassMatrixCheck:
-    checks = [check_mass_matrix(model, q) for model in models]
-    return MassMatrixCheck(min(c.least for c in checks), max(c.share_negative for c in checks))
+def check_mass_matrix(models: Sequence[ReconstructedModel], q: Array) -> MassMatrixCheck:
+    """The symmetric part of mass matrices at postures q (P, n), of several models the worst."""
+    M = np.array([mass_matrix(model, q) for model in models])
+    least = np.linalg.eigvalsh(0.5 * (M + M.swapaxes(2, 3)))[:, :, 0]
+    return MassMatrixCheck(float(least.min()), float(np.mean(least <= 0, axis=1).max()))
 
 
 def _postures(arm: Arm, q: Array, seed: int) -> tuple[Array, Array]:

@@ -143,7 +143,7 @@ class Effect(ABC):
         memory: whether it depends on the path or the time, not only on q, v and vdot.
         of_time: whether it depends on the time since the start of a run; to a controller the start is long ago.
         simulated: whether Drake's systems can have it; else it is found in logs alone.
-        rubs: whether it is friction of one joint and nothing else, as the ladder of a reconstruction has it.
+        rubs: whether it is friction of one joint and nothing else, as the friction selection of a reconstruction has it.
         periodic: whether its shape is a number of cycles per revolution of its joint.
         fault_order: of sensors: a record is falsified by the lower ones first.
         nested: how many of its coefficients, the last, are all of another listed law: it is there if the others are.

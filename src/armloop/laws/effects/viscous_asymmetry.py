@@ -13,9 +13,9 @@ class ViscousAsymmetry(Law):
     """tau_j += c |v_j|: f_v + c forward, f_v - c backward.
 
     Geared joints, those with strain wave gears above all, run harder one way, and the more so the faster they turn; a
-    reconstruction has a rung for it (``viscous_by_direction``). Without this law such a change is taken for a difference
-    of dry friction between the directions, right at one speed alone. Runs at several speeds tell the two apart: |v|
-    vanishes at rest, and no other law of the list is even in v and grows with it.
+    reconstruction has an extension for it (``viscous_by_direction``). Without this law such a change is taken for a
+    difference of dry friction between the directions, right at one speed alone. Runs at several speeds tell the two
+    apart: |v| vanishes at rest, and no other law of the list is even in v and grows with it.
     """
 
     name = "viscous_asymmetry"
