@@ -400,6 +400,16 @@ def test_a_lag_that_is_not_felt_below_the_corner_is_left() -> None:
         assert (np.abs(own - left).max() > 1e-3) == felt, corner
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_rows_that_repeat_the_one_before_do_not_hide_that_a_speed_is_late(seed: int) -> None:
+    log = filtered_by_its_driver(sines(np.arange(0, 20, 0.005), (0.2, 0.3, 0.4)), 45.0, 0.002, seed)
+    kept = np.arange(log.samples)
+    for k in np.flatnonzero(np.random.default_rng(seed).uniform(size=log.samples - 1) < 0.05) + 1:
+        kept[k] = kept[k - 1]
+    held = replace(log, q=log.q[kept], v=log.v[kept], tau=log.tau[kept])
+    assert held.velocity_lag == pytest.approx(log.velocity_lag, abs=2e-4) and log.velocity_lag > 0.001
+
+
 def test_joints_at_a_steady_speed_have_no_say_and_the_surest_say_most() -> None:
     log = sines(np.arange(0, 20, 0.004), (0.7, 2.0, 1.3))
     rng = np.random.default_rng(3)

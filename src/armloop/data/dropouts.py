@@ -44,7 +44,7 @@ def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
     Args:
         lag: seconds by which v is late.
     """
-    clean = _without_spikes(_moving_on(log))
+    clean = mended(log)
     lost = np.zeros(log.tau.shape, dtype=bool)
     for j in range(log.tau.shape[1]):
         cut = cut_off(clean, j)
@@ -53,6 +53,11 @@ def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
         for value, _ in cut:
             lost[:, j] |= clean.tau[:, j] == value
     return replace(clean, v=_in_time(clean, lag), lost=lost if lost.any() else None)
+
+
+def mended(log: Recorded) -> Recorded:
+    """The record with what lies beside them in place of repeated rows and spikes."""
+    return _without_spikes(_moving_on(log))
 
 
 def _in_time(log: Recorded, lag: float) -> Array:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armloop.data.dropouts import mended
 from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
@@ -183,7 +184,7 @@ class MotionLog:
     @cached_property
     def velocity_lag(self) -> float:
         """The group delay of v behind dq/dt in seconds, 0 if none is sure (see :mod:`armloop.data.redundancy`)."""
-        return velocity_lag(recorded(self))
+        return velocity_lag(mended(recorded(self)))
 
     def runs(self) -> list[slice]:
         """Return the stretches without a gap as slices; never filter or differentiate across two of them."""

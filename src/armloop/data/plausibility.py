@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from armloop.data.clock import LEAST_RATE, likely_unit, sample_rate
-from armloop.data.dropouts import dropouts
+from armloop.data.dropouts import dropouts, mended
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import (
     accelerations,
@@ -65,7 +65,7 @@ def doubts(log: Recorded) -> Iterator[Finding]:
     if log.derived:
         yield Finding("columns v", "are missing; v is the derivative of q")
     else:
-        yield from disagreements(log)
+        yield from disagreements(mended(log))
     rate = sample_rate(log.time)
     if rate < 50.0:
         yield Finding(

@@ -202,6 +202,15 @@ def smooth(samples: Samples, x: Array) -> Array:
     return x
 
 
+def rate_along(samples: Samples, x: Array) -> Array:
+    """(N, ...) rate of x (N, ...) along every run, per second; zero where samples are no time series."""
+    rate = np.zeros_like(x)
+    for run in samples.motion.runs() if samples.cutoff_hz > 0 else []:
+        if run.stop - run.start > 1:
+            rate[run] = np.gradient(x[run], samples.motion.time[run], axis=0)
+    return rate
+
+
 def as_torque(samples: Samples) -> Samples:
     """The samples with the motion filtered like the torque.
 

@@ -211,6 +211,7 @@ class UncertaintyData(Struct):
     shared: Annotated[dict[Text, ErrorData], _Terms] = {}
     stribeck: Annotated[list[dict[Name, Any]], Meta(max_length=MOST_JOINTS)] = []
     torque: Annotated[list[TorqueErrorsData], Meta(max_length=MOST_JOINTS)] = []
+    torque_lag: Finite = 0.0
     between_logs: Annotated[
         list[
             Annotated[

@@ -1,6 +1,8 @@
 """Standard errors reach the model file under the terms' names and do not depend on how samples are cut."""
 
 import json
+from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
@@ -8,10 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armloop.data.signals import independent_rows, preprocess
-from armloop.identification.uncertainty import Fitted, standard_errors
+from armloop.data.signals import independent_rows, preprocess, smooth
+from armloop.identification.uncertainty import Fitted, standard_errors, torque_errors
 from armloop.identification.uncertainty import standard_errors as module_function
 from armloop.identification.uncertainty.solving import solve_given_terms
+from armloop.identification.uncertainty.unknowns import problems
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import load_model
 from armloop.util.errors import ModelError
@@ -40,8 +43,6 @@ def test_every_coefficient_has_one_and_the_file_keeps_it(fit, tmp_path):
         assert set(errors["stribeck"][j]) == {"static", "coulomb", "viscous", "stribeck_velocity"}
         for entry in (*errors["joints"][j].values(), *errors["friction"][j].values()):
             assert 0 < entry["std_error"] < 10 and entry["degrees_of_freedom"] >= 1
-    from dataclasses import replace
-
     replace(model, uncertainty=errors).save(tmp_path / "model.json")
     assert load_model(tmp_path / "model.json").uncertainty == errors
     # files from before there were standard errors, and files somebody broke
@@ -88,6 +89,46 @@ def test_truth_lies_within_a_few_standard_errors(fit):
             assert abs(found[key]["value"] - value) < 5 * found[key]["std_error"]
 
 
+@pytest.mark.parametrize("late", [-0.002, 0.004])
+def test_a_torque_that_is_out_of_step_is_part_of_the_errors(fit: Any, late: float) -> None:
+    """Recorded earlier or later than the motion, as where channels are read one after the other."""
+    logs = collection(0, poses=10, segments=20, seconds=20.0).logs(Disturbance("white"), 1)
+    shifted = [
+        replace(log, tau=np.stack([np.interp(log.time - late, log.time, x) for x in log.tau.T], axis=1))
+        for log in logs
+    ]
+    samples = preprocess(shifted, true_model().conditioning)
+    fitted = [Fitted((1, 2, 3), samples.moving & independent_rows(samples)[:, None])]
+    _, parts = solve_given_terms(true_model(), samples, fitted, 2)
+    assert standard.torque_lag([part.equations for part in parts]) == pytest.approx(late, abs=4e-4)
+    worst = 0.0
+    for part, truth in zip(parts, map(partial(_values, true_model()), range(3)), strict=True):
+        wrong = np.array([u.value for u in part.unknowns]) - truth
+        spread = np.sqrt(np.diag(part.equations.covariance()))
+        worst = max(worst, np.abs(wrong / spread).max())
+        assert (np.abs(wrong / part.std_error) < 3.0).all()
+    assert worst > 5.0, "of the spread between blocks alone"
+
+
+def test_what_is_out_of_step_is_an_error_of_the_torque_of_a_later_run(fit: Any) -> None:
+    model, samples, fitted = fit
+    errors = {**standard_errors(model, samples, fitted), "torque_lag": 0.003}
+    late, in_step = (
+        torque_errors(replace(model, uncertainty=one), samples)
+        for one in (errors, {**errors, "torque_lag": 0.0})
+    )
+    np.testing.assert_array_equal(late[:, :, : in_step.shape[2]], in_step)
+    run = max(samples.motion.runs(), key=lambda run: run.stop - run.start)
+    time, torque = samples.motion.time[run], smooth(samples, model.predict(samples.motion))[run]
+    difference = torque - np.stack([np.interp(time - 0.003, time, x) for x in torque.T], axis=1)
+    own = late[run, :, -1]
+    assert np.sum(own * difference) / np.sum(own**2) == pytest.approx(1.0, abs=0.1)
+
+
+def _values(model: Any, joint: int) -> Any:
+    return np.array([unknown.value for unknown in problems(model)[joint].unknowns])
+
+
 def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two joints; regressions of which the second uses but the first half; every other sample of a second one left out."""
     time = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 9.0])
@@ -114,7 +155,12 @@ def test_blocks_suit_the_slowest_residual_and_the_shortest_data(monkeypatch: pyt
     monkeypatch.setattr(standard, "covered_time", covered_time)
     monkeypatch.setattr(standard, "block_length", lambda correlation, covered: 10 * correlation + covered)
     monkeypatch.setattr(standard, "independent_blocks", lambda motion, seconds: asked.update(seconds=seconds))
-    sums = SimpleNamespace(covariance=lambda: None, degrees_of_freedom=lambda: None)
+    sums = SimpleNamespace(
+        covariance=lambda: 0.0,
+        degrees_of_freedom=lambda: None,
+        late=lambda: (0.0, 0.0),
+        shifted=lambda: np.zeros(1),
+    )
     monkeypatch.setattr(standard, "_equations", lambda *_: sums)
     model: Any = SimpleNamespace(arm=SimpleNamespace(n=2))
     samples: Any = SimpleNamespace(motion=motion)
@@ -208,6 +254,7 @@ def test_a_model_keeps_errors_where_they_belong_and_none_that_is_no_number(
 ) -> None:
     """Of two joints: what the fitted samples do not determine has no error, or no degrees of freedom."""
     first = SimpleNamespace(
+        equations=SimpleNamespace(late=lambda: (3.0, 4.0)),
         unknowns=[
             unknown("a", 0, kind="joints"),
             unknown("b", 1, kind="joints"),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.motion import Samples
+from armloop.data.signals import rate_along, smooth
 from armloop.identification.uncertainty.between_logs import friction_spread
 from armloop.identification.uncertainty.unknowns import Unknown, problems
 from armloop.model import ReconstructedModel
@@ -57,7 +58,7 @@ def _directions(rows: Sequence[str]) -> Array:
 def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n, r) torque of independent errors of the model, one standard deviation each, through the samples' filter.
 
-    Of its coefficients, and of friction where it differs between logs.
+    Of its coefficients, of friction where it differs between logs, and of a record of the torque that was out of step.
     None (r = 0) of a model that keeps no directions of its unknowns, such as one made by hand.
     """
     kept: Sequence[dict[str, Any]] = model.uncertainty.get("torque", [])
@@ -71,6 +72,10 @@ def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
         for design in problem.designs(samples):
             torque[:, design.joint] += design.X @ directions[design.where]
         parts.append(torque)
+    lag = model.uncertainty.get("torque_lag", 0.0)
+    if lag:
+        predicted = smooth(samples, model.predict(samples.motion))
+        parts.append(lag * rate_along(samples, predicted)[:, :, None])
     spread = friction_spread(model, samples)
     parts += [spread] if spread.any() else []
     return np.concatenate(parts, axis=2) if parts else np.zeros((*samples.motion.q.shape, 0))

@@ -9,7 +9,7 @@ jackknife (:mod:`armloop.regression.clustered`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +32,9 @@ class Equations:
         count: (B, p) samples that entered.
         stage: (p,) which of the regressions, one after the other, found each coefficient.
         variance: (p,) mean squared residual of its regression, weighted as the scores are.
+        rate: (p,) column times the rate of the predicted torque, summed over all blocks: what a record of the torque that
+            is out of step with the motion adds to the scores, per second.
+        lag: residual times that rate, and its square, summed likewise.
     """
 
     jacobian: Array
@@ -39,6 +42,8 @@ class Equations:
     count: Array
     stage: Index
     variance: Array
+    rate: Array = field(default_factory=lambda: np.zeros(1))
+    lag: tuple[float, float] = (0.0, 0.0)
 
     @property
     def blocks(self) -> int:
@@ -63,6 +68,17 @@ class Equations:
         share = self.count / np.maximum(self.count.sum(axis=0), TINY)
         inner = delete_one(self._scaled, self.score * self.scale, share, _RIDGE)
         return inner * np.multiply.outer(self.scale, self.scale)
+
+    def shifted(self) -> Array:
+        """(p,) what the coefficients change by per second that the torque is recorded late."""
+        return -gauss_newton_step(self.jacobian.sum(axis=0), self.rate)
+
+    def late(self) -> tuple[float, float]:
+        """Score and information of the lag of the torque behind the motion, s, beside the coefficients."""
+        share = self.lag[1] + float(np.sum(self.rate * self.shifted()))
+        left = self.lag[0] - float(np.sum(self.rate * self.step()))
+        typical = float(np.mean(self.variance))
+        return -left / max(typical, TINY), max(share, 0.0) / max(typical, TINY)
 
     def independent_covariance(self) -> Array:
         """(p, p) what a textbook states: samples independent, inherited coefficients exact. For comparison."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from armloop.data.blocks import overlapping
 from armloop.data.motion import Samples
+from armloop.data.signals import rate_along
 from armloop.identification.uncertainty.blocking import (
     block_length,
     correlation_time,
@@ -123,6 +124,7 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
         ``friction_line``: per joint f_c, f_v of the straight line nearest to any law;
         ``torque``: the coefficients' covariance by the directions that the torque feels
         (:mod:`armloop.identification.uncertainty.propagated`);
+        ``torque_lag``: by how many seconds the torque is recorded later than the motion (:func:`torque_lag`);
         ``block_seconds``: length of the blocks; ``correlation_seconds``: the residual's correlation time.
     """
     parts, seconds, correlation = covariances(model, samples, fitted)
@@ -144,6 +146,7 @@ def standard_errors(model: ReconstructedModel, samples: Samples, fitted: Sequenc
     rows = np.logical_or.reduce([one.rows for one in fitted])
     table["friction_line"] = [_line(model, parts, joint, samples, rows[:, joint]) for joint in range(n)]
     table["torque"] = [to_dict(part.unknowns, leading(part.covariance, part.gram)) for part in parts]
+    table["torque_lag"] = torque_lag([part.equations for part in parts])
     return {
         "method": "jackknife over blocks of samples; the terms are taken as given",
         "block_seconds": seconds,
@@ -167,12 +170,32 @@ def covariances(
     covered = [covered_time(samples.motion.time, np.asarray(one.rows.any(axis=1))) for one in fitted]
     seconds = block_length(correlation, min(covered))
     blocks = independent_blocks(samples.motion, seconds)
-    found = []
-    for problem in todo:
-        if 0 < len(problem.unknowns) <= MOST_UNKNOWNS:
-            sums = _equations(problem, samples, fitted, blocks, spread)
-            found.append(Errors(problem.unknowns, sums.covariance(), sums.degrees_of_freedom(), sums))
+    every = [
+        (problem.unknowns, _equations(problem, samples, fitted, blocks, spread))
+        for problem in todo
+        if 0 < len(problem.unknowns) <= MOST_UNKNOWNS
+    ]
+    late = torque_lag([sums for _, sums in every])
+    found = [
+        Errors(unknowns, sums.covariance() + _outer(late * sums.shifted()), sums.degrees_of_freedom(), sums)
+        for unknowns, sums in every
+    ]
     return found, seconds, correlation
+
+
+def torque_lag(equations: Sequence[Equations]) -> float:
+    """By how many seconds the torque is recorded later than the motion, for all joints, as far as what is left tells.
+
+    A record's channels are in step to a part of its period only, and no column of a model says so: what of it looks like
+    friction and inertia goes into those, of every block alike, so that no spread between blocks shows it.
+    """
+    told = np.array([one.late() for one in equations]).reshape(-1, 2)
+    score, information = told.sum(axis=0)
+    return float(score / information) if information > 0 else 0.0
+
+
+def _outer(x: Array) -> Array:
+    return np.multiply.outer(x, x)
 
 
 def gauss_newton_steps(
@@ -239,7 +262,8 @@ class Assembled:
 
 @dataclass(frozen=True, eq=False)
 class _Portion:
-    """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,)."""
+    """Fitted samples of one joint in one piece: columns X (N, k) of the unknowns ``where``, residual r (N,), and the rate
+    of the torque that they predict (N,)."""
 
     index: Index
     joint: int
@@ -247,6 +271,7 @@ class _Portion:
     where: Index
     X: Array
     r: Array
+    rate: Array
 
 
 def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Iterator[_Portion]:
@@ -255,6 +280,7 @@ def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Itera
     for part, core, start in overlapping(samples, _PIECE, _MARGIN):
         for design in problem.designs(part):
             stage = stages[design.where]
+            rate = rate_along(part, design.X @ theta[design.where])[core]
             for s, one in enumerate(fitted):
                 inside = np.flatnonzero(one.rows[start : start + core.stop - core.start, design.joint])
                 if len(inside) == 0:
@@ -262,7 +288,7 @@ def _walk(problem: Problem, samples: Samples, fitted: Sequence[Fitted]) -> Itera
                 X = design.X[core][inside]
                 known = np.where(stage <= s, theta[design.where], 0.0)
                 r = part.tau[core][inside, design.joint] - X @ known
-                yield _Portion(start + inside, design.joint, s, design.where, X, r)
+                yield _Portion(start + inside, design.joint, s, design.where, X, r, rate[inside])
 
 
 def _stages(problem: Problem, fitted: Sequence[Fitted]) -> Index:
@@ -294,6 +320,7 @@ def _equations(
     p, B = len(problem.unknowns), int(blocks[-1]) + 1
     stages = _stages(problem, fitted)
     jacobian, score, count = np.zeros((B, p, p)), np.zeros((B, p)), np.zeros((B, p))
+    rate, lag = np.zeros(p), np.zeros(2)
     for portion in _walk(problem, samples, fitted):
         if squares is not None:
             squares[portion.joint] += portion.r @ portion.r
@@ -301,6 +328,8 @@ def _equations(
         own = stages[portion.where] == portion.stage
         seen = stages[portion.where] <= portion.stage
         rows, columns = portion.where[own], portion.where[seen]
+        rate[rows] += weight * portion.X[:, own].T @ portion.rate
+        lag += weight * np.array([portion.r, portion.rate]) @ portion.rate
         mine = blocks[portion.index]
         edges = np.flatnonzero(np.diff(mine, prepend=-1, append=B))
         for first, last in pairwise(edges):
@@ -311,7 +340,9 @@ def _equations(
     used = count.any(axis=1)
     joint = problem.unknowns[0].joint
     variance = np.ones(p) if problem.weighted else spread[stages, joint]
-    return Equations(jacobian[used], score[used], count[used], stages, variance)
+    return Equations(
+        jacobian[used], score[used], count[used], stages, variance, rate, (float(lag[0]), float(lag[1]))
+    )
 
 
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
