@@ -1,19 +1,24 @@
-"""Progress is seen by who looks at a terminal, and by nobody else."""
+"""Progress is seen by who looks at a terminal or into a job's log, and never in an answer for programs."""
 
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from armloop.commands.shared import progress
 
 
+@pytest.mark.parametrize("json", [True, False])
 @pytest.mark.parametrize("terminal", [True, False])
-def test_progress_is_on_standard_error_of_a_terminal_and_never_in_the_answer(
-    terminal: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_progress_is_on_a_terminals_standard_error_else_before_the_answer_for_people(
+    terminal: bool, json: bool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal)
-    progress()("reading 5% of it")
-    answer = capsys.readouterr()
-    assert answer.out == "" and answer.err == ("  … reading 5 % of it\n" if terminal else "")
+    options: Any = SimpleNamespace(json=json)
+    progress(options)("reading 5% of it")
+    answer, line = capsys.readouterr(), "  … reading 5 % of it\n"
+    assert answer.err == (line if terminal else "")
+    assert answer.out == ("" if terminal or json else line)

@@ -34,7 +34,7 @@ def run(options: Collect) -> None:
     from armloop.workflows import collect_logs
 
     folder = take_folder(options.out, (f"{name}.csv" for name in CONDITIONS))
-    logs = collect_logs(simulated_arm(options), options.plan, options.seed, progress())
+    logs = collect_logs(simulated_arm(options), options.plan, options.seed, progress(options))
     for name, log in logs.items():
         write_log(folder / f"{name}.csv", log)
         print(f"{folder / name}.csv  {log.samples} samples in {len(log.runs())} run(s)")

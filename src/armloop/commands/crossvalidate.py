@@ -94,7 +94,7 @@ def run(options: Crossvalidate) -> None:
         "library": options.library,
         "conditioning": None if options.cutoff is None else Conditioning(cutoff_hz=options.cutoff),
         "options": Options(max_order=options.max_order, physical=not options.no_physical),
-        "progress": progress(),
+        "progress": progress(options),
         "kept": kept,
         "workers": Processes(options.jobs),
     }

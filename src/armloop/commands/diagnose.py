@@ -38,14 +38,14 @@ def run(options: Diagnose) -> None:
     model, logs = model_and_logs(options)
     held_out = held_out_logs(options, model, logs)
     wanted = wish(options, model)
-    result = run(model, logs, progress(), options.jobs)
+    result = run(model, logs, progress(options), options.jobs)
     result = result.adopt() if options.adopt else result
     compensation = close(model, result.model, result.samples, held_out)
     answer = {**result.to_dict(), **compensation.to_dict()}
-    planned = None if wanted is None else plan(str(options.next_run), result, wanted, progress())
+    planned = None if wanted is None else plan(str(options.next_run), result, wanted, progress(options))
     if planned is not None:
         answer["next_run"] = planned.to_dict()
-    progress()("drawing the report")
+    progress(options)("drawing the report")
     page = diagnosis_report(result, model, [log.name for log in logs], compensation)
     write_json(folder / "diagnosis.json", answer)
     result.model.save(folder / "model.json")

@@ -90,7 +90,7 @@ def run(options: Excite) -> None:
     settings.timing(arm.n)  # faults of the options before anything is computed
     whole = options.arm in urdf_names() and not options.lock and options.tip is None
     found = read_ranges(options, arm, options.arm if whole else "urdf")
-    tell = progress()
+    tell = progress(options)
     result = excite(arm, found, settings, model.predict if model else None, tell)
     ratio = None
     if options.compare or options.report:

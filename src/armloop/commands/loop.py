@@ -28,11 +28,11 @@ def run(options: Loop) -> None:
     if not options.measured:
         from armloop.workflows import LOOP_FILES, run_loop
 
-        run_loop(take_folder(options.out, LOOP_FILES), options.seed, progress())
+        run_loop(take_folder(options.out, LOOP_FILES), options.seed, progress(options))
         return
     from armloop.reports.measured_report import measured_words
     from armloop.workflows.measured import MEASURED_FILES, run_measured
 
     folder = take_folder(options.out, MEASURED_FILES)
-    print(measured_words(run_measured(folder, progress())))
+    print(measured_words(run_measured(folder, progress(options))))
     print(f"written: {folder}/{', '.join(MEASURED_FILES)}")

@@ -125,7 +125,7 @@ def run(options: Reconstruct) -> None:
                 snr=snr,
                 friction=_laws(options.friction),
             ),
-            progress(),
+            progress(options),
             recorded,
             workers,
             in_memory=most,
@@ -136,7 +136,7 @@ def run(options: Reconstruct) -> None:
     if options.report:
         from armloop.reports.reconstruction_report import reconstruction_report
 
-        progress()("drawing the report")
+        progress(options)("drawing the report")
         write_text(options.report, reconstruction_report(result, first_samples(logs)))
     if options.json:
         print_json({"model": str(options.out), **result.to_dict()})

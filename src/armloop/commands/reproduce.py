@@ -52,7 +52,7 @@ def run(options: Reproduce) -> None:
 
     names = chosen(options.items)
     folder = take_folder(options.out, ("reproduction.json", "report.html"))
-    tell = progress()
+    tell = progress(options)
     context = Context(draws=options.draws, progress=tell)
     kept = Kept(folder, {"draws": options.draws})
     answer, seconds, entries = {}, {}, []

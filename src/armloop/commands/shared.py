@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from armloop.commands.arguments import Chain, HeldOut, OfModel, Recorded
-from armloop.commands.options import comma_numbers
+from armloop.commands.options import Options, comma_numbers
 from armloop.data.header import check_header
 from armloop.data.log import GAINS, MotionLog, read_log
 from armloop.data.repeats import require_not_fitted
@@ -26,13 +26,14 @@ from armloop.util.progress import Progress, silent, with_time_left
 _PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip")
 
 
-def progress() -> Progress:
-    """Progress on standard error where that is a terminal; elsewhere the line of a fault stands there alone."""
-    if not sys.stderr.isatty():
+def progress(options: Options) -> Progress:
+    """Progress on the terminal; with none, as in a job's log, before the answer: standard error is for faults alone."""
+    if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
+    stream = sys.stderr if sys.stderr.isatty() else sys.stdout
     # % stands apart from its number, as in the tables
     return with_time_left(
-        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=sys.stderr, flush=True)
+        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=stream, flush=True)
     )
 
 

@@ -83,17 +83,17 @@ def run(options: Track) -> None:
         model.arm.require_same(scenario.plant.arm, paths[name])
     view = _view(options, scenario) if options.meshcat else None
     if scenario.pickup is not None:
-        answer, pickup = run_pickup_scenario(scenario, models, folder, progress(), view)
+        answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options), view)
         tables = [phases_table(pickup.phases)]
         files = (
             "tracking.json, tracking.png, diagnosis.json, augmented.json, since_the_grasp.csv, replay.html"
         )
     elif scenario.wear is not None:
-        answer, wear = run_wear_scenario(scenario, models, folder, progress())
+        answer, wear = run_wear_scenario(scenario, models, folder, progress(options))
         tables = [spread_table(wear)]
         files = "tracking.json, spread.png"
     else:
-        answer, results = run_scenario(scenario, models, folder, progress(), view)
+        answer, results = run_scenario(scenario, models, folder, progress(options), view)
         paper = scenario.name.startswith("three_axis_tracking")
         tables = [eta_table(results, paper=paper), metrics_table(results)]
         files = "tracking.json, tracking.png, replay.html"

@@ -45,7 +45,7 @@ def run(options: Tune) -> None:
     scenario = load_tracking(options.scenario, simulated_arm(options))
     model = load_model(options.model, scenario.plant.arm) if options.model else None
     answer, tuning = tune_scenario(
-        scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress()
+        scenario, 2 * pi * options.bandwidth, options.margin, model, folder, progress(options)
     )
     if options.json:
         print_json(answer)

@@ -75,7 +75,7 @@ def run(options: Watch) -> int:
     how = Options(
         options.false_alarm_hours, options.healthy, not options.sums_only, options.scheduler, options.jobs
     )
-    tell = progress()
+    tell = progress(options)
     told: list[str] = []
     outcome, counts = None, Counts()
     for places in _batches(sys.stdin) if options.logs == ["-"] else [options.logs]:
