@@ -143,8 +143,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     return (
         stages,
         "Measure, model, control; find what changed; control better",
-        f"{result.arm.name}, seed {result.seed}:  hidden was {truth_name(result)};  {verdict};  "
-        f"{number(sum(result.seconds.values()), 2)} s in all",
+        f"{result.arm.name}, seed {result.seed}:  hidden was {truth_name(result)};  {verdict};  ",
     )
 
 
