@@ -288,8 +288,7 @@ def _driving(
 
     Friction is the part of the torque at constant velocity that turns with it: of rigid links' torques none does.
     """
-    n, trained = model.arm.n, model.history.get("range")
-    fastest = np.ones(n) if trained is None else np.maximum(np.array(trained[1], dtype=float), 1e-6)
+    n, fastest = model.arm.n, np.maximum(model.ranges[1], 1e-6)
     alone = np.kron(np.eye(n), np.linspace(0, 1, _SPEEDS + 1)[1:, None]) * fastest
     v = np.concatenate([alone, rng.uniform(-1, 1, (_MOTIONS, n)) * fastest])
     q = rng.uniform(low, high, v.shape)

@@ -76,13 +76,11 @@ def log_sums(
     model: ReconstructedModel,
     log: MotionLog,
     extra: Mapping[str, Array] | None = None,
-    block_seconds: float = BLOCK_SECONDS,
 ) -> LogSums:
     """The sums of one log.
 
     Args:
         extra: further columns of the log, (N,) or (N, n) each: ``temperature`` °C, ``since_start`` s.
-        block_seconds: longest block, s.
 
     Raises:
         LogError: the log is not of the model's arm, too short for the filter, or no joint slides long enough.
@@ -104,7 +102,7 @@ def log_sums(
     scale = residual_scale(model, samples)
     u = (samples.tau - smooth(samples, predicted))[kept] / scale
     x = known.values / scale[:, None]
-    number = block_numbers(motion, block_seconds)
+    number = block_numbers(motion, BLOCK_SECONDS)
     present, block = np.unique(number[kept], return_inverse=True)
     edges = np.searchsorted(block, np.arange(len(present) + 1))
     count = slides.astype(float)

@@ -68,13 +68,13 @@ def write_text(path: str | Path, text: str) -> None:
         draft.write_bytes(text.encode("utf-8", errors="backslashreplace"))
 
 
-def write_json(path: str | Path, value: dict[str, Any], indent: int | None = 1) -> None:
+def write_json(path: str | Path, value: dict[str, Any]) -> None:
     """Write an object as strict JSON with the command's mark, whole or not at all; see `strict`."""
     mark = outputs.stamp()
     if mark is not None:
         first = {key: value[key] for key in ("schema",) if key in value}
         value = {**first, "written_by": mark, **{k: v for k, v in value.items() if k not in first}}
-    write_text(path, strict(value, indent) + "\n")
+    write_text(path, strict(value, indent=1) + "\n")
 
 
 def strict(value: Any, indent: int | None = None) -> str:

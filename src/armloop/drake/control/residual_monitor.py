@@ -54,8 +54,7 @@ class ResidualMonitor(LeafSystem):
             )
         n = self._n = model.arm.n
         self._model, self._period, self._count, self._learn = model, period, count, blocks
-        ranges = model.history.get("range")
-        self._slides = _SLIDES * (np.asarray(ranges[1], dtype=float) if ranges else np.ones(n))
+        self._slides = _SLIDES * model.ranges[1]
         # the columns of any motion are the same: those of one at rest tell how many there are
         rest = np.zeros((count, n))
         motion = Motion(period * np.arange(float(count)), rest, rest + 0.1, rest)

@@ -20,7 +20,7 @@ from armloop.drake.experiments.tracking import (
     refusing_divergence,
     score,
 )
-from armloop.drake.plant.fault_injection import Effects, UndeclaredEffect
+from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 
@@ -48,7 +48,6 @@ def run_pickup(
     model: FeedforwardModel,
     learn: Callable[[MotionLog], FeedforwardModel],
     view: LiveView | None = None,
-    changes: Effects | None = None,
 ) -> PickupResult:
     """Run a scenario that has a `pickup` by PID with the model's feedforward, Eq. (36).
 
@@ -58,7 +57,6 @@ def run_pickup(
     integrator is then put back to what it held at the grasp: what it has learned since is in the model now.
 
     view : shows the run, and holds it to its rate
-    changes : what happens to the arm at `pickup.at` instead of the load
     """
     pickup = scenario.pickup
     if pickup is None:
@@ -66,7 +64,7 @@ def run_pickup(
     free = _Run(scenario, model, (), view)
     free.arm.systems.start_on_reference(free.context)
     free.advance(pickup.at)
-    loaded = _Run(scenario, model, (pickup.payload,) if changes is None else tuple(changes), view)
+    loaded = _Run(scenario, model, (pickup.payload,), view)
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)

@@ -38,9 +38,9 @@ class ClampedLaw(NamedTuple):
     ratio: float = 0.0
 
     @staticmethod
-    def along(direction: Direction, command: float, slope: float, limit: float = math.inf) -> ClampedLaw:
-        """Return a law along a direction."""
-        return ClampedLaw(direction.joint, command, slope, limit, direction.other, direction.ratio)
+    def along(direction: Direction, command: float, slope: float) -> ClampedLaw:
+        """Return a law along a direction, without a limit."""
+        return ClampedLaw(direction.joint, command, slope, math.inf, direction.other, direction.ratio)
 
     @staticmethod
     def dry(direction: Direction, level: float) -> ClampedLaw:

@@ -43,9 +43,7 @@ def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
 def _curves(model: ReconstructedModel) -> tuple[Array, Array]:
     """Speeds (K, n) and the mean friction at them, (K, n)."""
     n = model.arm.n
-    ranges = model.history.get("range")
-    top = np.array(ranges[1], dtype=float) if ranges else np.ones(n)
-    speeds = np.geomspace(1e-3, 1.0, _SPEEDS)[:, None] * np.maximum(top, 1e-2)
+    speeds = np.geomspace(1e-3, 1.0, _SPEEDS)[:, None] * np.maximum(model.ranges[1], 1e-2)
     lower, upper = training_range(model)
     q = np.random.default_rng(0).uniform(lower, upper, (_POSTURES, n))
     equations = ModelEquations(model, NUMPY)

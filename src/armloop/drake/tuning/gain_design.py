@@ -57,7 +57,7 @@ def _joint(
     crossing = bandwidth / 1.6
     for _ in range(_TURNS):
         gains = _at_crossover(sampled, crossing, np.deg2rad(margin))
-        reached = sampled_margins(sampled, gains, points=2000)[0].bandwidth
+        reached = sampled_margins(sampled, gains)[0].bandwidth
         if abs(reached / bandwidth - 1) < CLOSE and sampled.is_stable(gains):
             return float(gains.kp[0]), float(gains.ki[0]), float(gains.kd[0])
         crossing *= float(np.clip(bandwidth / reached, 0.7, 1.4))

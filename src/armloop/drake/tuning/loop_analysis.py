@@ -154,18 +154,13 @@ def loop_margins(
     q0: ArrayLike,
     *,
     period: float = 1e-3,
-    points: int = 2000,
 ) -> list[LoopMargins]:
-    """Return the margins of every joint's loop at posture q0 (n,).
-
-    period : s of the controller; points : frequencies looked at, up to Nyquist
-    """
-    sampled = SampledArm.of(posture_model(arm, friction, q0), period)
-    return sampled_margins(sampled, gains, points=points)
+    """Return the margins of every joint's loop at posture q0 (n,), with a controller of a period in s."""
+    return sampled_margins(SampledArm.of(posture_model(arm, friction, q0), period), gains)
 
 
 def sampled_margins(sampled: SampledArm, gains: PidGains, *, points: int = 2000) -> list[LoopMargins]:
-    """Return the margins of every joint's loop of a sampled arm."""
+    """Return the margins of every joint's loop of a sampled arm, from so many frequencies up to Nyquist."""
     w = sampled.frequencies(points)
     L = sampled.loops(gains, w)
     return [_margins(cut_loop(L, i), w) for i in range(len(gains.kp))]
