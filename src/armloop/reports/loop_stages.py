@@ -143,7 +143,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     return (
         stages,
         "Measure, model, control; find what changed; control better",
-        f"{result.arm.name}, seed {result.seed}:  hidden was {truth_name(result)};  {verdict};  ",
+        f"{result.arm.name}, seed {result.seed}:  hidden was {truth_name(result)};  {verdict}",
     )
 
 
