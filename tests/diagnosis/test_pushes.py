@@ -43,6 +43,7 @@ class TestChoice:
             return pushes.Contact(SimpleNamespace(name=name), nothing, nothing, nothing, shares[name], own)  # type: ignore[arg-type]
 
         monkeypatch.setattr(pushes, "_trial", trial)
+        monkeypatch.setattr(pushes, "_somewhere", lambda found, points: found)
         evidence: Any = SimpleNamespace(
             model=SimpleNamespace(arm=SimpleNamespace(n=joints)), scale=np.array([0.5, 4.0])
         )
@@ -50,7 +51,10 @@ class TestChoice:
         counted = np.array([[True, True], [True, False]])
         found = pushes.push(evidence, nothing, slice(0, 2), counted, list(shown))
         links = [f"f{link}" for link in range(joints - 1, 2, -1)]
-        assert asked == [*(f"t{j + 1}" for j in shown), "f0", *links]
+        first = [*(f"t{j + 1}" for j in shown), "f0", *links]
+        # where a force may act besides, only its error asks
+        forceful = found is not None and found.added.name[0] == "f"  # type: ignore[attr-defined]
+        assert asked == first + [f"f{k / 2}" for k in range(1, 2 * joints + 1) if forceful]
         assert weights[0].tolist() == [[2.0, 0.25], [2.0, 0.0]]
         if found is None:
             return None
@@ -160,6 +164,31 @@ class TestParameters:
         assert self.trial(monkeypatch, kind, three_axis(), shown=[1]).own == 0.0
         assert self.trial(monkeypatch, kind, three_axis(), size=0.0) is None
         assert replace(kind).link == 0
+
+
+@pytest.mark.parametrize("link", [0, 2.5])
+def test_the_error_of_a_force_counts_that_the_point_it_acts_on_is_not_known(
+    link: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three joints feel a force halfway along the last link as a larger one there, or another one on the tool."""
+    arm, there = three_axis(), np.array([3.0, -2.0, 4.0])
+    given = Motion(0.01 * np.arange(60.0), *np.zeros((3, 60, 3)), np.array([0]))
+    given.q[:] = [0.3, -0.4, 0.9]
+    kind = pushes._Kind(effect("external_contact", None), link)
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(motion=given, period=0.01, reach=0.02),
+        scale=np.full(3, 1e-3),
+        variation=np.ones(3),
+        model=SimpleNamespace(arm=arm),
+    )
+    residual = kind.columns(evidence, given) @ there
+    monkeypatch.setattr(pushes, "_interval", lambda evidence, residual, weight, burst, kind: burst)
+    found = pushes.push(evidence, residual, slice(20, 50), np.ones((60, 3), dtype=bool), [0, 1, 2])
+    assert found is not None and found.added.effect.name == "external_contact"
+    force = found.added.parameters["force"]
+    off = np.abs(np.asarray(force.value) - there)
+    assert (off <= 2.0 * np.asarray(force.std_error)).all()
+    assert np.linalg.norm(np.asarray(force.std_error)) > 0.1 * np.linalg.norm(there)
 
 
 class TestInterval:

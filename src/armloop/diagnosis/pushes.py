@@ -59,15 +59,15 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class _Kind:
-    """A force on a link (0: the tool) or a torque on a joint."""
+    """A force on a link's far end (0: on the tool; 2.5: on the middle of link 3) or a torque on a joint."""
 
     effect: Effect
-    link: int = 0
+    link: float = 0
 
     def columns(self, evidence: Evidence, part: Motion) -> Array:
         """(N, n, p) torque per unit."""
         context = Context(evidence.model.arm, part)
-        return self.effect.on_all_joints(self.effect.columns(context, float(self.link)), part.joints)
+        return self.effect.on_all_joints(self.effect.columns(context, self.link), part.joints)
 
 
 def around(motion: Motion, burst: slice) -> Mask:
@@ -122,7 +122,21 @@ def push(
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
     rivals.pop(chosen.effect.place, None)
-    return replace(best, rivals=list(rivals.values()))
+    best = replace(best, rivals=list(rivals.values()))
+    if chosen.effect.joint is not None:
+        return best
+    halves = (_Kind(chosen.effect, k / 2) for k in range(1, 2 * n + 1))
+    points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in halves]
+    return _somewhere(best, [p for p in points if p and p.share >= most - _MORE and not p.contradicted])
+
+
+def _somewhere(found: Contact, points: list[Contact]) -> Contact:
+    """A force that acts on one of these points, nobody knows on which: its error by the law of total variance."""
+    forces = [point.added.parameters["force"] for point in (found, *points)]
+    values, errors = (np.array([getattr(f, of) for f in forces]) for of in ("value", "std_error"))
+    error = np.sqrt(np.mean((values - values[0]) ** 2 + errors**2, axis=0))
+    parameters = {**found.added.parameters, "force": replace(forces[0], std_error=error.tolist())}
+    return replace(found, added=replace(found.added, parameters=parameters))
 
 
 def _trial(

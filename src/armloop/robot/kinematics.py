@@ -156,16 +156,18 @@ def nominal_parameters(arm: Arm) -> Array:
     return np.column_stack([arm.mass, arm.mass[:, None] * arm.com, tensor]).ravel()
 
 
-def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
+def tool_jacobian(arm: Arm, q: Array, link: float | None = None) -> Array:
     """(N, 3, n) translational Jacobian of the tool's origin in the base frame, at postures q (N, n).
 
     The tool is the frame X_tool fixed to the last link (that link's own frame where there is none).
 
     Args:
         link: of the far end of this link (from 1) instead: where the next joint sits, which with all joints beyond
-            does not move the point.
+            does not move the point. Of a point between a link's ends with a fraction: 2.5 is the middle of link 3.
     """
     N, n = q.shape
+    link = n if link is None else link
+    last = int(np.ceil(link))
     R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
     axes, origins = np.zeros((n, N, 3)), np.zeros((n, N, 3))
     for i, joint in enumerate(arm.joints):
@@ -177,10 +179,10 @@ def tool_jacobian(arm: Arm, q: Array, link: int | None = None) -> Array:
             R = R @ rotation_about(s, q[:, i])
         else:
             p = p + q[:, i : i + 1] * axes[i]
-        if link == i + 1 < n:
+        if last == i + 1:
             break
-    tip = p + R @ (arm.X_tool if i + 1 == n else arm.X_PF[i + 1])[:3, 3]
+    tip = p + (link - last + 1) * (R @ (arm.X_tool if last == n else arm.X_PF[last])[:3, 3])
     turning = np.asarray(arm.revolute)[:, None, None]
     J = np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
-    J[:, :, i + 1 :] = 0.0
+    J[:, :, last:] = 0.0
     return J

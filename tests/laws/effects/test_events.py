@@ -43,6 +43,9 @@ def test_a_force_on_a_link_acts_on_the_joints_before_it() -> None:
         np.testing.assert_allclose(tau[1:3], columns[1:3] @ [1.0, -2.0, 3.0], atol=1e-12)
         assert not tau[[0, 3, 4]].any() and tau[1:3].any()
     assert not contact.columns(given, 2.0)[:, 2].any()
+    # the middle of link 2 lies between where joint 2 sits, which it does not move, and where joint 3 sits
+    ends = contact.columns(given, 1.0) + contact.columns(given, 2.0)
+    np.testing.assert_allclose(contact.columns(given, 1.5), ends / 2, atol=1e-12)
     found = contact.estimates(given.arm, np.arange(3.0), np.diag([4.0, 9.0, -1e-20]), 0.0)["force"]
     assert (found.value, found.std_error, found.unit) == ([0.0, 1.0, 2.0], [2.0, 3.0, 0.0], "N")
 

@@ -41,8 +41,7 @@ class ExternalContact(Effect):
         return tau
 
     def columns(self, context: Context, shape: float) -> Array:
-        link = int(shape) or None
-        return -np.swapaxes(tool_jacobian(context.arm, context.motion.q, link), 1, 2)
+        return -np.swapaxes(tool_jacobian(context.arm, context.motion.q, shape or None), 1, 2)
 
     @classmethod
     def fault(cls, parameters: Mapping[str, Any]) -> str:
