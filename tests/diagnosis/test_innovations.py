@@ -305,6 +305,10 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
         AddedEffect(effect("joint_spring", 1), spring),
     ]
     assert level(terms[3:4], *known) == pytest.approx(0.5 + 3 * np.exp(-((CREEP / 0.2) ** 2)))
+    # friction that fades is as large as it is then, 0.1 s after the start
+    fading = {"level": Estimate(3.0, 0.1, "N*m"), "time_constant": Estimate(0.4, 0.1, "s")}
+    drift = AddedEffect(effect("friction_drift", 1), fading)
+    assert level(terms[3:4], drift) == pytest.approx(0.5 + 3 * np.exp(-0.1 / 0.4))
 
 
 def test_a_window_is_a_fifth_of_a_second_and_at_least_a_sample() -> None:

@@ -144,5 +144,5 @@ def dry_level(evidence: Evidence, known: Sequence[AddedEffect] = ()) -> Array:
     except ModelError:  # an effect of one's own that is no law of the state
         rubbing = Dynamics(replace(model, effects=())).friction
     forth = np.full_like(motion.v, CREEP)
-    one, other = (rubbing(v, evidence.context.load, motion.q) for v in (forth, -forth))
+    one, other = (rubbing(v, evidence.context.load, motion.q, motion.elapsed) for v in (forth, -forth))
     return np.abs(one - other) / 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -49,11 +50,20 @@ class Dynamics:
         """C(q, v) v, the torques of the motion at constant velocities."""
         return self._answer(lambda e, x, y: e.bias(x, y), q, v)
 
-    def friction(self, v: ArrayLike, load: ArrayLike | None = None, q: ArrayLike | None = None) -> Array:
-        """Friction at velocities v, 0 at rest; ``load`` and ``q`` for friction that changes with them (0 by default)."""
+    def friction(
+        self,
+        v: ArrayLike,
+        load: ArrayLike | None = None,
+        q: ArrayLike | None = None,
+        t: float | Array = math.inf,
+    ) -> Array:
+        """Friction at velocities v, 0 at rest; ``load`` and ``q`` for friction that changes with them (0 by default).
+
+        So does ``t``, seconds since the start, one or (N,); by default the joints are warm.
+        """
         nothing = np.zeros_like(_numbers(v))
         return self._answer(
-            lambda e, x, y, z: e.friction(x, y, q=z),
+            lambda e, x, y, z: e.friction(x, y, t, z),
             v,
             *(nothing if x is None else x for x in (load, q)),
         )
