@@ -191,7 +191,7 @@ class TestFinding:
 
         monkeypatch.setattr(contacts, "pulses", pulses)
         monkeypatch.setattr(contacts, "beside", lambda samples, residual, rows: residual + rows.start)
-        rows = np.full((100, 2), of.get("judged", True))
+        rows = np.full((100, 2), False) | of.get("judged", True)
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=given, moving=None),
             rows=rows,
@@ -243,10 +243,20 @@ class TestFinding:
         assert self.judged == [70, 0]
         assert self.level == [70.0, 0.0]
 
-    def test_what_fills_more_than_four_tenths_of_a_run_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        # of 9.9 s: 3.9 s and 4.0 s
-        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 71, 0))) == 2
-        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 72, 0))) == 0
+    def test_what_fills_more_than_four_tenths_of_a_joints_motion_is_none(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A law of a joint that moves but once or twice shows like an event of most of its motion."""
+        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 70, 0))) == 2
+        assert len(self.pushed(monkeypatch, (10, 30, 0), (50, 71, 0))) == 0
+        once = np.ones((100, 2), dtype=bool)
+        once[:, 0] = (np.arange(100) >= 20) & (np.arange(100) < 45)
+        bursts = (20, 31, 0), (60, 85, 1)
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, judged=once)] == [60]
+        # another joint that shows it, too, moves at other times
+        assert [a for a, *_ in self.pushed(monkeypatch, *bursts, (20, 29, 1), judged=once)] == [20, 60]
+        # a joint that never moves is judged by all of the run
+        assert len(self.pushed(monkeypatch, *bursts, judged=[False, True])) == 2
 
     def test_where_no_joint_can_be_judged_what_stands_out_counts(
         self, monkeypatch: pytest.MonkeyPatch

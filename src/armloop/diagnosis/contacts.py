@@ -34,7 +34,7 @@ _STANDS_OUT = 1.5
 _EDGE, _SHORTEST = 0.25, 0.1
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
 _SAME = 0.05
-#: All events together fill at most this part of a run: what is there longer is none.
+#: Events fill at most this part of a joint's motion: what is there longer is none.
 _LONGEST = 0.4
 
 
@@ -107,11 +107,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     holds = turning(motion, evidence.samples.moving) | at_rest(evidence.samples)
-    length = sum(motion.time[b.rows.stop - 1] - motion.time[b.rows.start] for b in bursts)
-    total = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
-    if length > _LONGEST * total:
-        return []  # what is there that long is no event
-    contacts = []
+    contacts, bursts = [], _rare(evidence.rows, bursts)
     for burst in bursts:
         # What happens to another joint at the same time, but not together with this, is an event of its own.
         others = {
@@ -133,6 +129,20 @@ def _seen_whole(motion: Motion, contact: Contact) -> bool:
     run = next(run for run in motion.runs() if contact.rows[run].any())
     time = motion.time[run]
     return bool(start - time[0] >= _SHORTEST and time[-1] - end >= _SHORTEST)
+
+
+def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
+    """Bursts but for those that, at all of their joints, are most of what the joint does: there a law does as well.
+
+    Args:
+        rows: (N, n) samples that count; of a joint that has none all do.
+    """
+    motion = rows | ~rows.any(axis=0)
+    held = np.zeros_like(rows)
+    for burst in bursts:
+        held[burst.rows, sorted(burst.joints)] = True
+    rare = (held & motion).sum(axis=0) <= _LONGEST * motion.sum(axis=0)
+    return [burst for burst in bursts if rare[sorted(burst.joints)].any()]
 
 
 def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: list[Burst]) -> list[Burst]:
