@@ -106,6 +106,14 @@ class TestPulses:
         found = sorted(pulse.rows.start for pulse in pulses(run, left, run.moving))
         assert found == pytest.approx([200, 700], abs=3)
 
+    def test_a_swing_forth_and_back_is_no_event(self) -> None:
+        """Its second half is as far from what is beside it as the first."""
+        run, left = samples(), np.zeros((1000, 1))
+        left[400:420] = 2.5
+        assert len(pulses(run, left, run.moving)) == 1
+        left[420:440] = -1.9
+        assert pulses(run, left, run.moving) == []
+
     def test_what_is_not_judged_or_where_a_joint_turns_is_no_event(self) -> None:
         run = samples()
         left = np.zeros((1000, 1))
@@ -149,6 +157,8 @@ def test_peaks_lie_apart() -> None:
     assert _peaks(level, 1) == [1, 5, 3]
     assert _peaks(level, 2) == [1, 5]
     assert len(_peaks(np.ones(100), 2)) == 6
+    # or are of the other sign
+    assert _peaks(np.array([0.0, 3.0, -2.0, 1.0, 0.0, -2.5, 0.0]), 2) == [1, 5, 2]
     # at the beginning, too
     assert _peaks(np.array([3.0, 2.0, 0.0, 1.0]), 1) == [0, 3]
     assert _peaks(np.array([2.0, 3.0, 0.0, 0.0, 1.0]), 1) == [1, 4]

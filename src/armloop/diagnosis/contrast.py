@@ -72,13 +72,13 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
     for length in (length for length in LENGTHS if seconds >= _OTHERS * length):
         width, gap = _widths(samples, length)
         every, one_way = contrast(samples, innovation, length)
-        level = np.where(judged, np.abs(every), 0.0)
-        for j, own in enumerate(level.T):
+        every = np.where(judged, every, 0.0)
+        for j, own in enumerate(every.T):
             peaks = _peaks(own, 2 * width + gap)
-            clear, count = _clear([float(own[k]) for k in peaks], [bool(one_way[k, j]) for k in peaks])
+            clear, count = _clear([abs(float(own[k])) for k in peaks], [bool(one_way[k, j]) for k in peaks])
             if clear > found.get(j, (0.0, []))[0]:
                 starts = [k - width // 2 for k in peaks[:count]]
-                found[j] = clear, [Pulse(slice(k, k + width), j, level) for k in starts]
+                found[j] = clear, [Pulse(slice(k, k + width), j, np.abs(every)) for k in starts]
     return [pulse for _, stretches in found.values() for pulse in stretches]
 
 
@@ -96,14 +96,18 @@ def beside(samples: Samples, residual: Array, rows: slice) -> Array:
 
 
 def _peaks(level: Array, apart: int) -> list[int]:
-    """Places of the highest values that lie so far apart, the highest first; one more than may be events."""
+    """Places of the highest values of one sign that lie so far apart, the highest first; one more than may be events.
+
+    An event's own shadow has its sign; beside an oscillation there is as much of the other.
+    """
     left, found = level.copy(), []
     for _ in range(_MOST + 1):
-        k = int(np.argmax(left))
-        if left[k] <= 0:
+        k = int(np.argmax(np.abs(left)))
+        if left[k] == 0:
             break
         found.append(k)
-        left[max(0, k - apart) : k + apart + 1] = 0.0
+        near = left[max(0, k - apart) : k + apart + 1]
+        near[near * left[k] > 0] = 0.0
     return found
 
 
