@@ -110,9 +110,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     contacts, bursts = [], _rare(evidence.rows, bursts)
     for burst in bursts:
         # What happens to another joint at the same time, but not together with this, is an event of its own.
-        others = {
-            j for b in bursts if b is not burst and _meet(motion, b, burst) for j in b.joints
-        } - burst.joints
+        others = {j for b in bursts if _meet(motion, b, burst) for j in b.joints} - burst.joints
         # A joint that rests or turns round meanwhile leaves there what friction may do, and that may be far more than the
         # event.
         counted, own = tells.copy(), sorted(burst.joints)
@@ -132,13 +130,11 @@ def _seen_whole(motion: Motion, contact: Contact) -> bool:
 
 
 def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
-    """Bursts but for those that, at all of their joints, are most of what the joint does: there a law does as well.
+    """Bursts but for those that, at all of their joints, are much of what a joint does: there a law does as well.
 
-    Args:
-        rows: (N, n) samples that count; of a joint that has none all do.
+    Of a joint none of whose samples (N, n) counts, all do.
     """
-    motion = rows | ~rows.any(axis=0)
-    held = np.zeros_like(rows)
+    motion, held = rows | ~rows.any(axis=0), np.zeros_like(rows)
     for burst in bursts:
         held[burst.rows, sorted(burst.joints)] = True
     rare = (held & motion).sum(axis=0) <= _LONGEST * motion.sum(axis=0)

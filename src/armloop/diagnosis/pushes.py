@@ -110,12 +110,8 @@ def push(
 
     def order(pair: tuple[Contact, _Kind]) -> tuple[bool, int, bool, float]:
         trial, kind = pair
-        return (
-            forceful and kind.effect.joint is not None,
-            kind.effect.complexity,
-            bool(kind.link),
-            -trial.share,
-        )
+        unlikely = forceful and kind.effect.joint is not None
+        return unlikely, kind.effect.complexity, bool(kind.link), -trial.share
 
     best, chosen = min(equals, key=order)
     if best.own < _EXPLAINED:
