@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from armloop.drake.plant.plant import add_links
 from armloop.dynamics import Dynamics, nearest_rigid_body, require_mass_matrix, with_mass_matrix
 from armloop.laws.friction import FrictionTerm
-from armloop.model.components import SparseTerms
+from armloop.model.components import RigidBody, SparseTerms
 from armloop.robot.arm import Arm, load_arm
 from armloop.util.errors import ModelError
 
@@ -147,3 +147,23 @@ def test_terms_that_no_mass_matrix_holds_are_named():
 def test_vectors_of_another_length_are_refused():
     with pytest.raises(ValueError, match=r"\(3,\) or \(N, 3\); they are \(2,\)"):
         Dynamics(model_of(ARMS["three_axis"])).gravity([0.0, 1.0])
+
+
+def test_what_a_rotor_needs_does_not_pass_the_gear_and_loads_no_joint() -> None:
+    """Friction that grows with the load, of an arm whose third rotor is known beside the links: everywhere the same."""
+    arm, rotor, mu = ARMS["three_axis"], 0.4, 0.1
+    full = np.concatenate([rigid_body(arm).parameters, [0.0, 0.0, rotor]])
+    body = RigidBody(full, ("m1", "J3"), np.array([1.0, rotor]))
+    model = model_of(arm, body, friction=(FrictionTerm("load_sign", mu),))
+    motion = random_motion(arm.n, 20, seed=5)
+    links = model_of(arm, friction=()).predict(motion)
+    turning = motion.vdot * [0.0, 0.0, rotor]
+    expected = links + turning + mu * np.abs(links) * np.sign(motion.v)
+    assert_allclose(model.predict(motion), expected, atol=1e-9)
+    assert_allclose(model.joint_load(motion), links, atol=1e-9)
+    assert_allclose(model.context(motion).load, links, atol=1e-9)
+    dynamics, sample = Dynamics(model), model.drive()
+    assert_allclose(dynamics.torque(motion.q, motion.v, motion.vdot), expected, atol=1e-9)
+    each = [sample(q, v, a) for q, v, a in zip(motion.q, motion.v, motion.vdot, strict=True)]
+    assert_allclose(each, expected, atol=1e-9)
+    assert_allclose(dynamics.acceleration(motion.q, motion.v, expected), motion.vdot, atol=1e-6)

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from math import prod
 from typing import Any
 
-from armloop.model.components import Lagrangian
+import numpy as np
+
+from armloop.model.components import Lagrangian, RigidBody
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import inverse_dynamics, mass_matrix
 from armloop.util.arrays import Array
@@ -133,6 +135,28 @@ class BodyEquations(Equations):
     def torque(self, q: Numbers, v: Numbers, vdot: Numbers) -> list[Any]:
         tau = self._dynamics(q, v, vdot)
         return [x + rotor * a for x, rotor, a in zip(tau, self._rotors, vdot, strict=True)]
+
+
+class RotorEquations(Equations):
+    """Rotors that turn with their joints, before the gears: they load none."""
+
+    def __init__(self, rotors: Array) -> None:
+        self.n, self._rotors = len(rotors), rotors.tolist()
+
+    def inertia(self, q: Numbers) -> Rows:
+        return [[rotor if i == j else 0.0 for j in range(self.n)] for i, rotor in enumerate(self._rotors)]
+
+    def rest(self, q: Numbers, v: Numbers) -> list[Any]:
+        return [0.0] * self.n
+
+
+def of_bodies(arm: Arm, body: RigidBody, functions: Functions) -> list[Equations]:
+    """The equations of links, and of the rotors that are known beside them."""
+    rotors, parameters = body.rotors, np.array(body.parameters)
+    if not rotors.any():
+        return [BodyEquations(arm, parameters, functions)]
+    parameters[10 * arm.n :] -= rotors
+    return [BodyEquations(arm, parameters, functions), RotorEquations(rotors)]
 
 
 def is_nothing(x: Any) -> bool:

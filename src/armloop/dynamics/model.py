@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from armloop.dynamics.effects import effect_law
-from armloop.dynamics.equations import BodyEquations, EnergyEquations, Equations, Numbers, Rows
+from armloop.dynamics.equations import (
+    EnergyEquations,
+    Equations,
+    Numbers,
+    RotorEquations,
+    Rows,
+    of_bodies,
+)
 from armloop.dynamics.sparse import SparseArrayEquations, SparseEquations
 from armloop.laws.friction import Acting, Direction, Sliding, torque_along
 from armloop.model import ReconstructedModel
@@ -68,7 +75,7 @@ class ModelEquations:
             laws.append(effect_law(model.arm, name, joint, a.values, functions, inertial, other))
         used = [c for c in model.components if not isinstance(c, SparseTerms) or c.step <= step]
         self._parts: list[tuple[Equations, bool]] = [
-            (part, True) for part in equations(model.arm, used, functions)
+            (part, not isinstance(part, RotorEquations)) for part in equations(model.arm, used, functions)
         ]
         self._parts += [(law.equations, law.load) for law in laws if law.equations is not None]
         #: What rubs, along every joint and every direction that two share.
@@ -252,7 +259,7 @@ def equations(arm: Arm, components: Sequence[Component], functions: Functions) -
         if isinstance(component, Lagrangian):
             parts.append(EnergyEquations(component, functions))
         elif isinstance(component, RigidBody):
-            parts.append(BodyEquations(arm, component.parameters, functions))
+            parts += of_bodies(arm, component, functions)
         elif not isinstance(component, SparseTerms):
             raise TypeError(f"{type(component).__name__} has no equations of motion")
     return parts

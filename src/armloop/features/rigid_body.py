@@ -30,7 +30,12 @@ _EXCITATION = 200
 def parameter_names(n: int, rotors: bool = False) -> list[str]:
     """Names of the full parameters of n links, ``m1, mx1, ... Iyz1, m2, ...``, then rotors ``J1 ... Jn``."""
     links = [f"{name}{link + 1}" for link in range(n) for name in LINK_PARAMETERS]
-    return links + [f"J{joint + 1}" for joint in range(n) if rotors]
+    return links + (rotor_names(n) if rotors else [])
+
+
+def rotor_names(n: int) -> list[str]:
+    """Names of the rotor inertias of n joints."""
+    return [f"J{joint + 1}" for joint in range(n)]
 
 
 def full_columns(arm: Arm, motion: Motion, rotors: bool = False) -> Array:

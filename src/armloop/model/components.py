@@ -12,6 +12,7 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.features.double_feature_set import Factors, padded, product_name, products
 from armloop.features.lagrangian import EnergyTerms
+from armloop.features.rigid_body import rotor_names
 from armloop.robot.arm import Arm
 from armloop.robot.newton_euler import joint_torques
 from armloop.util.arrays import Array, Index
@@ -149,6 +150,13 @@ class RigidBody:
         n = arm.n
         tau = joint_torques(arm, self.parameters[: 10 * n], motion.q, v, vdot)
         return tau + self.parameters[10 * n :] * vdot if len(self.parameters) > 10 * n else tau
+
+    @property
+    def rotors(self) -> Array:
+        """(n,) rotor inertias that the data tell from the links' own: what turns before the gears loads no joint."""
+        n = len(self.parameters) // 11 if len(self.parameters) % 11 == 0 else len(self.parameters) // 10
+        known = dict(zip(self.names, self.values.tolist(), strict=True))
+        return np.array([known.get(name, 0.0) for name in rotor_names(n)])
 
     def terms(self, arm: Arm, joint: int) -> list[Term]:
         """The base parameters that act on the joint, each times its column of the regressor.

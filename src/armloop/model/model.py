@@ -22,7 +22,7 @@ from armloop.laws.effects import Context, Effect, Estimate, Value, effect
 from armloop.laws.effects.base import Placed, entry, fill
 from armloop.laws.effects.base import Pointwise as EffectPointwise
 from armloop.laws.friction import FrictionLaw
-from armloop.model.components import COMPONENTS, Component
+from armloop.model.components import COMPONENTS, Component, RigidBody
 from armloop.model.pointwise import InverseDynamics, Parts, pointwise, stacked
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
@@ -150,6 +150,14 @@ class ReconstructedModel:
                 tau[own] += component.torque(self.arm, part, step)
         return tau
 
+    def joint_load(self, motion: Motion, step: int = 3) -> Array:
+        """(N, n) torque of the components that passes the joints' gears and bearings: all but that of the rotors."""
+        return self.rigid_body(motion, step) - self._of_rotors(motion, step)
+
+    def _of_rotors(self, motion: Motion, step: int = 3) -> Array:
+        rotors = [component.rotors for component in self.components if isinstance(component, RigidBody)]
+        return np.sum(rotors, axis=0) * motion.vdot if rotors and step >= 3 else np.zeros_like(motion.q)
+
     def predict(self, motion: Motion, step: int = 3, sensors: bool = True) -> Array:
         """Joint torques for a motion, (N, n) in N·m (N for a prismatic joint).
 
@@ -160,7 +168,7 @@ class ReconstructedModel:
         self._check(motion, step)
         if step < 3 or not self.effects:
             rigid = self.rigid_body(motion, step)
-            return rigid + self.friction.torque(motion, step, rigid)
+            return rigid + self.friction.torque(motion, step, rigid - self._of_rotors(motion, step))
         context = self.context(motion)
         tau = context.predicted
         assert tau is not None
@@ -174,14 +182,15 @@ class ReconstructedModel:
 
     def _mechanical(self, motion: Motion) -> tuple[Array, Array]:
         """Torque of the arm itself, effects included and sensor faults not, and the load on its joints."""
-        load = self.rigid_body(motion)
+        rotors = self._of_rotors(motion)
+        load = self.rigid_body(motion) - rotors
         effects = [added for added in self.effects if not added.effect.sensor]
         context = self._bare_context(motion, [added.effect for added in effects])
         for added in effects:
             if added.effect.load:
                 load = load + added.torque(context)
         context = replace(context, load=load)
-        tau = load + self.friction.torque(motion, 3, load)
+        tau = load + rotors + self.friction.torque(motion, 3, load)
         for added in effects:
             if not added.effect.load:
                 tau = tau + added.torque(context)

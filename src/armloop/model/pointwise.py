@@ -56,12 +56,15 @@ def pointwise(parts: Parts, step: int) -> InverseDynamics:
     bodies = [_body(arm, c, step) for c in components if isinstance(c, RigidBody)]
     bodies += [_energies(c, step) for c in components if isinstance(c, Lagrangian)]
     laws = [_friction(joint) for joint in friction]
+    rotors = np.sum(
+        [np.zeros(arm.n), *(c.rotors for c in components if isinstance(c, RigidBody) and step >= 3)], axis=0
+    )
 
     def torque(q: Array, v: Array, vdot: Array, sliding: Array | None = None) -> Array:
         tau = terms(q, v, vdot)
         for body in bodies:
             tau += body(q, v, vdot)
-        total = load = tau.tolist()
+        total, load = tau.tolist(), (tau - rotors * vdot).tolist()
         slip = v if sliding is None else sliding
         for is_load, effect in effects:
             extra = effect(q, v if is_load else slip, vdot)

@@ -18,7 +18,7 @@ from armloop.data.signals import smooth
 from armloop.identification.reconstruction.catalogue import Laws
 from armloop.laws.friction import Direction, FrictionTerm, sliding_direction
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array, Index
+from armloop.util.arrays import Array, Index, Mask
 
 #: Samples at a time, and periods of the filter beside them: what it carries further is round-off.
 _SAMPLES, _BESIDE = 4096, 15.0
@@ -50,6 +50,7 @@ class Design:
         count: their number r.
         laws: whose columns follow.
         load: (r + p,) coefficients of the torque that passes the joints; None where no friction depends on it.
+        passes: (r,) whether the torque of each of the library's coefficients does: that of a rotor does not.
     """
 
     arm: Arm
@@ -57,6 +58,7 @@ class Design:
     count: int
     laws: Laws = field(default_factory=Laws)
     load: Array | None = None
+    passes: Mask | None = None
 
     @property
     def size(self) -> int:
@@ -72,6 +74,8 @@ class Design:
         """The same with the load by the first coefficients of theta: of the library, and of laws that load joints."""
         own = np.array(theta[: self.size])
         own[self.count :] *= self.laws.loading
+        if self.passes is not None:
+            own[: self.count] *= self.passes
         return replace(self, load=own)
 
     def walk(self, samples: Samples, candidates: list[list[FrictionTerm]]) -> Iterator[Columns]:

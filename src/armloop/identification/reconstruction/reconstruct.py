@@ -349,5 +349,5 @@ def held_out_parts(model: ReconstructedModel, data: Data, part: Part, progress: 
 
 def _witness(chunk: Chunk, model: ReconstructedModel, part: Part, scales: Scales, most: int) -> Witness:
     samples = chunk.samples
-    load = model.rigid_body(samples.motion)
+    load = model.joint_load(samples.motion)
     return witness(residual(model, samples), samples, load, np.asarray(chunk.judging(part)), scales, most)

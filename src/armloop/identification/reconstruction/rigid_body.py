@@ -16,7 +16,7 @@ import numpy as np
 
 from armloop.data.motion import Motion
 from armloop.dynamics.physics import joint_limits
-from armloop.features.rigid_body import BaseParameters
+from armloop.features.rigid_body import BaseParameters, rotor_names
 from armloop.identification.reconstruction.catalogue import Laws
 from armloop.identification.reconstruction.data import Data
 from armloop.identification.reconstruction.design import Design
@@ -67,7 +67,8 @@ def rigid_body(arm: Arm, data: Data, options: Options, progress: Progress) -> Fo
     """
     motion = data.reference.samples.motion
     base = BaseParameters.of_arm(arm, rotors=True)
-    design = Design(arm, partial(base.columns, arm), base.count)
+    passes = np.array([name not in rotor_names(arm.n) for name in base.names])
+    design = Design(arm, partial(base.columns, arm), base.count, passes=passes)
     progress(f"rigid body: {base.count} base parameters, beside plain friction")
     training = Training.of(data, design, options)
     survey = training.survey

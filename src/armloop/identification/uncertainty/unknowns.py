@@ -16,7 +16,7 @@ import numpy as np
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.features.double_feature_set import products
-from armloop.features.rigid_body import BaseParameters
+from armloop.features.rigid_body import BaseParameters, rotor_names
 from armloop.laws.friction import FrictionTerm, stribeck_fall
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
@@ -113,6 +113,8 @@ def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
         base, names, values = None, body.energy.names, body.coefficients
     unknowns = [Unknown("shared", None, name, float(c), 1) for name, c in zip(names, values, strict=True)]
     r = len(unknowns)
+    # what rotors need does not pass the joints
+    passing = np.where([name in rotor_names(model.arm.n) for name in names], 0.0, values)
     wheres = []
     for joint, law in enumerate(model.friction.terms):
         own = _friction_unknowns(law, joint)
@@ -122,7 +124,7 @@ def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
     def designs(samples: Samples) -> list[Design]:
         motion = samples.motion
         columns = base.columns(model.arm, motion) if base is not None else body.energy.columns(motion)  # type: ignore[union-attr]
-        load = columns @ values
+        load = columns @ passing
         columns = smooth(samples, columns)
         found = []
         for joint, law in enumerate(model.friction.terms):

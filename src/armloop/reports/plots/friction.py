@@ -51,7 +51,7 @@ def friction_figure(model: ReconstructedModel, samples: Samples) -> Figure:
 def frictional(model: ReconstructedModel, samples: Samples) -> Array:
     """(N, n) the model's friction along a motion, with its memory; added effects are left where they are."""
     motion = samples.motion
-    return model.friction.torque(motion, 3, model.rigid_body(motion))
+    return model.friction.torque(motion, 3, model.joint_load(motion))
 
 
 def friction_curves(model: ReconstructedModel, joint: int, speeds: Array, postures: Array) -> Array:
@@ -71,4 +71,4 @@ def _at_rest(model: ReconstructedModel, q: Array) -> Array:
     """(n,) what holds the arm up, by the model without friction."""
     still = np.zeros((1, len(q)))
     motion = Motion(np.zeros(1), q[None], still, still)
-    return model.rigid_body(motion)[0]
+    return model.joint_load(motion)[0]
