@@ -49,6 +49,16 @@ def test_the_variance_between_logs_is_found_where_there_is_one(seed: int) -> Non
     assert between_logs(left[:, None], rows & (logs < 2)[:, None], motion, blocks) == [None]
 
 
+def test_a_log_that_creeps_tells_no_slope() -> None:
+    """As the static log of a collection: what a model gets wrong there is no viscous friction that differs at speed."""
+    motion, rng = sines(4), np.random.default_rng(1)
+    logs, blocks = log_numbers(motion), np.arange(len(motion.time)) // 50
+    slow = (logs == 3)[:, None]
+    v = np.where(slow, 0.002 * motion.v, motion.v)
+    left = 0.01 * rng.normal(size=v.shape) + 10.0 * v * slow
+    assert between_logs(left, np.ones_like(slow), replace(motion, v=v), blocks) == [None]
+
+
 def worn(seed: int, dry: float) -> MotionLog:
     """A log in which joint 2 has so much more dry friction."""
     motion = fourier_motion(40.0, 100.0, seed)

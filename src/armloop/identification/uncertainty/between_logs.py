@@ -3,7 +3,8 @@
 A drive that warms up, another load of grease: within a log nothing shows it, and so no held-out block and no standard error
 does. Of what the model leaves, each log tells a level and a slope along its joint's direction, with the covariance of its
 own blocks; how far those lie apart beyond that is the variance between logs, by maximum likelihood (EM; Laird and Ware,
-Biometrics 38, 1982). Where logs do not differ by more than chance (Cochran's Q) it is zero.
+Biometrics 38, 1982). Where logs do not differ by more than chance (Cochran's Q) it is zero. A log that stays slow tells
+nothing of the slope: what a model gets wrong near standstill is no friction that differs at speed.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from armloop.util.arrays import Array, Index, Mask
 _PAUSE = 60.0
 #: Fewest logs, and blocks with samples of a joint in each, that tell anything of the variance.
 _LOGS, _BLOCKS = 3, 8
+#: Part of the fastest log's fastest speed that a log must reach to tell a slope.
+_FAST = 0.2
 #: Probability that logs which do not differ are taken to.
 _CHANCE = 0.001
 _ITERATIONS = 200
@@ -57,7 +60,8 @@ def _variance(left: Array, v: Array, blocks: Index, logs: Index) -> list[list[fl
     found = []
     for log in np.unique(logs):
         own = logs == log
-        if len(np.unique(blocks[own])) >= _BLOCKS:
+        fast = np.abs(v[own]).max() >= _FAST * np.abs(v).max()
+        if fast and len(np.unique(blocks[own])) >= _BLOCKS:
             X = np.column_stack([np.sign(v[own]), v[own]])
             b = np.linalg.lstsq(X, left[own], rcond=None)[0]
             found.append((b, clustered_covariance(X, left[own] - X @ b, blocks[own])))
