@@ -238,7 +238,7 @@ def test_short_runs_are_dropped_and_long_ones_kept():
 
 def test_no_run_long_enough_is_an_error_that_says_how_long_it_must_be():
     time = np.concatenate([k + np.arange(0, 0.2, 0.004) for k in range(5)])
-    with pytest.raises(LogError, match=r"^sines: .*lasts 0\.196 s; .* 10 Hz .* at least 0\.3 s"):
+    with pytest.raises(LogError, match=r"^log sines: .*lasts 0\.196 s; .* 10 Hz .* at least 0\.3 s"):
         preprocess([sines(time)], TEN_HZ)
 
 

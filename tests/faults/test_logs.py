@@ -258,4 +258,4 @@ def test_what_convert_would_have_to_guess(place: Path, capsys: pytest.CaptureFix
     (place / "tau.csv").write_text("\n".join(tau) + "\n")
     capsys.readouterr()
     assert main(["convert", "tau.csv", "--out", "d.csv"]) == 2
-    one_line(capsys.readouterr().err, "column tau3, row 60: not a number")
+    one_line(capsys.readouterr().err, r"column tau3, row 60 \(line 61\): not a number")

@@ -203,8 +203,6 @@ def test_the_data_ratio_counts_trajectories(made: Excitation) -> None:
     copies = [motion] * 12
     same = data_ratio(made.regression, motion, copies, 0, noises=1000)
     assert_allclose(same.median, 1.0, atol=0.15)
-    longer = Motion(
-        *(np.concatenate([x] * 4) for x in (motion.time, motion.q, motion.v, motion.vdot)), motion.starts
-    )
+    longer = Motion.joined([motion] * 4)
     assert_allclose(data_ratio(made.regression, longer, copies, 0, noises=1000).median, 4.0, atol=0.5)
     assert same.to_dict()["most"] == 12

@@ -22,6 +22,9 @@ from armloop.util.errors import ExcitationError, InputError, LogError
 class Table:
     """Stands for the pooled regression: the held-out errors (folds, n) follow from the choice by a table."""
 
+    #: So few that a likelihood says enough of any gain.
+    repeats = 1e-3
+
     def __init__(self, errors: dict[str, Any], counts: Any = ((10.0, 10.0), (10.0, 10.0))) -> None:
         self.errors, self.counts, self.candidates = errors, np.array(counts), [[], []]
         self.squares = np.array(counts)
