@@ -12,6 +12,7 @@ from operation import contents
 from armloop.cli import main
 from armloop.data.log import read_log, write_log
 from armloop.data.tables import write_columns
+from armloop.util.errors import InputWarning
 from armloop.watch import Options, watch
 from armloop.watch.sources import find_logs, recorded_at
 from armloop.watch.store import Store
@@ -132,6 +133,15 @@ def test_broken_and_foreign_logs_are_set_aside_with_their_reason(fleet: Path, tm
     shutil.copy(models / "healthy.json", models / "stranger.json")
     again = watch(models, find_logs([logs]), tmp_path / "store")
     assert (again.counts.read, len(again.aside)) == (1, 2)
+
+
+def test_a_link_to_a_log_that_is_gone_is_said(fleet: Path, tmp_path: Path) -> None:
+    logs = tmp_path / "logs" / "healthy"
+    logs.mkdir(parents=True)
+    (logs / "gone.csv").symlink_to(tmp_path / "archive" / "gone.csv")
+    with pytest.warns(InputWarning, match=r"set aside: .*gone\.csv: cannot be read \(No such file"):
+        outcome = watch(fleet / "models", find_logs([logs.parent]), tmp_path / "store")
+    assert outcome.counts.aside == 1
 
 
 def test_the_folder_of_one_arm_is_taken_for_its_logs(fleet: Path, tmp_path: Path) -> None:

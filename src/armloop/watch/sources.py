@@ -85,7 +85,7 @@ def find_logs(places: Sequence[str | Path]) -> list[LogFile]:
 
 
 def _below(place: Path) -> Iterator[Path]:
-    """Logs below a folder, links to folders followed, each folder once."""
+    """Logs below a folder, links to folders followed, each folder once; a link to nothing is there, to be told."""
     seen: set[str] = set()
     for folder, inside, names in os.walk(place, followlinks=True):
         inside.sort()
@@ -96,7 +96,8 @@ def _below(place: Path) -> Iterator[Path]:
         seen.add(real)
         for name in names:
             path = Path(folder, name)
-            if kind_of(path) in (CSV, PARQUET) and not name.startswith(".") and path.is_file():
+            log = kind_of(path) in (CSV, PARQUET) and not name.startswith(".")
+            if log and (path.is_file() or not path.exists()):
                 yield path
 
 
