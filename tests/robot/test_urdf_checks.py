@@ -59,10 +59,8 @@ WRONG: dict[str, tuple[str, str]] = {
     "an indefinite inertia": (GOOD.replace('ixy="0"', 'ixy="0.2"'), r"<inertia> is not positive definite"),
     "lower above upper": (GOOD.replace('lower="-2" upper="2"', 'lower="2" upper="-2"'), r"lower=2 is not below upper=-2"),
     "lower equal to upper": (GOOD.replace('lower="-2" upper="2"', 'lower="1" upper="1"'), r"--lock j1=1"),
-    "no velocity": (GOOD.replace('velocity="3"', 'velocity="0"'), r"joint 'j1': <limit> velocity=0 must be positive"),
     "a negative velocity": (GOOD.replace('velocity="3"', 'velocity="-3"'), r"<limit> velocity=-3 must be positive"),
     "a negative effort": (GOOD.replace('effort="50"', 'effort="-5"'), r"<limit> effort=-5"),
-    "huge limits": (GOOD.replace('upper="2"', 'upper="1e300"'), r"<limit> upper=1e\+300 is no limit"),
     "NaN limit": (GOOD.replace('upper="2"', 'upper="nan"'), r"<limit> upper='nan' is not a finite number"),
     "text for a limit": (GOOD.replace('upper="2"', 'upper="2rad"'), r"<limit> upper='2rad'"),
     "an axis of two": (GOOD.replace('xyz="0 1 0"', 'xyz="0 1"'), r"joint 'j1': <axis> xyz='0 1' must be three"),
@@ -165,6 +163,38 @@ def test_what_looks_like_another_unit_is_said(tmp_path: Path, doubt: str) -> Non
     body, expected = DOUBTFUL[doubt]
     with pytest.warns(InputWarning, match=expected):
         load_arm(write(tmp_path / "a.urdf", body))
+
+
+#: As exporters and authors of published URDFs leave them: what is said, and the limits of the first joint.
+AS_PUBLISHED = {
+    "xacro in a comment": (GOOD + '<!-- <xacro:arm side="${side}"/> -->', None, (-2, 2, 3)),
+    "no speed": (GOOD.replace('velocity="3"', 'velocity="0"'), r"j1.*velocity=0 is taken for unknown", (-2, 2, np.inf)),
+    "limits of nothing": (
+        GOOD.replace('lower="-2" upper="2" velocity="3" effort="50"', 'lower="0" upper="0" velocity="0" effort="0"'),
+        r"j1.*<limit> is zero throughout", (-np.inf, np.inf, np.inf)
+    ),
+    "a limit of none": (GOOD.replace('lower="-2"', 'lower="-1e16"'), r"lower=-1e\+16 is taken for none", (-np.inf, 2, 3)),
+    "a rounding for an inertia": (
+        GOOD.replace('ixx="0.03" iyy="0.04" izz="0.05" ixy="0"', 'ixx="0" iyy="0" izz="0" ixy="2e-35"', 1),
+        r"'base': <inertia> is zero with a mass", (-2, 2, 3)
+    ),
+    "a base that no body is": (GOOD.replace('ixy="0"', 'ixy="0.2"', 1), r"'base': .*but this link never moves", (-2, 2, 3)),
+    "a fixed joint that mimics": (
+        GOOD + joint("f", "l2", "f", "fixed", '<mimic joint="j1"/>') + link("f", 0.1), None, (-2, 2, 3)
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", AS_PUBLISHED)
+def test_urdfs_are_read_as_they_are_published(tmp_path: Path, case: str) -> None:
+    body, said, limits = AS_PUBLISHED[case]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        arm = load_arm(write(tmp_path / "a.urdf", body))
+    first = arm.joints[0]
+    assert (arm.n, (first.lower, first.upper, first.velocity)) == (2, limits)
+    lines = [str(each.message) for each in caught]
+    assert any(re.search(said, line) for line in lines) if said else not lines
 
 
 def test_large_things_that_are_usual_are_not_said(tmp_path: Path) -> None:

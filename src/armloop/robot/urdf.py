@@ -33,11 +33,12 @@ def read_urdf(path: Path) -> Element:
     names = {kind: _names(root, kind, path) for kind in ("link", "joint")}
     if not names["link"]:
         raise ArmError(f"{path}: the URDF has no <link>")
-    for link in root.findall("link"):
-        check_link(link, f"{path}: link {link.get('name')!r}")
     for joint in root.findall("joint"):
         check_joint(joint, names["link"], f"{path}: joint {joint.get('name')!r}")
     _check_tree(root, path)
+    still = _never_moved(root)
+    for link in root.findall("link"):
+        check_link(link, f"{path}: link {link.get('name')!r}", moves=link.get("name") not in still)
     return root
 
 
@@ -92,17 +93,22 @@ def _parsed(path: Path) -> Element:
         raise ArmError(
             f"{path}: unreadable URDF: it declares a document type or entities, which are not expanded"
         )
-    if "<xacro:" in text or "${" in text:
-        raise ArmError(
-            f"{path}: holds xacro (<xacro:...> or ${{...}}); expand it first: xacro in.xacro > out.urdf"
-        )
+    unexpanded = f"{path}: holds xacro (<xacro:...> or ${{...}}); expand it first: xacro in.xacro > out.urdf"
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
+        if "<xacro:" in text:  # a prefix that the file does not declare
+            raise ArmError(unexpanded) from error
         raise ArmError(f"{path}: unreadable URDF: {error}") from error
+    if any(_is_xacro(element) for element in root.iter()):  # what stands in comments is nobody's
+        raise ArmError(unexpanded)
     if root.tag != "robot":
         raise ArmError(f"{path}: unreadable URDF: the root element is <{root.tag[:40]}>, it must be <robot>")
     return root
+
+
+def _is_xacro(element: Element) -> bool:
+    return "xacro}" in element.tag or any("${" in value for value in element.attrib.values())
 
 
 def _names(root: Element, kind: str, path: Path) -> list[str]:
@@ -167,6 +173,15 @@ def _check_tree(root: Element, path: Path) -> None:
         before[child] = name
 
 
+def _never_moved(root: Element) -> set[str]:
+    """Names of the links that fixed joints alone hold to a base: no torque feels their inertia."""
+    still = set(base_links(root))
+    fixed = [_links(joint) for joint in root.findall("joint") if joint.get("type") == "fixed"]
+    while found := {child for parent, child in fixed if parent in still} - still:
+        still |= found
+    return still
+
+
 def _links(joint: Element) -> tuple[str, str]:
     parent, child = joint.find("parent"), joint.find("child")
     assert parent is not None and child is not None  # _check_joint has seen them
@@ -191,9 +206,9 @@ def _keep_way_to(tip: str, root: Element, path: Path) -> None:
 
 def _say_beyond(joint: Element, value: float, where: str) -> None:
     limit = joint.find("limit")
-    if limit is None or joint.get("type") == "continuous" or not {"lower", "upper"} & set(limit.attrib):
+    if limit is None or joint.get("type") == "continuous":
         return
-    lower, upper = (float(limit.get(key, "0")) for key in ("lower", "upper"))
+    lower, upper = float(limit.get("lower", "-inf")), float(limit.get("upper", "inf"))
     if not lower <= value <= upper:
         warn(f"{where} is outside of the joint's limits, {lower:g} to {upper:g}")
 

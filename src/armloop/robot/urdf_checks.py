@@ -27,6 +27,9 @@ _LARGEST_ELSE = 1e12
 _TRIANGLE = 0.01
 # A link of an arm is no larger, m; no angle of a frame is beyond, rad; limits between these, rad, may be degrees.
 _FAR, _TURN, _DEGREES = 10.0, 7.0, (30.0, 720.0)
+# A link with a mass is no smaller, m: what is left of its inertia below this is rounding.
+_SPECK = 1e-6
+_LIMITS = ("lower", "upper", "velocity", "effort")
 # Children of which an element has one at most.
 _ONCE = {
     "link": ("inertial",),
@@ -35,8 +38,8 @@ _ONCE = {
 }
 
 
-def check_link(link: Element, where: str) -> None:
-    """Raise `ArmError` where a link's inertia cannot be; ``where`` names file and link."""
+def check_link(link: Element, where: str, moves: bool = True) -> None:
+    """Raise `ArmError` where the inertia of a link that ``moves`` cannot be; ``where`` names file and link."""
     _check_once(link, where)
     inertial = link.find("inertial")
     if inertial is None:
@@ -63,15 +66,17 @@ def check_link(link: Element, where: str) -> None:
     if np.abs(tensor).max() > _LARGEST_ELSE:
         raise ArmError(f"{where}: <inertia> holds {np.abs(tensor).max():g}; give kg·m²")
     least, middle, most = np.linalg.eigvalsh(tensor)
-    if least < -1e-9 * max(most, abs(least)):
-        raise ArmError(
-            f"{where}: <inertia> is not positive definite: a principal moment is {least:.4g} kg·m²; no body has it"
-        )
-    if mass == 0 and most > 0:
+    rounding = mass * _SPECK**2
+    if least < -max(1e-9 * most, rounding):
+        wrong = f"{where}: <inertia> is not positive definite: a principal moment is {least:.4g} kg·m²; no body has it"
+        if moves:
+            raise ArmError(wrong)
+        warn(f"{wrong}, but this link never moves")
+    elif mass == 0 and most > 0:
         warn(
             f"{where}: <mass> is zero with an <inertia>, which no body has; the link is taken for one without either"
         )
-    elif mass > 0 and most == 0:
+    elif mass > 0 and most <= rounding:
         warn(f"{where}: <inertia> is zero with a mass of {mass:g} kg; it is taken for a point")
     elif mass > 0 and np.sqrt(most / mass) > _FAR:
         warn(
@@ -100,6 +105,8 @@ def check_joint(joint: Element, links: list[str], where: str) -> None:
     if kind not in (*MOVING, "fixed"):
         raise ArmError(f"{where}: type {str(kind)[:40]!r}; it must be one of {', '.join(MOVING)}, fixed")
     if kind == "fixed":
+        for element in joint.findall("mimic"):  # left there by who fixed a gripper; parsers refuse it
+            joint.remove(element)
         return
     for dynamics in joint.findall("dynamics"):
         for key in {"damping", "friction"} & set(dynamics.attrib):
@@ -111,20 +118,29 @@ def check_joint(joint: Element, links: list[str], where: str) -> None:
     limit = joint.find("limit")
     if limit is None:
         return
+    if all(key in limit.attrib and number(limit, key, f"{where}: <limit>") == 0 for key in _LIMITS):
+        warn(f"{where}: <limit> is zero throughout, as where an export leaves it empty; it is taken for none")
+        for key in _LIMITS:
+            del limit.attrib[key]
     values = {}
-    for key in ("lower", "upper", "velocity", "effort"):
+    for key in _LIMITS:
         if key in limit.attrib:
             values[key] = number(limit, key, f"{where}: <limit>")
             if abs(values[key]) > _LARGEST.get(key, _LARGEST_ELSE):
-                raise ArmError(f"{where}: <limit> {key}={values[key]:g} is no limit; leave it out")
-    if values.get("velocity", 1.0) <= 0:
+                warn(f"{where}: <limit> {key}={values[key]:g} is taken for none")
+                values[key] = np.copysign(np.inf, values[key])
+                del limit.attrib[key]
+    if values.get("velocity", 1.0) < 0:
         raise ArmError(
             f"{where}: <limit> velocity={values['velocity']:g} must be positive; leave it out if unknown"
         )
+    if values.get("velocity") == 0:
+        warn(f"{where}: <limit> velocity=0 is taken for unknown, as where an export leaves it empty")
+        del limit.attrib["velocity"]
     if values.get("effort", 0.0) < 0:
         raise ArmError(f"{where}: <limit> effort={values['effort']:g} must not be negative")
-    lower, upper = values.get("lower", 0.0), values.get("upper", 0.0)
-    if kind != "continuous" and ("lower" in values or "upper" in values) and lower >= upper:
+    lower, upper = values.get("lower", -np.inf), values.get("upper", np.inf)
+    if kind != "continuous" and lower >= upper:
         raise ArmError(
             f"{where}: <limit> lower={lower:g} is not below upper={upper:g}; lock a joint that does not move "
             f"(--lock {joint.get('name')}={lower:g})"
