@@ -65,8 +65,9 @@ def test_every_element_of_the_ladder_belongs_to_a_law_with_a_name() -> None:
     assert elements == {kind for law in LAWS.values() for kind in law}
     assert restricted(ladder, tuple(LAWS)) == restricted(ladder, None) == ladder
     assert [rung.name for rung in restricted(ladder, ("presliding", "coulomb"))] == ["coulomb", "presliding"]
-    sharp, fading = (restricted(ladder, (name,))[0].elements[0] for name in ("coulomb", "coulomb_fading"))
-    assert len(sharp) == 1 < len(fading) and sharp[0].parameter == min(term.parameter for term in fading)
+    (sharp,), (least, fading) = (restricted(ladder, (name,)) for name in ("coulomb", "coulomb_fading"))
+    assert sharp.elements == least.elements and all(len(own) == 1 for own in sharp.elements)
+    assert sharp.elements[0][0].parameter < min(term.parameter for term in fading.elements[0])
 
 
 def test_folds_are_runs_where_there_are_enough_and_blocks_else():
@@ -97,9 +98,9 @@ def test_the_ladder_reaches_down_to_the_slowest_motion() -> None:
     arm, motion = three_axis(), fourier_motion(5.0, 100.0, 1)
     usual = extensions(arm, motion)
     assert extensions(arm, motion, np.full(3, 0.01)) == usual
-    elements = extensions(arm, motion, np.array([0.01, 0.002, 0.01]))[0].elements
-    sharpest = [min(term.parameter for term in own if term.parameter) for own in elements]
-    assert sharpest[1] < 0.001 and all(len(own) == len(usual[0].elements[0]) + 1 for own in elements)
+    creeping = extensions(arm, motion, np.array([0.01, 0.002, 0.01]))
+    assert creeping[0].elements[1][0].parameter < 0.001
+    assert all(len(own) == len(usual[3].elements[0]) + 1 for own in creeping[3].elements)
 
 
 def test_what_a_law_brought_is_said_to_the_digit_that_decided():

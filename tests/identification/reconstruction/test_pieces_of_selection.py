@@ -176,9 +176,16 @@ class TestLadder:
     def test_elements_follow_the_speeds(self) -> None:
         motion = fourier_motion(5.0, 100.0, 1)
         motion.v[:] = np.array([4.0, 0.1, 1.0])
-        coulomb, _, falls, *_, by_load, memory, _ = selection.extensions(three_axis(), motion)
-        assert [t.parameter for t in coulomb.elements[0]] == [0.003, 0.01, 0.03, 0.1, 0.0]
-        assert [t.kind for t in coulomb.elements[0]] == ["smooth_sign"] * 4 + ["viscous"]
+        coulomb, _, falls, fading, *_, by_load, memory, _ = selection.extensions(three_axis(), motion)
+        assert [t.parameter for t in coulomb.elements[0] + fading.elements[0]] == [
+            0.003,
+            0.0,
+            0.01,
+            0.03,
+            0.1,
+        ]
+        assert [t.kind for t in coulomb.elements[0]] == ["smooth_sign", "viscous"]
+        assert {t.kind for t in fading.elements[0]} == {"smooth_sign"}
         assert [t.parameter for t in falls.elements[0]] == [0.02, 0.056, 0.15, 0.43, 1.2]
         assert [t.parameter for t in falls.elements[1]] == [0.02, 0.024, 0.028, 0.034, 0.04]
         assert [t.parameter for t in by_load.elements[2]] == [0.003, 0.01, 0.03, 0.1]
@@ -203,19 +210,23 @@ class TestLadder:
         assert selection.restricted(ladder, None) is ladder
         sharp, viscous = FrictionTerm("smooth_sign", parameter=0.003), FrictionTerm("viscous")
         (one,) = selection.restricted(ladder, ["viscous", "coulomb"])
-        assert one.name == "coulomb and viscous" and one.elements == [[sharp, viscous]] * 3
+        assert one.name == "Coulomb and viscous" and one.elements == [[sharp, viscous]] * 3
         assert [e.name for e in selection.restricted(ladder, ["viscous"])] == ["viscous"]
         assert selection.restricted(ladder, ["viscous"])[0].elements == [[viscous]] * 3
         # with all that a rung brings it is the rung
         assert selection.restricted(ladder, ["coulomb_fading", "viscous", "stribeck"]) == [
             ladder[0],
-            ladder[2],
+            *ladder[2:4],
         ]
 
     @pytest.mark.parametrize("plenty", [True, False])
-    def test_the_laws_are_the_elements_of_the_rungs_that_were_taken(self, plenty: bool) -> None:
+    def test_the_laws_are_the_elements_of_the_rungs_that_were_taken(
+        self, plenty: bool, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         """The offset gains, the Stribeck fall and what follows do not."""
         asked: dict[str, Any] = {}
+        speeds = [0.1, 0.2, 0.3]
+        monkeypatch.setattr(selection, "stribeck_speeds", lambda *given: speeds)
 
         class Faked(Table):
             def held_out(self, choice: Any, weights: Any, prior: Any) -> np.ndarray:
@@ -246,11 +257,11 @@ class TestLadder:
         data: Any = SimpleNamespace(
             reference=SimpleNamespace(motion=motion), slowest=lambda part: None, pooled=pooled, plenty=plenty
         )
-        for names, rungs in ((None, 8), (["offset", "coulomb", "viscous", "nonlinear_viscous"], 3)):
+        for names, rungs in ((None, 10), (["offset", "coulomb", "viscous", "nonlinear_viscous"], 3)):
             options: Any = SimpleNamespace(friction=names, physical=True)
             priors: Any = {} if names else {"drawings": 2.0, "nothing": 1.0}
             found = selection.select_friction(three_axis(), data, None, options, priors)  # type: ignore[arg-type]
-            ladder = selection.restricted(selection.extensions(three_axis(), motion), names)
+            ladder = selection.restricted(selection.extensions(three_axis(), motion, None, speeds), names)
             assert len(ladder) == rungs
             every = [[t for e in ladder for t in e.elements[j]] for j in range(3)]
             assert found.candidates == every == asked["candidates"]

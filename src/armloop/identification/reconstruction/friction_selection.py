@@ -1,10 +1,11 @@
 """Nested model selection of friction: each larger law must earn its place on held-out data; then backward elimination.
 
 The extensions go from what every drive has to what only some show: Coulomb and viscous friction, an offset (beside the
-Coulomb level it makes levels that differ with the direction), the Stribeck fall, nonlinear viscous friction,
-viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with memory
-before the joint slides, with and without load. An extension brings a row of elements (widths, speeds, powers), of which a
-passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
+Coulomb level it makes levels that differ with the direction), the Stribeck fall at each joint's own velocity
+(:mod:`.stribeck_speed`), a Coulomb level that fades in with the speed, falls at several velocities, nonlinear viscous
+friction, viscous friction that differs with the direction, Coulomb friction that grows with the load, and friction with
+memory before the joint slides, with and without load. An extension brings a row of elements (widths, speeds, powers), of
+which a passive regression keeps few. It is taken for all joints if the error on held-out folds falls by more than its own
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
 must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
@@ -28,6 +29,7 @@ from armloop.data.motion import Motion
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.pooled import Choice, Pooled, Prior, Solution
+from armloop.identification.reconstruction.stribeck_speed import stribeck_speeds
 from armloop.identification.reconstruction.training import Training
 from armloop.laws.friction import FRICTION_LAWS, FrictionTerm
 from armloop.robot.arm import Arm
@@ -100,7 +102,16 @@ class FrictionSelection:
         return self.pooled.relative_errors(theta, self.pooled.choice(self.laws))
 
 
-def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[Extension]:
+def stribeck_ranges(arm: Arm, motion: Motion) -> list[tuple[float, float]]:
+    """The slowest and the fastest Stribeck velocity that each joint may have: it follows the joint's fastest speed."""
+    lows = np.where(arm.revolute, 1.0, 0.1) * _SLOWEST
+    fastest = np.quantile(np.abs(motion.v), 0.995, axis=0)
+    return [(float(low), float(max(_PART * v, 2 * low))) for low, v in zip(lows, fastest, strict=True)]
+
+
+def extensions(
+    arm: Arm, motion: Motion, slowest: Array | None = None, speeds: Sequence[float] = ()
+) -> list[Extension]:
     """The nested friction laws of an arm; the Stribeck speeds follow each joint's fastest speed.
 
     Where a joint creeps, slower than the speed over which the direction fades in fastest, one more speed, for every
@@ -108,13 +119,11 @@ def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[E
 
     Args:
         slowest: (n,) speeds of the slowest motion that is regressed; None for none so slow.
+        speeds: (n,) the Stribeck velocity of every joint, which then comes before the row of them, of which it takes
+            the place of the nearest; none if empty.
     """
     units = np.where(arm.revolute, 1.0, 0.1)
-    fastest = np.quantile(np.abs(motion.v), 0.995, axis=0)
-    stribeck = [
-        np.geomspace(low, max(_PART * v, 2 * low), _STRIBECK)
-        for low, v in zip(units * _SLOWEST, fastest, strict=True)
-    ]
+    stribeck = [np.geomspace(*limits, _STRIBECK) for limits in stribeck_ranges(arm, motion)]
     sharp = units * _FADES[0]
     creep = sharp if slowest is None else np.minimum(sharp, slowest)
     fades = [
@@ -130,10 +139,23 @@ def extensions(arm: Arm, motion: Motion, slowest: Array | None = None) -> list[E
     def each(kind: str, sizes: Sequence[Iterable[float]]) -> list[list[FrictionTerm]]:
         return [[FrictionTerm(kind, parameter=float(f"{v:.2g}")) for v in own] for own in sizes]
 
+    levels = each("smooth_sign", fades)
+    falls = [Extension("Stribeck", each("stribeck_peak", stribeck))]
+    if speeds:
+        others = [
+            np.delete(row, int(np.argmin(np.abs(np.log(row / own)))))
+            for row, own in zip(stribeck, speeds, strict=True)
+        ]
+        falls = [
+            Extension("Stribeck", [[FrictionTerm("stribeck_peak", parameter=own)] for own in speeds]),
+            Extension("Stribeck at several velocities", each("stribeck_peak", others)),
+        ]
     return [
-        Extension("Coulomb and viscous", [[*t, FrictionTerm("viscous")] for t in each("smooth_sign", fades)]),
+        Extension("Coulomb and viscous", [[first, FrictionTerm("viscous")] for first, *_ in levels]),
         Extension("offset (levels by direction)", same("offset")),
-        Extension("Stribeck", each("stribeck_peak", stribeck)),
+        falls[0],
+        Extension("Coulomb fading in", [rest for _, *rest in levels]),
+        *falls[1:],
         Extension("nonlinear viscous", same("nonlinear_viscous")),
         Extension("viscous by direction", same("viscous_by_direction")),
         Extension("Coulomb by load", each("load_smooth_sign", fades)),
@@ -158,16 +180,13 @@ def restricted(nested: list[Extension], names: Sequence[str] | None) -> list[Ext
     if names is None:
         return nested
     kinds = {kind: name for name in names for kind in FRICTION_LAWS[name]}
-
-    def allowed(own: list[FrictionTerm]) -> list[FrictionTerm]:
-        named = [term for term in own if term.kind in kinds]
-        sharpest = min((term.parameter for term in own if term.kind == "smooth_sign"), default=0.0)
-        fading = "coulomb_fading" in names
-        return [t for t in named if fading or t.kind != "smooth_sign" or t.parameter == sharpest]
-
     kept = []
     for extension in nested:
-        elements = [allowed(own) for own in extension.elements]
+        fades = extension is not nested[0] and "coulomb_fading" not in names
+        elements = [
+            [term for term in own if term.kind in kinds and not (fades and term.kind == "smooth_sign")]
+            for own in extension.elements
+        ]
         whole = elements == extension.elements
         called = list(dict.fromkeys(kinds[term.kind] for own in elements for term in own))
         if called:
@@ -191,7 +210,12 @@ def select_friction(
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    nested = restricted(extensions(arm, data.reference.motion, data.slowest(_CREEP)), options.friction)
+    motion, slowest = data.reference.motion, data.slowest(_CREEP)
+    nested = restricted(extensions(arm, motion, slowest), options.friction)
+    if any(term.kind == "stribeck_peak" for extension in nested for term in extension.elements[0]):
+        progress("friction: each joint's Stribeck velocity")
+        speeds = stribeck_speeds(data, design, nested[0].elements, stribeck_ranges(arm, motion))
+        nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
     candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
     pooled = data.pooled(design, candidates, options.physical)
     ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])

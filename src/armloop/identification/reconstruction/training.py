@@ -136,7 +136,11 @@ class Training:
 
     def window_pooled(self, design: Design, laws: list[list[FrictionTerm]], passive: bool) -> Pooled:
         """The same of the window, all of it one fold."""
-        return Pooled(JointSums.of(self.window, design, laws, _at_once), laws, 1, self.repeats, passive)
+        return Pooled(self.window_sums(design, laws), laws, 1, self.repeats, passive)
+
+    def window_sums(self, design: Design, laws: list[list[FrictionTerm]]) -> JointSums:
+        """Normal equations of the window."""
+        return JointSums.of(self.window, design, laws, _at_once)
 
 
 def fitted_rows(chunk: Chunk) -> Mask:
