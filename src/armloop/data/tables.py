@@ -277,7 +277,7 @@ def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: E
             continue
         if len(cells) != len(header):
             return LogError(
-                f"{path}: row {row} (line {line}) has {len(cells)} cells; "
+                f"{path}: row {row} (line {line}) has {len(cells)} cell{'s' * (len(cells) != 1)}; "
                 f"it must have {len(header)}, one for each name of the header"
             )
         for name in names:
