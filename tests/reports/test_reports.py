@@ -129,6 +129,13 @@ def test_a_number_keeps_its_error_and_unit() -> None:
     assert tied("2 numbers and 3 more") == "2 numbers and 3 more"
 
 
+def test_a_line_of_a_narrow_place_ends_between_two_numbers() -> None:
+    text = render(
+        Report("a", "b", [Section("c", tables=[make_table(["d"], [["7 ± 1"]])])], [Card("0.71 ± 0.01", "e")])
+    )
+    assert ">0.71 ±\u00a00.01</p>" in text and ">7 ±\u00a01</td>" in text
+
+
 def test_a_percentage_stands_apart_from_its_sign() -> None:
     assert tied("it leaves 54% of 1.5 % and 50 %") == "it leaves 54\u00a0% of 1.5\u00a0% and 50\u00a0%"
 
