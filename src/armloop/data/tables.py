@@ -152,6 +152,8 @@ def kind_of(path: Path) -> str:
 
 
 def _check_suffix(path: Path) -> None:
+    if path.is_dir():
+        raise LogError(f"{path}: is a folder; a motion log is a file that ends in {CSV} or {PARQUET}")
     if kind_of(path) not in (CSV, PARQUET):
         raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
     check_name(path)
