@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import pytest
+from matplotlib.text import Text
 
 from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
@@ -52,6 +53,12 @@ def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
     assert outward == {"replay.html"}
     assert "url(http" not in page and "<script" not in page
     assert len(page) < 6e6
+
+
+def test_the_rings_caption_ends_with_the_verdict(loop: SimpleNamespace) -> None:
+    figure = loop_figure(loop)
+    words = " ".join(text.get_text() for text in figure.findobj(Text) if isinstance(text, Text))
+    assert re.search(r"verdict was right(?!;)", words) and not re.search(r";\s*;|right;", words)
 
 
 @pytest.fixture
