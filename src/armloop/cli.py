@@ -58,7 +58,10 @@ class _Command(_Parser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         self.learn()
-        return super().parse_known_args(args, namespace)
+        found, others = super().parse_known_args(args, namespace)
+        if others:  # said here, where the command's own help is named
+            self.error(f"unrecognized arguments: {' '.join(others)}")
+        return found, others
 
     def learn(self) -> None:
         """Declare the command's options."""
