@@ -52,6 +52,13 @@ def test_cells_in_quotes_are_numbers(tmp_path, log, decimal):
     assert_same(convert([tmp_path / "log.csv"]).log, log)
 
 
+def test_a_recording_that_broke_off_is_said_to_be_one(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="mcap")
+    (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:-1000])
+    with pytest.raises(InputError, match=r"its end is missing, .*`mcap recover`"):
+        convert([tmp_path / "cut.mcap"], arm=three_axis(), answers=TORQUE)
+
+
 def test_prefixed_names_match_and_others_are_told(tmp_path, log):
     path = bag(tmp_path / "bag", log, [2, 1, 0], kind="db3", names=[f"left_{name}" for name in NAMES])
     assert_same(convert([path], arm=three_axis(), answers=TORQUE).log, log)
