@@ -7,6 +7,7 @@ with one line on standard error. 3 `armloop watch` has a new alarm.
 from __future__ import annotations
 
 import argparse
+import codecs
 import io
 import os
 import signal
@@ -57,7 +58,10 @@ class _Command(_Parser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         self.learn()
-        return super().parse_known_args(args, namespace)
+        found, others = super().parse_known_args(args, namespace)
+        if others:  # said here, where the command's own help is named
+            self.error(f"unrecognized arguments: {' '.join(others)}")
+        return found, others
 
     def learn(self) -> None:
         """Declare the command's options."""
@@ -93,6 +97,17 @@ class _Completion(argparse.Action):
         parser.exit()
 
 
+#: Signs of tables and sentences, and what stands for them where an encoding has none of them; ─ keeps its width.
+_PLAIN = dict(zip("─·–−…°±→×²³η√π", "- * - - .. deg +- -> x ^2 ^3 eta sqrt pi".split(), strict=True))
+
+
+def _spelt_out(error: UnicodeError) -> tuple[str | bytes, int]:
+    """What an encoding lacks in signs that it has; letters of a name as Python's escapes."""
+    if isinstance(error, UnicodeEncodeError) and error.object[error.start] in _PLAIN:
+        return _PLAIN[error.object[error.start]], error.start + 1
+    return codecs.backslashreplace_errors(error)
+
+
 class _Ended(BaseException):
     """The process was asked to end (SIGTERM); not an Exception, so that nothing takes it for a fault."""
 
@@ -100,8 +115,9 @@ class _Ended(BaseException):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return the exit status."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a name that the terminal's encoding lacks is spelt out
-            stream.reconfigure(errors="backslashreplace")
+        if isinstance(stream, io.TextIOWrapper):
+            codecs.register_error("spelt_out", _spelt_out)
+            stream.reconfigure(errors="spelt_out")
     try:
         with listening() as doubts, _ending_on_request():
             given = build_parser().parse_args(arguments)

@@ -59,7 +59,7 @@ def beyond_figure(time: Array, truth: Array, predicted: Mapping[str, Array], uni
             )
         last = "time [s]" if j == n - 1 else ""
         polish(left, last, f"joint {j + 1} [{unit(units[j])}]")
-        polish(right, last, "error")
+        polish(right, last, f"error {j + 1} [{unit(units[j])}]")
     legend(made, 1 + len(predicted))
     return made
 

@@ -56,7 +56,7 @@ FAULTS: dict[str, tuple[tuple[object, ...], str]] = {
     ),
     "an empty file": ((*EVALUATE, text_file("bad.csv", "")), r"bad\.csv: the file is empty"),
     "a missing file": ((*RECONSTRUCT, given("none.csv")), r"none\.csv: no such file"),
-    "a folder for a log": ((*CLUSTER, given("")), r"inputs\d*.*(unknown suffix|not a file)"),
+    "a folder for a log": ((*CLUSTER, given("")), r"inputs\d*: is a folder; a motion log is a file"),
     "a wrong suffix": ((*CLUSTER, text_file("bad.txt", "time")), r"bad\.txt: unknown suffix '\.txt'"),
     "no Parquet in a Parquet file": (
         (*CLUSTER, text_file("bad.parquet", "time,q1")),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 from types import SimpleNamespace
 from typing import Any
@@ -22,3 +24,10 @@ def test_progress_is_on_a_terminals_standard_error_else_before_the_answer_for_pe
     answer, line = capsys.readouterr(), "  … reading 5 % of it\n"
     assert answer.err == (line if terminal else "")
     assert answer.out == ("" if terminal or json else line)
+
+
+def test_a_terminal_of_few_letters_gets_tables_that_can_be_read() -> None:
+    script = "import armloop.cli as c; c.main(['cluster']); print('─── 2.1 N·m ± 0.1°, η → ü')"
+    env = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == r"--- 2.1 N*m +- 0.1deg, eta -> \xfc", done.stderr

@@ -43,6 +43,22 @@ def test_a_bag_without_stamps_is_timed_by_its_recorder(tmp_path, log):
     assert any("recorded" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_cells_in_quotes_are_numbers(tmp_path, log, decimal):
+    rows = [[f"{x:.9f}" for x in row] for row in np.column_stack([log.time, log.q, log.v, log.tau])]
+    names = ["time", *(f"{kind}{j}" for kind in ("q", "v", "tau") for j in (1, 2, 3))]
+    lines = [",".join(f'"{cell.replace(".", decimal)}"' for cell in row) for row in [names, *rows]]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert_same(convert([tmp_path / "log.csv"]).log, log)
+
+
+def test_a_recording_that_broke_off_is_said_to_be_one(tmp_path, log):
+    path = bag(tmp_path / "bag", log, [0, 1, 2], kind="mcap")
+    (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:-1000])
+    with pytest.raises(InputError, match=r"its end is missing, .*`mcap recover`"):
+        convert([tmp_path / "cut.mcap"], arm=three_axis(), answers=TORQUE)
+
+
 def test_prefixed_names_match_and_others_are_told(tmp_path, log):
     path = bag(tmp_path / "bag", log, [2, 1, 0], kind="db3", names=[f"left_{name}" for name in NAMES])
     assert_same(convert([path], arm=three_axis(), answers=TORQUE).log, log)

@@ -278,6 +278,7 @@ def test_the_command_prints_and_answers(tmp_path, capsys):
     assert main(line) == 0
     out = capsys.readouterr().out
     assert "read back by Drake" in out and "cannot say" in out and "Stribeck" in out
+    assert "N·m" in out and "N*m" not in out and max(map(len, out.splitlines())) <= 110
     assert main([*line, "--json"]) == 0
     answer = answered(capsys.readouterr().out, "export")
     assert max(answer["difference"]) < 1e-6 * max(answer["rms"])

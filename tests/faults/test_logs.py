@@ -142,7 +142,7 @@ LOGS: dict[str, tuple[Lay, str, str]] = {
     "a note between rows": (
         text(lambda lines: [*lines[:400], "# pause", *lines[400:]]),
         REFUSED,
-        r"row 400 \(line 401\) has 1 cells",
+        r"row 400 \(line 401\) has 1 cell;",
     ),
     "units below the names": (
         text(lambda lines: [lines[0], lines[0].replace("time", "s"), *lines[1:]]),

@@ -65,7 +65,10 @@ WRONG: dict[str, tuple[str, str]] = {
     "standard output for logs": ("collect three_axis --out -", "-: --out cannot be standard output"),
     "an infinite cutoff": (f"{RECONSTRUCT} --cutoff inf", "--cutoff inf"),
     "an unknown estimator": (f"{RECONSTRUCT} --estimator magic", "unknown estimator 'magic'"),
-    "an unknown option": (f"{RECONSTRUCT} --magic", "unrecognized arguments: --magic"),
+    "an unknown option": (
+        f"{RECONSTRUCT} --magic",
+        "reconstruct: unrecognized arguments: --magic; see armloop reconstruct --help",
+    ),
     "gains for torques": (f"{RECONSTRUCT} --tau-unit N*m --drive-gains 1,1,1", "--drive-gains turn currents"),
     "gains that are words": (f"{RECONSTRUCT} --drive-gains a,b,c", "--drive-gains 'a,b,c'"),
     "a gain of zero": (f"{RECONSTRUCT} --drive-gains 0,1,1", "every gain must be a positive"),

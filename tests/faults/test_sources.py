@@ -63,14 +63,40 @@ def endless(suffix: str) -> Lay:
     return lambda place: (place / f"bad.{suffix}").symlink_to("/dev/zero")
 
 
+def rows_of(change: Callable[[str], str]) -> Lay:
+    """bad.csv with each line below the header changed."""
+
+    def lay(place: Path) -> None:
+        table()(place)
+        head, *rows = (place / "bad.csv").read_text().splitlines()
+        (place / "bad.csv").write_text("\n".join([head, *map(change, rows)]) + "\n")
+
+    return lay
+
+
 SAID = " --tau-unit N*m --angle-unit rad"
 SUFFIXES = ("csv", "txt", "parquet", "db3", "mcap", "bag", "mat", "npz")
 # what lies there, the source and options, what the line says
 SOURCES: dict[str, tuple[Lay, str, str]] = {
     **{f"a pipe named .{x}": (pipe(x), f"bad.{x}", "is a device or a pipe") for x in SUFFIXES},
     **{f"a device named .{x}": (endless(x), f"bad.{x}", "is a device or a pipe") for x in SUFFIXES},
-    "one row": (table(1), f"bad.csv{SAID}", "1 rows; a motion log has at least 20"),
+    "one row": (table(1), f"bad.csv{SAID}", "1 row; a motion log has at least 20"),
     "nineteen rows": (table(19), f"bad.csv{SAID}", "19 rows; a motion log has at least 20"),
+    "a number before each row": (
+        rows_of(lambda row: f"7,{row}"),
+        f"bad.csv{SAID}",
+        r"row 1 \(line 2\) has 5 cells; it must have 4, as the header says$",
+    ),
+    "decimal commas between commas": (
+        rows_of(lambda row: row.replace(".", ",")),
+        f"bad.csv{SAID}",
+        r"has 8 cells; it must have 4, as the header says \(a decimal comma between commas",
+    ),
+    "a row that breaks off": (
+        lambda place: (table()(place), (place / "bad.csv").open("a").write("1")),
+        f"bad.csv{SAID}",
+        r"row 101 \(line 102\) has 1 cell; it must have 4",
+    ),
     "a time that stands still": (
         table(time=["1"] * 100),
         f"bad.csv{SAID}",

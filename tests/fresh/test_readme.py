@@ -51,6 +51,9 @@ def done(installed, tmp_path_factory):
     # what `make loop` calls, without setting up an environment of its own
     out = armloop("armloop loop --out out/loop", place, installed)
     assert "the verdict was right" in out
+    # each stage heads what it prints
+    stages = [int(k) for k in re.findall(r"^(\d)/7 \S", out, re.MULTILINE)]
+    assert stages == [1, 2, 3, 4, 5, 6, 7]
     for line in commands("armloop"):
         assert armloop(line, place, installed).strip(), line
     for example in blocks("python"):

@@ -19,7 +19,7 @@ from armloop.reports.html import Picture, svg
 from armloop.reports.plots import style
 from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import thin, with_gaps
-from armloop.reports.plots.watch import NARROW, heat_figure
+from armloop.reports.plots.watch import NARROW, heat_figure, trend_figure
 from armloop.reports.residuals import held_out_residuals, joint_load, time_axis
 from armloop.util.files import write_figure
 
@@ -332,3 +332,18 @@ def test_thinning_keeps_spikes_and_gaps() -> None:
 def test_runs_are_not_joined() -> None:
     time = np.array([0, 1, 2, 3, 50, 51, 52, 53.0])
     assert np.flatnonzero(np.isnan(with_gaps(time, np.ones(8))[1])).tolist() == [4]
+
+
+def test_logs_copied_together_stand_in_their_order() -> None:
+    """All have the date of the copy: an axis of time would show one line of dots, and alarms beside it."""
+    logs = [f"log{k}" for k in range(10)]
+    alarm = {"since": 1e9, "when": 1e9 + 60.0, "since_log": "log4", "log": "log6"}
+    values = np.arange(10.0)
+    made = trend_figure(np.full(10, 1e9), logs, [("friction", values, values)], 5.0, [alarm])
+    places = {str(line.get_label()): np.asarray(line.get_xdata()) for line in made.axes[0].lines}
+    np.testing.assert_array_equal(places["one log"], np.arange(1, 11))
+    assert (places["change began"][0], places["alarm"][0]) == (5, 7)
+    band = made.axes[0].patches[0].get_extents().transformed(made.axes[0].transData.inverted())
+    np.testing.assert_allclose((band.y0, band.y1), np.quantile(values[:4], [0.05, 0.95]))
+    apart = trend_figure(1e9 + 3600.0 * values, logs, [("friction", values, values)], 5.0, [alarm])
+    assert np.asarray(apart.axes[0].lines[0].get_xdata()).dtype == np.dtype("datetime64[us]")

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import pytest
+from matplotlib.text import Text
 
 from armloop.diagnosis import Diagnosis, close
 from armloop.diagnosis.unlisted import Unlisted
@@ -52,6 +53,12 @@ def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
     assert outward == {"replay.html"}
     assert "url(http" not in page and "<script" not in page
     assert len(page) < 6e6
+
+
+def test_the_rings_caption_ends_with_the_verdict(loop: SimpleNamespace) -> None:
+    figure = loop_figure(loop)
+    words = " ".join(text.get_text() for text in figure.findobj(Text) if isinstance(text, Text))
+    assert re.search(r"verdict was right(?!;)", words) and not re.search(r";\s*;|right;", words)
 
 
 @pytest.fixture
@@ -127,6 +134,13 @@ def test_every_joint_has_its_residual_and_what_the_controller_adds(loop: SimpleN
 def test_a_number_keeps_its_error_and_unit() -> None:
     assert tied("joint 2: 0.71 ± 0.01 N·m, 99 %") == "joint\u00a02: 0.71\u00a0±\u00a00.01\u00a0N·m, 99\u00a0%"
     assert tied("2 numbers and 3 more") == "2 numbers and 3 more"
+
+
+def test_a_line_of_a_narrow_place_ends_between_two_numbers() -> None:
+    text = render(
+        Report("a", "b", [Section("c", tables=[make_table(["d"], [["7 ± 1"]])])], [Card("0.71 ± 0.01", "e")])
+    )
+    assert ">0.71 ±\u00a00.01</p>" in text and ">7 ±\u00a01</td>" in text
 
 
 def test_a_percentage_stands_apart_from_its_sign() -> None:

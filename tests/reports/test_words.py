@@ -11,8 +11,10 @@ from armloop.reports.words import (
     number,
     percent,
     place,
+    spelled,
     unit,
     with_error,
+    wrapped,
 )
 
 
@@ -36,6 +38,18 @@ def test_a_value_ends_where_its_error_begins() -> None:
     assert with_error(0.44982, 0.00071) == "0.44982 ± 0.00071"
     assert with_error([1.0, 2.0], [0.1, 0.02]) == "(1.00 ± 0.10, 2.000 ± 0.020)"
     assert with_error(1.0, float("nan")) == "1.00"
+
+
+def test_a_sentence_has_the_signs_of_the_tables() -> None:
+    assert spelled("it leaves 0.81% of 2.9 N*m (RMS)") == "it leaves 0.81 % of 2.9 N·m (RMS)"
+    assert spelled("0.3 ± 0.1 N*m*s/rad, 2 kg*m^2") == "0.3 ± 0.1 N·m·s/rad, 2 kg·m²"
+    assert spelled("--tau-unit N*m; cos(2*q1)*v2^2; 5 %") == "--tau-unit N*m; cos(2*q1)*v2^2; 5 %"
+
+
+def test_a_sentence_of_a_terminal_is_as_wide_as_its_tables() -> None:
+    lines = wrapped("joint 1 leaves 5% " * 20, "  ").splitlines()
+    assert len(lines) > 2 and max(map(len, lines)) <= 110
+    assert lines[0].startswith("  joint") and lines[1].startswith("    ") and "5 %" in lines[0]
 
 
 def test_an_entry_is_told_with_all_its_joints() -> None:

@@ -12,6 +12,7 @@ from operation import contents
 from armloop.cli import main
 from armloop.data.log import read_log, write_log
 from armloop.data.tables import write_columns
+from armloop.reports.watch_report import _cards
 from armloop.util.errors import InputWarning
 from armloop.watch import Options, watch
 from armloop.watch.sources import find_logs, recorded_at
@@ -142,6 +143,8 @@ def test_a_link_to_a_log_that_is_gone_is_said(fleet: Path, tmp_path: Path) -> No
     with pytest.warns(InputWarning, match=r"set aside: .*gone\.csv: cannot be read \(No such file"):
         outcome = watch(fleet / "models", find_logs([logs.parent]), tmp_path / "store")
     assert outcome.counts.aside == 1
+    (card,) = [card for card in _cards(outcome) if card.title == "set aside"]
+    assert card.figure == "1"
 
 
 def test_the_folder_of_one_arm_is_taken_for_its_logs(fleet: Path, tmp_path: Path) -> None:

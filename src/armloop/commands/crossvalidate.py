@@ -74,6 +74,7 @@ def run(options: Crossvalidate) -> None:
         ladder_table,
         physical_table,
     )
+    from armloop.reports.words import wrapped
     from armloop.util.checkpoints import Kept
     from armloop.util.files import write_json
     from armloop.util.workers import Processes
@@ -121,4 +122,4 @@ def run(options: Crossvalidate) -> None:
         print(physical_table(comparison), end="\n\n")
     for note in dict.fromkeys(note for _, fit in result.results for note in fit.notes):
         if not note.startswith("friction, "):  # the table has them all
-            print(f"note: {note}")
+            print(wrapped(f"note: {note}"))

@@ -106,6 +106,7 @@ def run(options: Excite) -> None:
         print_json({"reference": str(options.out), "rows": rows, **result.to_dict(), **compared})
         return
     from armloop.reports.excitation_tables import measures_table, ratio_words, use_table
+    from armloop.reports.words import wrapped
 
     print(measures_table(result))
     print()
@@ -113,5 +114,5 @@ def run(options: Excite) -> None:
     if ratio is not None:
         print(ratio_words(ratio, result))
     for note in result.notes:
-        print(f"note: {note}")
+        print(wrapped(f"note: {note}"))
     print(f"reference written to {options.out}, {rows} rows")

@@ -63,7 +63,7 @@ def run(options: Export) -> None:
 
 def _tell(found: Exported, model: ReconstructedModel, by_log: bool) -> None:
     from armloop.reports.tables import table
-    from armloop.reports.words import unit
+    from armloop.reports.words import unit, wrapped
 
     states = "states of the log" if by_log else "random states within the training range"
     if found.difference is not None and found.unsaid is not None:
@@ -78,8 +78,8 @@ def _tell(found: Exported, model: ReconstructedModel, by_log: bool) -> None:
     if found.missing:
         print("what it cannot say:")
         for line in found.missing:
-            print(f"  {line}")
+            print(wrapped(line, "  "))
     for line in found.notes:
-        print(f"  {line}")
+        print(wrapped(line, "  "))
     for path in found.files:
         print(f"wrote {path}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armloop.commands.options import option
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 
 #: Rows per second of the reference.
 _RATE = 500.0
-_WIDTH = 110
 
 
 class NextRun(Ranges):
@@ -102,7 +100,7 @@ def plan(path: str, diagnosis: Diagnosis, wanted: Wish, tell: Progress) -> Plann
 def _words(path: str, run: Next) -> str:
     from armloop.diagnosis.next_run import FAR_ENOUGH
     from armloop.reports.tables import make_table
-    from armloop.reports.words import effect_label, number, percent
+    from armloop.reports.words import effect_label, number, percent, wrapped
 
     table, lines = "", []
     told = [each for each in run.told if each.then is not None]
@@ -138,4 +136,4 @@ def _words(path: str, run: Next) -> str:
         f"Reference written to {path}, {number(run.reference.duration)} s. It knows nothing of obstacles, nor of the arm "
         "hitting itself: watch it in slow motion first."
     )
-    return table + "\n".join(textwrap.fill(line, _WIDTH, subsequent_indent="  ") for line in lines)
+    return table + "\n".join(map(wrapped, lines))

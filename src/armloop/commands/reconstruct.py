@@ -96,6 +96,7 @@ def run(options: Reconstruct) -> None:
         score_table,
         steps_table,
     )
+    from armloop.reports.words import wrapped
     from armloop.util.doubts import warn
     from armloop.util.files import write_text
     from armloop.util.workers import Cluster, Processes
@@ -154,11 +155,11 @@ def run(options: Reconstruct) -> None:
 
         for table in (coefficients_table(result.model), stribeck_table(result.model)):
             print(table, end="\n\n") if table else None
-        print(NOTE, end="\n\n")
+        print(wrapped(NOTE), end="\n\n")
     print(score_table(result.held_out, arm, "Prediction error on held-out blocks"), end="\n\n")
     print(parts_table(result.parts, arm))
     for note in [*unjudged(result.parts), *result.notes]:
-        print(f"note: {note}")
+        print(wrapped(f"note: {note}"))
     print(f"model written to {options.out}")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -31,10 +30,9 @@ def progress(options: Options) -> Progress:
     if getattr(options, "json", False) and not sys.stderr.isatty():
         return silent
     stream = sys.stderr if sys.stderr.isatty() else sys.stdout
-    # % stands apart from its number, as in the tables
-    return with_time_left(
-        lambda message: print(f"  … {re.sub(r'(?<=[0-9])%', ' %', message)}", file=stream, flush=True)
-    )
+    from armloop.reports.words import spelled
+
+    return with_time_left(lambda message: print(f"  … {spelled(message)}", file=stream, flush=True))
 
 
 def print_json(value: Any) -> None:

@@ -40,6 +40,7 @@ def run(options: Tune) -> None:
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.model import load_model
     from armloop.reports.tuning_tables import gains_table, margins_table, missed_notes, verified_table
+    from armloop.reports.words import wrapped
     from armloop.workflows import tune_scenario
 
     scenario = load_tracking(options.scenario, simulated_arm(options))
@@ -52,6 +53,6 @@ def run(options: Tune) -> None:
         return
     print("\n\n".join(str(table(tuning)) for table in (gains_table, margins_table, verified_table)))
     for note in missed_notes(tuning):
-        print(f"note: {note}")
+        print(wrapped(f"note: {note}"))
     if folder is not None:
         print(f"\nwritten: {folder}/tune.json, report.html, bode.png, step.png")

@@ -48,9 +48,8 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     """One source as a motion log in SI units, base to tip; raises ``LogError``, which names the column at fault."""
     where = str(recording.path)
     if recording.samples < FEWEST_SAMPLES:
-        raise LogError(
-            f"{where}: {recording.samples} {recording.rows}s; a motion log has at least {FEWEST_SAMPLES}"
-        )
+        rows = f"{recording.samples} {recording.rows}{'s' * (recording.samples != 1)}"
+        raise LogError(f"{where}: {rows}; a motion log has at least {FEWEST_SAMPLES}")
     mapping = _answered(recording, mapping, arm, answers)
     notes = list(recording.notes)
     order = _order(recording, mapping, arm, notes)

@@ -80,9 +80,12 @@ def read_rosbag(path: Path, topic: str | None, wanted: Sequence[str] | None) -> 
         AssertionError,
         UnicodeDecodeError,
     ) as error:
-        raise LogError(
-            f"{path}: no readable bag ({error}); give the bag's folder, a .db3, .mcap or .bag"
-        ) from error
+        remedy = "give the bag's folder, a .db3, .mcap or .bag"
+        if "end magic" in str(error):  # what a recorder that was killed leaves
+            remedy = (
+                "its end is missing, as where a recorder was killed: `mcap recover` writes what there is anew"
+            )
+        raise LogError(f"{path}: no readable bag ({error}); {remedy}") from error
     if not rows:
         raise fault or LogError(f"{path}: {chosen} has no messages; record the joint states of a moving arm")
     notes = [f"{len(rows)} messages of {chosen}"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import re
 from dataclasses import dataclass, field
@@ -87,18 +88,22 @@ def read_text(path: Path) -> TextTable:
     if not body:
         raise LogError(f"{path}: there are no rows below the header; a log has one row per sample")
     starts = sorted({int(np.searchsorted(numbers, head + 1)) for head in heads} - {len(body)})
-    decimal = "," if separator != "," and any(re.search(r"\d,\d", line) for line in body[:50]) else "."
+    decimal = (
+        "," if any(re.search(r"\d,\d", cell) for row in body[:50] for cell in _cells(row, separator)) else "."
+    )
     if separator != "," or decimal != ".":
         between = {"\t": "tabs", ";": "semicolons", " ": "blanks", ",": "commas"}[separator]
         notes.append(f"{between} between the cells, decimal {'comma' if decimal == ',' else 'point'}")
     if separator == " ":
         body = [" ".join(line.split()) for line in body]
     # One more separator at the end of each row, or one column whose cells are empty, is what some loggers write.
-    width = len(body[0].rstrip("\r").split(separator))
-    extra = width - len(names)
+    cells_of_first = _cells(body[0], separator)
+    extra = len(cells_of_first) - len(names)
+    if extra > 0 and all(cell.strip() for cell in cells_of_first):
+        raise _fault(path, body, numbers, separator, len(names))
     if extra == 1 and all(not line.rstrip("\r ").endswith(separator) for line in body[:3]):
         # An empty name where the rows have an empty cell more than the header (libfranka's ``,,``).
-        empty = (k for k, cell in enumerate(body[0].split(separator)) if not cell.strip())
+        empty = (k for k, cell in enumerate(cells_of_first) if not cell.strip())
         k = next(empty, len(names))
         names_read = [*names[:k], "", *names[k:]]
     else:
@@ -212,7 +217,9 @@ def _layout(lines: list[str]) -> tuple[str, int | None]:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return line.split() if separator == " " else line.split(separator)
+    if separator == " ":
+        return line.split()
+    return next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
 
 
 def _bare(cell: str) -> str:
@@ -258,12 +265,20 @@ def _number(text: str | None) -> float:
 
 
 def _fault(
-    path: Path, body: list[str], numbers: list[int], separator: str, width: int, cause: Exception
+    path: Path,
+    body: list[str],
+    numbers: list[int],
+    separator: str,
+    width: int,
+    cause: Exception | None = None,
 ) -> LogError:
     for row, (line, number) in enumerate(zip(body, numbers, strict=True), start=1):
-        cells = len(line.split(separator))
+        cells = len(_cells(line, separator))
         if cells != width:
+            doubled = separator == "," and cells in (2 * width - 1, 2 * width)
+            comma = " (a decimal comma between commas: separate the cells by semicolons)" if doubled else ""
             return LogError(
-                f"{path}: row {row} (line {number}) has {cells} cells; it must have {width}, as the header says"
+                f"{path}: row {row} (line {number}) has {cells} cell{'s' * (cells != 1)}; it must have {width}, as the "
+                f"header says{comma}"
             )
     return LogError(f"{path}: cannot be read as a table ({cause}); write it anew with one kind of separator")

@@ -254,8 +254,9 @@ def read_log(
     first, before = (max(0, rows[0] - 1), min(1, rows[0])) if rows else (0, 0)
     table = read_columns(path, ["time", *chain(*kinds.values())], (first, rows[1]) if rows else None)
     time, stacked = table.pop("time"), _side_by_side(table, kinds)
-    if len(time) - before < FEWEST_SAMPLES:
-        raise LogError(f"{path}: {len(time) - before} rows; a motion log has at least {FEWEST_SAMPLES}")
+    count = len(time) - before
+    if count < FEWEST_SAMPLES:
+        raise LogError(f"{path}: {count} row{'s' * (count != 1)}; a motion log has at least {FEWEST_SAMPLES}")
     derived = "v" not in kinds
     if derived:
         _check_time(time, str(path), lambda row: place(path, first + row))

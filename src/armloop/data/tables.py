@@ -152,6 +152,8 @@ def kind_of(path: Path) -> str:
 
 
 def _check_suffix(path: Path) -> None:
+    if path.is_dir():
+        raise LogError(f"{path}: is a folder; a motion log is a file that ends in {CSV} or {PARQUET}")
     if kind_of(path) not in (CSV, PARQUET):
         raise LogError(f"{path}: unknown suffix {path.suffix!r}; a motion log ends in {CSV} or {PARQUET}")
     check_name(path)
@@ -277,7 +279,7 @@ def _csv_fault(path: Path, header: Sequence[str], names: Sequence[str], cause: E
             continue
         if len(cells) != len(header):
             return LogError(
-                f"{path}: row {row} (line {line}) has {len(cells)} cells; "
+                f"{path}: row {row} (line {line}) has {len(cells)} cell{'s' * (len(cells) != 1)}; "
                 f"it must have {len(header)}, one for each name of the header"
             )
         for name in names:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,13 +11,12 @@ from armloop.laws.effects.found import RANGE
 from armloop.laws.effects.listed import listed
 from armloop.reports.findings import all_added, blame, confounded, findings, nothing_to_supply, reasons
 from armloop.reports.tables import Table, make_table
-from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error
+from armloop.reports.words import MISSING, effect_label, percent, unit, vector, with_error, wrapped
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Closing, Diagnosis
     from armloop.robot.arm import Arm
 
-_WIDTH = 110
 #: Parameters that say when something was, which the sentences tell.
 _WHEN = ("picked_up", "put_down", "posture")
 
@@ -152,17 +150,13 @@ def diagnosis_table(diagnosis: Diagnosis, compensation: Closing | None = None) -
     """The verdict, what was found, the errors per joint, and what a controller changes, for a terminal."""
     sentences = [*findings(diagnosis), *reasons(diagnosis), *blame(diagnosis)]
     verdict = diagnosis.verdict.replace("_", " ")
-    parts = [f"Verdict: {verdict}", "\n".join(map(_wrapped, sentences))]
+    parts = [f"Verdict: {verdict}", "\n".join(map(wrapped, sentences))]
     parts += map(str, found_tables(diagnosis))
     for found, alike in confounded(diagnosis):
-        lines = [_wrapped(f"- {other}: {why}") for other, why in alike]
+        lines = [wrapped(f"- {other}: {why}") for other, why in alike]
         parts.append("\n".join([f"This motion cannot tell {found} from", *lines]))
     if compensation is not None:
         if not compensation.feedforward.largest.any():
             parts.append(nothing_to_supply(all_added(diagnosis)))
         parts += map(str, compensation_tables(diagnosis, compensation))
     return "\n\n".join(parts)
-
-
-def _wrapped(sentence: str) -> str:
-    return textwrap.fill(sentence, _WIDTH, subsequent_indent="  ")

@@ -22,6 +22,7 @@ from armloop import __version__
 from armloop.reports.plots.narrow import stack
 from armloop.reports.plots.style import GRID, INK, MUTED, SURFACE
 from armloop.reports.tables import Table
+from armloop.reports.words import spelled
 
 _THEME = {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", SURFACE: "var(--surface)"}
 _DPI = 150
@@ -30,7 +31,6 @@ _TIES = re.compile(
     r"(?<=[±→×]) | (?=[%±])|(?<=joint) (?=\d)|(?<=\d) (?=(?:N|kg|m|s|ms|rad|A|Hz|×)(?:[·/²³,.;:)]|\s|$))"
 )
 _OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*\b")
-_PERCENT = re.compile(r"(?<=\d)%")
 #: Width on the page of an inch of a figure, rem: its labels are then about as large as the text.
 _REM_PER_INCH = 6.4
 #: Letters of a table's line that a phone has room for.
@@ -122,6 +122,7 @@ def render(report: Report) -> str:
     )
     environment.filters["svg"] = lambda picture: Markup(picture.svg())
     environment.filters["prose"] = prose
+    environment.filters["parted"] = parted
     environment.tests["wide"] = wide
     return environment.get_template("report.html").render(report=report, version=__version__)
 
@@ -129,6 +130,11 @@ def render(report: Report) -> str:
 def prose(text: str) -> Markup:
     """A sentence as HTML: tied, a command's options as code."""
     return Markup(_OPTION.sub(r"<code>\g<0></code>", str(escape(tied(text)))))
+
+
+def parted(text: str) -> Markup:
+    """As :func:`prose`, in a narrow place: a line may end before ±, rather than within a number."""
+    return prose(text).replace("\u00a0±", " ±")
 
 
 def wide(table: Table) -> bool:
@@ -140,7 +146,7 @@ def wide(table: Table) -> bool:
 
 def tied(text: str) -> str:
     """Keep a number's sign, error and unit on one line with it; % stands apart from its number, as everywhere."""
-    return _TIES.sub("\u00a0", _PERCENT.sub(" %", text))
+    return _TIES.sub("\u00a0", spelled(text))
 
 
 def svg(figure: Figure | str, narrow: Figure | None = None) -> str:

@@ -72,7 +72,7 @@ def _cards(outcome: Outcome) -> list[Card]:
             "bad" if outcome.new else "good",
         ),
         Card(str(outcome.counts.read), "new logs", f"{outcome.counts.known} known before"),
-        Card(str(len(outcome.aside)), "set aside", "broken, or of an unknown arm"),
+        Card(str(max(len(outcome.aside), outcome.counts.aside)), "set aside", "broken, or of an unknown arm"),
     ]
 
 
@@ -134,7 +134,9 @@ def _trends(outcome: Outcome, arm: str, tested: Tested) -> Section:
         if np.isfinite(values[:, s]).any():
             chosen.setdefault(names[s], s)
     shown = [(name, values[:, s], tested.watched.evidence[:, s]) for name, s in [*chosen.items()][:_SHOWN]]
-    made = trend_figure(tested.history.units.when, shown, float(tested.watched.limits[-1]), alarms)
+    history = tested.history
+    logs = [history.logs[k].name for k in history.units.log]
+    made = trend_figure(history.units.when, logs, shown, float(tested.watched.limits[-1]), alarms)
     return Section(
         f"Trends of {arm}", [], [Picture(made, Prose("watch")["trend"])], [], [], list(tested.notes)
     )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import textwrap
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from armloop.reports.prose import Prose
 from armloop.reports.tables import Table, make_table
-from armloop.reports.words import counted, place
+from armloop.reports.words import counted, place, wrapped
 
 if TYPE_CHECKING:
     from armloop.watch import Outcome
@@ -66,10 +65,7 @@ def watch_words(outcome: Outcome) -> str:
         lines.append("\n" + str(alarms_table(new, "New alarms")))
         for alarm in new:
             lines.append(f"\n{alarm['arm']}:")
-            lines += [
-                textwrap.fill(text, 110, initial_indent="  ", subsequent_indent="    ")
-                for text in alarm_words(alarm)
-            ]
+            lines += [wrapped(text, "  ") for text in alarm_words(alarm)]
     else:
         lines.append("no new alarm")
     if outcome.aside:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from armloop.laws.effects.base import with_error as of_scalar
 
 if TYPE_CHECKING:
     from armloop.laws.effects import Effect
@@ -20,6 +24,10 @@ _OTHER_CONTROLLERS = {
     "exact": "PID + exact model",
 }
 _UNITS = {"*": "·", "^2": "²", "^3": "³"}
+_PERCENT = re.compile(r"(?<=[0-9])%")
+#: A torque's or a load's unit behind its number; ``--tau-unit N*m`` stays as it is typed.
+_UNIT = re.compile(r"(?<=[0-9)] )(?:N|kg)\*m\S*")
+_WIDTH = 110
 
 
 def number(x: float | None, digits: int = 3) -> str:
@@ -58,6 +66,16 @@ def unit(text: str) -> str:
     return text
 
 
+def spelled(text: str) -> str:
+    """A sentence with its numbers as in the tables: ``0.81%`` as 0.81 %, ``2 N*m`` as 2 N·m."""
+    return _UNIT.sub(lambda found: unit(found[0]), _PERCENT.sub(" %", text))
+
+
+def wrapped(sentence: str, indent: str = "") -> str:
+    """A sentence for a terminal, spelled, in lines that are no longer than a table is wide."""
+    return textwrap.fill(spelled(sentence), _WIDTH, initial_indent=indent, subsequent_indent=f"{indent}  ")
+
+
 def vector(value: float | Sequence[float], digits: int = 3) -> str:
     """A scalar, or a vector in brackets."""
     if isinstance(value, Sequence):
@@ -73,8 +91,7 @@ def with_error(value: float | Sequence[float], std_error: float | Sequence[float
     error = float(np.max(std_error))
     if not np.isfinite(error) or error <= 0:
         return number(value)
-    decimals = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
-    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+    return of_scalar(value, error)
 
 
 def angle(text: str, of: str) -> str:

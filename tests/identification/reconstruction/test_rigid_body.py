@@ -127,6 +127,12 @@ def test_parameters_that_the_motion_leaves_open_are_said_to_be():
     assert set(found.model.history["physics"]["faults"]) <= set(found.notes)
 
 
+def test_the_notes_say_what_the_errors_are_of(result: Reconstruction):
+    # of the model, whether it is written or not: a call from Python writes none
+    note = "errors are of a model fitted without the held-out blocks; the model itself is fitted to all data"
+    assert note in result.notes and not any("written" in each for each in result.notes)
+
+
 def test_the_ladder_says_what_each_rung_brought(result: Reconstruction):
     ladder = result.model.history["friction_ladder"]
     assert ladder[0]["rung"] == "Coulomb and viscous" and ladder[0]["joints"] == [1, 2, 3]

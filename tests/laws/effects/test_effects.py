@@ -361,7 +361,9 @@ def test_a_ripple_is_sought_above_the_harmonics_of_gravity_and_on_turning_joints
 
 
 def test_a_number_without_an_error_is_stated_without_one():
-    assert Estimate(0.25, 0.011, "s").words(3) == "0.25 ± 0.011 s"
+    assert Estimate(0.25, 0.011, "s").words(3) == "0.250 ± 0.011 s"
+    assert Estimate(12.34567, 0.00101, "s").words() == "12.3457 ± 0.0010 s"
+    assert Estimate(0.25, float("nan"), "s").words() == "0.25 s"
     assert Estimate(0.25, 0.0, "s").words(3) == "0.25 s" and Estimate(1.0, 0.0, "1").words() == "1"
 
 

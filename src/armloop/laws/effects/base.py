@@ -80,9 +80,15 @@ class Estimate:
 
     def words(self, digits: int = 4) -> str:
         """A scalar with its standard error, where it has one, and unit."""
-        error = number(self.std_error)
-        stated = f" ± {error:.2g}" if error else ""
-        return f"{number(self.value):.{digits}g}{stated} {self.unit}".removesuffix(" 1")
+        value, error = number(self.value), number(self.std_error)
+        stated = with_error(value, error) if 0 < error < np.inf else f"{value:.{digits}g}"
+        return f"{stated} {self.unit}".removesuffix(" 1")
+
+
+def with_error(value: float, error: float) -> str:
+    """A number and its standard error, both to the second digit of the error."""
+    places = int(np.clip(1 - np.floor(np.log10(error)), 0, 6))
+    return f"{value:.{places}f} ± {error:.{places}f}"
 
 
 def entry(name: str, joint: int | None, other_joint: int | None = None) -> dict[str, Any]:

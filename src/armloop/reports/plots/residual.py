@@ -77,7 +77,7 @@ def residual_shape_figure(diagnosis: Diagnosis, what_is_left: bool = False) -> F
     moved = moving_joints(diagnosis)
     n, mixed = len(moved), len({joint.kind for joint in joints}) > 1
     made = figure(10.5, (2.0 if n < 5 else 1.7) * n + 0.8)
-    grid = panels(made, n, 4, gap=0.5, rows_gap=0.72 if mixed else 0.5)
+    grid = panels(made, n, 4, gap=0.58, rows_gap=0.72 if mixed else 0.5)
     for line, j in zip(grid, moved, strict=True):
         joint, last = joints[j], j == moved[-1]
         u, at = unit(joint.torque_unit), joint.position_unit

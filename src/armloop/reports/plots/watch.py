@@ -31,8 +31,6 @@ MOST_ARMS = 60
 _CELL, _BAR, WIDE, NARROW = 0.26, 4.0, 9.6, 4.0
 #: None lets the page through, light or dark.
 _STRENGTH = LinearSegmentedColormap.from_list("evidence", [f"{GREY}1f", ORANGE, "#b0182c"])
-# s that the axis of time covers at least
-_LEAST_SPAN = 86_400.0
 
 
 def heat_figure(
@@ -96,6 +94,7 @@ def _instant(seconds: Any) -> Any:
 
 def trend_figure(
     when: Array,
+    logs: Sequence[str],
     shown: Sequence[tuple[str, Array, Array]],
     limit: float,
     alarms: Sequence[dict[str, Any]],
@@ -103,15 +102,21 @@ def trend_figure(
     """Scores of some streams over time with the healthy band, and below each the evidence up to the threshold.
 
     Args:
-        when: (U,) s since 1970.
+        when, logs: (U,) s since 1970 and the log's name, in order.
         shown: (name, scores (U,), log evidence (U,)) per stream.
-        alarms: with ``since`` and ``when``.
+        alarms: with ``since``, ``when`` and their logs.
     """
     made = figure(10.0, 0.9 + 2.7 * len(shown))
     axes = panels(made, 2 * len(shown), 1, left=1.0, sharex=True, height_ratios=[2, 1] * len(shown))[:, 0]
-    days = _instant(when)
-    first = min((alarm["since"] for alarm in alarms), default=np.inf)
-    healthy = when < first
+    # Logs that are dated less than 1 s apart were copied together: their order is all that is known of time.
+    dated = when.max() - when.min() >= len(when)
+    days = _instant(when) if dated else 1 + np.arange(len(when))
+
+    def at(alarm: dict[str, Any], instant: str, log: str) -> Any:
+        return _instant(alarm[instant]) if dated else 1 + logs.index(alarm[log])
+
+    changes = [at(alarm, "since", "since_log") for alarm in alarms]
+    healthy = days < min(changes) if changes else np.ones(len(days), dtype=bool)
     for k, (name, values, evidence) in enumerate(shown):
         top, under = axes[2 * k], axes[2 * k + 1]
         known = values[healthy & np.isfinite(values)]
@@ -125,16 +130,18 @@ def trend_figure(
         under.axhline(limit, color=ORANGE, lw=1.2, label="threshold")
         for alarm in alarms:
             for panel in (top, under):
-                panel.axvline(_instant(alarm["since"]), color=GREEN, lw=1.2, ls="--", label="change began")
-                panel.axvline(_instant(alarm["when"]), color=ORANGE, lw=1.4, label="alarm")
+                panel.axvline(
+                    at(alarm, "since", "since_log"), color=GREEN, lw=1.2, ls="--", label="change began"
+                )
+                panel.axvline(at(alarm, "when", "log"), color=ORANGE, lw=1.4, label="alarm")
         polish(top, "", "score", name)
         polish(under, "", "log evidence", "")
         under.set_ylim(0, 1.25 * limit)
-    if when.max() - when.min() < _LEAST_SPAN:  # logs of one moment would have an axis of years
-        middle = 0.5 * (when.max() + when.min())
-        axes[-1].set_xlim(_instant(middle + _LEAST_SPAN * np.array([-0.5, 0.5])))
-    locator = AutoDateLocator()
-    axes[-1].xaxis.set_major_locator(locator)
-    axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    if dated:
+        locator = AutoDateLocator()
+        axes[-1].xaxis.set_major_locator(locator)
+        axes[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    else:
+        axes[-1].set_xlabel("log, in the order of their dates")
     legend(made, 5)
     return made
