@@ -12,6 +12,7 @@ from scores import score
 
 from armloop.diagnosis import search as searching
 from armloop.laws.effects import effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 
 ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
@@ -64,6 +65,21 @@ class TestSearch:
         assert self.search([self.trial("a", -1000.0, 0.0)], monkeypatch).share == 1.0
         assert self.search([], monkeypatch) is None
         assert self.search([self.trial("barred", 600.0, 10.0)], monkeypatch) is None
+
+    def test_dry_friction_is_what_one_with_memory_may_be_where_the_joint_has_memory_in_the_model(
+        self,
+    ) -> None:
+        memory = (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002))
+        search: Any = object.__new__(searching._Search)
+        search.evidence = SimpleNamespace(
+            model=SimpleNamespace(friction=FrictionLaw((memory, memory, memory[:1])))
+        )
+        best = effect("presliding_hysteresis", 2)
+        assert search._alike(effect("coulomb_friction", 2), best) == searching.MOST
+        others = (("coulomb_friction", 1), ("viscous_friction", 2), ("stribeck_friction", 2))
+        assert {search._alike(effect(*law), best) for law in others} == {searching.RIVAL_SHARE}
+        plain = effect("coulomb_friction", 3), effect("presliding_hysteresis", 3)
+        assert search._alike(*plain) == search._alike(best, plain[0]) == searching.RIVAL_SHARE
 
     def test_it_must_remove_a_part_of_what_could_be_explained_of_some_joint(
         self, monkeypatch: pytest.MonkeyPatch

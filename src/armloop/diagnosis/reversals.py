@@ -126,14 +126,12 @@ def _never_seen(evidence: Evidence) -> NDArray[np.bool_]:
 
 def _remembering(evidence: Evidence, outcome: Outcome) -> NDArray[np.bool_]:
     """(n,) joints in which dry friction was found, and whose friction has memory in the model: so has what was added."""
-    remember, rub = np.zeros((2, evidence.rows.shape[1]), dtype=bool)
-    for j, terms in enumerate(evidence.model.friction.terms):
-        remember[j] = any(term.element.way == "memory" for term in terms)
+    remembering, friction = np.zeros(evidence.rows.shape[1], dtype=bool), evidence.model.friction
     for one in outcome.added():
         law = one.placed() if one.effect.rubs else None
         if law is not None and any(t.element.dry and t.element.way != "memory" for t in law.terms):
-            rub[law.along.joint] = True
-    return np.asarray(remember & rub)
+            remembering[law.along.joint] = friction.remembers(law.along.joint)
+    return remembering
 
 
 def _joints(effect: Effect) -> set[int]:

@@ -15,6 +15,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     CHANCE,
+    MOST,
     MULTIPLE,
     SIGNIFICANCE,
     enough,
@@ -204,9 +205,19 @@ class _Search:
         rivals = [
             (trial.effect, gain(current, trial.score) / whole)
             for trial in trials
-            if trial is not best and gain(current, trial.score) >= RIVAL_SHARE * most
+            if trial is not best
+            and gain(current, trial.score) >= self._alike(trial.effect, best.effect) * most
         ]
         return Found(best.effect, best.shape, min(most / whole, 1.0), rivals)
+
+    def _alike(self, effect: Effect, best: Effect) -> float:
+        """The part of what the best removes from which another is its alternative.
+
+        Dry friction that rises in a joint whose friction has memory in the model has it, too, which its law lacks.
+        """
+        if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
+            return RIVAL_SHARE
+        return MOST if self.evidence.model.friction.remembers(best.joint - 1) else RIVAL_SHARE
 
     def _is_much(self, current: Score, trial: Score) -> bool:
         """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""

@@ -290,6 +290,10 @@ class FrictionLaw:
                     tau[:, j] += term.coefficient * term.column(motion, j, load)
         return tau
 
+    def remembers(self, joint: int) -> bool:
+        """Whether the friction of a joint (0-based) has memory."""
+        return any(term.element.way == "memory" for term in self.terms[joint])
+
     def stribeck_parameters(self, joint: int) -> dict[str, float]:
         """f_s, f_c, f_v, v_s of Eq. (34) for a joint (0-based), where the law has that form."""
         by_kind = {term.kind: term for term in self.terms[joint]}
