@@ -14,7 +14,10 @@ from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import reversals
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.reversals import _Gain, _Gains, _positive, _View, judge_reversals
+from armloop.laws.effects import Estimate
 from armloop.laws.effects import effect as listed
+from armloop.laws.friction import FrictionLaw, FrictionTerm
+from armloop.model import AddedEffect
 
 
 @dataclass(frozen=True)
@@ -263,12 +266,13 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
             samples=samples,
             rows=rows,
             scale=scale,
-            model=SimpleNamespace(arm=None, baseline={}),
+            model=SimpleNamespace(arm=None, baseline={}, friction=FrictionLaw(((), ()))),
             only=lambda own: run(own),
         )
 
     told: list[str] = []
-    outcome: Any = SimpleNamespace(found=["slide"], after=SimpleNamespace(effects=(), shapes=()))
+    after = SimpleNamespace(effects=(), shapes=())
+    outcome: Any = SimpleNamespace(found=["slide"], after=after, added=list)
     found = judge_reversals(
         run(np.zeros((6, 2), dtype=bool)), outcome, np.ones((6, 2), dtype=bool), told.append
     )
@@ -324,12 +328,13 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     samples = SimpleNamespace(motion=motion, moving=None, period=0.05)
     baseline: dict[str, Any] = {}
     evidence: Any = SimpleNamespace(
-        model=SimpleNamespace(baseline=baseline),
+        model=SimpleNamespace(baseline=baseline, friction=FrictionLaw(((), ()))),
         samples=samples,
         rows=rows,
         only=lambda own: SimpleNamespace(rows=own, samples=samples),
     )
-    outcome: Any = SimpleNamespace(after=SimpleNamespace(effects=(), shapes=()))
+    added: list[AddedEffect] = []
+    outcome: Any = SimpleNamespace(after=SimpleNamespace(effects=(), shapes=()), added=lambda: added)
     assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
     ((own, judged),) = asked
     # of four turns one is not kept and one not independent; two samples, of a twentieth of a second, to either side
@@ -341,6 +346,21 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     baseline["reversals"] = [0.5, None]
     assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
     assert np.argwhere(asked[1][1]).tolist() == [[4, 0], [5, 0], [6, 0]]
+    baseline.clear()
+    # nor one whose friction has memory in the model, where dry friction was found beside it
+    memory = (FrictionTerm("smooth_sign", 2.0, 0.01), FrictionTerm("hysteresis", 1.0, 0.002))
+    for name, law, joints in (
+        ("coulomb_friction", memory, {0}),
+        ("coulomb_friction", memory[:1], {0, 1}),
+        ("viscous_friction", memory, {0, 1}),
+        ("rotor_inertia", memory, {0, 1}),
+        ("presliding_hysteresis", memory, {0}),
+    ):
+        kind = listed(name, 2)
+        added[:] = [AddedEffect(kind, {p.name: Estimate(1.0, 0.1, "") for p in kind.parameters})]
+        evidence.model.friction = FrictionLaw((memory, law))
+        assert judge_reversals(evidence, outcome, kept, lambda text: None) is None
+        assert set(np.argwhere(asked[-1][1])[:, 1].tolist()) == joints
 
 
 class TestReversals:

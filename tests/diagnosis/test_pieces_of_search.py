@@ -12,6 +12,7 @@ from scores import score
 
 from armloop.diagnosis import search as searching
 from armloop.laws.effects import effect
+from armloop.laws.friction import FrictionLaw, FrictionTerm
 
 ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
@@ -65,6 +66,21 @@ class TestSearch:
         assert self.search([], monkeypatch) is None
         assert self.search([self.trial("barred", 600.0, 10.0)], monkeypatch) is None
 
+    def test_dry_friction_is_what_one_with_memory_may_be_where_the_joint_has_memory_in_the_model(
+        self,
+    ) -> None:
+        memory = (FrictionTerm("sign", 2.0), FrictionTerm("hysteresis", 1.0, 0.002))
+        search: Any = object.__new__(searching._Search)
+        search.evidence = SimpleNamespace(
+            model=SimpleNamespace(friction=FrictionLaw((memory, memory, memory[:1])))
+        )
+        best = effect("presliding_hysteresis", 2)
+        assert search._alike(effect("coulomb_friction", 2), best) == searching.MOST
+        others = (("coulomb_friction", 1), ("viscous_friction", 2), ("stribeck_friction", 2))
+        assert {search._alike(effect(*law), best) for law in others} == {searching.RIVAL_SHARE}
+        plain = effect("coulomb_friction", 3), effect("presliding_hysteresis", 3)
+        assert search._alike(*plain) == search._alike(best, plain[0]) == searching.RIVAL_SHARE
+
     def test_it_must_remove_a_part_of_what_could_be_explained_of_some_joint(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -111,6 +127,37 @@ class TestSearch:
         swaps = {"joint_spring": drag, "viscous_friction": offset, "torque_offset": spring}
         chosen(swaps, [spring, offset])
         assert len(asked) == 4
+
+    def test_what_is_not_clear_of_its_error_makes_way_for_what_it_stood_in_the_way_of(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Dry friction with memory, level and change of it alike, is not clear; the dry friction beside which it is, is."""
+
+        def found(name: str) -> Any:
+            return SimpleNamespace(effect=effect(name, 2), shape=0.0, share=1.0, rivals=[])
+
+        best_first = [found("presliding_hysteresis"), found("coulomb_friction")]
+        search: Any = object.__new__(searching._Search)
+        search.evidence, search.progress, search.barred = None, lambda text: None, ()
+        search.nothing = SimpleNamespace(fit=None, residual=None)
+
+        def best(beside: list[Any]) -> Any:
+            left = [f for f in best_first if f.effect.place not in search.barred]
+            return None if beside or not left else left[0]
+
+        def clear(evidence: Any, outcome: Any) -> Any:
+            return replace(outcome, found=[f for f in outcome.found if f.effect.name not in unclear])
+
+        search._best, search._pair, search._one_for_several = best, lambda beside: [], lambda found: found
+        monkeypatch.setattr(searching, "clear", clear)
+        monkeypatch.setattr(searching, "_known", lambda evidence, found: SimpleNamespace(fit=None))
+        unclear: set[str] = set()
+        assert search.outcome().found == best_first[:1]
+        unclear.add("presliding_hysteresis")
+        assert search.outcome().found == best_first[1:]
+        search.barred = ()
+        unclear.add("coulomb_friction")
+        assert search.outcome().found == []
 
 
 class TestOneForSeveral:
@@ -313,6 +360,26 @@ class TestOutcomes:
         assert kept({("bc", "all"): -1.0, ("ac", "all"): -2.0}, "a", "b", "c") == "ac"
         assert kept({("ac", "all"): 0.0, ("c", "ac"): -1.0}, "a", "b", "c") == "c"
         assert kept({("", "all"): -1.0}, "a") == ""
+
+    def test_a_law_that_goes_beside_one_that_holds_it_is_what_that_may_be(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(searching, "lead", lambda others, after: 0.0)
+        monkeypatch.setattr(
+            searching, "times_enough", lambda e, others, after: -1.0 if others == "bcde" else 1.0
+        )
+        laws = (("coulomb_friction", 2), ("presliding_hysteresis", 2), ("presliding_hysteresis", 1))
+        laws += (("viscous_friction", 2), ("torque_drift", 2))
+        found: Any = [
+            SimpleNamespace(effect=effect(*law), shape=name, share=0.9, rivals=[])
+            for law, name in zip(laws, "abcde", strict=True)
+        ]
+        nothing: Any = None
+        outcome = searching.Outcome(found, nothing, SimpleNamespace(score="all"), nothing)  # type: ignore[arg-type]
+        made = searching.useful(nothing, outcome)
+        assert [f.shape for f in made.found] == list("bcde")
+        assert [len(f.rivals) for f in made.found] == [1, 0, 0, 0]
+        assert [(e.place, share) for e, share in made.found[0].rivals] == [(found[0].effect.place, 0.9)]
 
     def test_an_effect_that_removes_less_than_what_is_left_where_it_acts(
         self, monkeypatch: pytest.MonkeyPatch

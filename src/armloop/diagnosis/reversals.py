@@ -9,7 +9,9 @@ So they are judged after the search, as a condition of their own. As no fit has 
 at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
 drives of an arm are alike: what is plain at one joint needs less at the others. What the model leaves at the reversals of
 its training logs, too, it has lacked all along; the rest has changed since. Of a joint that never turned round in them
-nothing is said: a program that goes from point to point may rest at each.
+nothing is said: a program that goes from point to point may rest at each. Nor of one whose friction has memory in
+the model, where the search found more dry friction: laws turn with the direction at once, but friction that rises keeps
+its memory, and what shows where the joint turns is that.
 """
 
 from __future__ import annotations
@@ -83,7 +85,7 @@ def judge_reversals(
     """
     samples = evidence.samples
     turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
-    turns &= ~_never_seen(evidence)
+    turns &= ~(_never_seen(evidence) | _remembering(evidence, outcome))
     own = evidence.only(evidence.rows | turns)
     judged = at_reversals(samples, turns, own.rows & kept)
     start = known = Known.of(own, outcome.after.effects, outcome.after.shapes)
@@ -120,6 +122,16 @@ def _never_seen(evidence: Evidence) -> NDArray[np.bool_]:
     """(n,) joints that turned round nowhere in the training logs: how the model errs there, nobody knows."""
     left = evidence.model.baseline.get("reversals")
     return np.array([x is None for x in left]) if left else np.zeros(evidence.rows.shape[1], dtype=bool)
+
+
+def _remembering(evidence: Evidence, outcome: Outcome) -> NDArray[np.bool_]:
+    """(n,) joints in which dry friction was found, and whose friction has memory in the model: so has what was added."""
+    remembering, friction = np.zeros(evidence.rows.shape[1], dtype=bool), evidence.model.friction
+    for one in outcome.added():
+        law = one.placed() if one.effect.rubs else None
+        if law is not None and any(t.element.dry and t.element.way != "memory" for t in law.terms):
+            remembering[law.along.joint] = friction.remembers(law.along.joint)
+    return remembering
 
 
 def _joints(effect: Effect) -> set[int]:

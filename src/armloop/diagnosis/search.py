@@ -15,6 +15,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     CHANCE,
+    MOST,
     MULTIPLE,
     SIGNIFICANCE,
     enough,
@@ -143,7 +144,14 @@ class _Search:
             if places in seen:
                 break
             seen.add(places)
-        return clear(self.evidence, Outcome(found, self.nothing.fit, known.fit, self.nothing.residual))
+        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, known.fit, self.nothing.residual))
+        unclear = [f.effect for f in found if f not in outcome.found]
+        if not unclear:
+            return outcome
+        # What is not clear may have stood in the way of a simpler law that is: columns nearly alike share one torque.
+        self.progress(f"not clear of its error: {', '.join(e.label() for e in unclear)}; searching without")
+        self.barred = [*self.barred, *(effect.place for effect in unclear)]
+        return self.outcome()
 
     def _best(self, beside: Sequence[Found]) -> Found | None:
         """The simplest of the best further effects, with its rivals; None where none is worth it."""
@@ -186,8 +194,9 @@ class _Search:
         if key not in self._beside:
             known = _known(self.evidence, beside) if beside else self.nothing
             trials = self.panel.tried(known, paced(self.progress))
-            self._beside[key] = known.fit.score, [t for t in trials if t.effect.place not in self.barred]
-        return self._beside[key]
+            self._beside[key] = known.fit.score, trials
+        current, trials = self._beside[key]
+        return current, [t for t in trials if t.effect.place not in self.barred]
 
     def _found(self, current: Score, trials: Sequence[Tried]) -> Found:
         """The simplest of the best of some trials, with its rivals."""
@@ -196,9 +205,19 @@ class _Search:
         rivals = [
             (trial.effect, gain(current, trial.score) / whole)
             for trial in trials
-            if trial is not best and gain(current, trial.score) >= RIVAL_SHARE * most
+            if trial is not best
+            and gain(current, trial.score) >= self._alike(trial.effect, best.effect) * most
         ]
         return Found(best.effect, best.shape, min(most / whole, 1.0), rivals)
+
+    def _alike(self, effect: Effect, best: Effect) -> float:
+        """The part of what the best removes from which another is its alternative.
+
+        Dry friction that rises in a joint whose friction has memory in the model has it, too, which its law lacks.
+        """
+        if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
+            return RIVAL_SHARE
+        return MOST if self.evidence.model.friction.remembers(best.joint - 1) else RIVAL_SHARE
 
     def _is_much(self, current: Score, trial: Score) -> bool:
         """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""
@@ -256,12 +275,25 @@ def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
 
 
 def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
-    """The outcome without effects that, beside the others, remove no held-out error; the worst first."""
+    """The outcome without effects that, beside the others, remove no held-out error; the worst first.
+
+    One that is nested in another that stays, as dry friction is in one with memory, is what that may be, too.
+    """
     given = strengths(evidence, outcome)
     worst = min(range(len(given)), key=lambda k: given[k].times, default=None)
     if worst is None or given[worst].times > 0:
         return outcome
-    return useful(evidence, without_effect(evidence, outcome, outcome.found[worst]))
+    dropped = outcome.found[worst]
+    for other in outcome.found:
+        if other is not dropped and _nested(dropped.effect, other.effect):
+            other.rivals.append((dropped.effect, dropped.share))
+    return useful(evidence, without_effect(evidence, outcome, dropped))
+
+
+def _nested(effect: Effect, law: Effect) -> bool:
+    """Whether all elements of an effect are among those of a law of the same joints."""
+    own, others = (getattr(each, "elements", ()) for each in (effect, law))
+    return bool(own) and effect.place[1:] == law.place[1:] and all(element in others for element in own)
 
 
 def outweighed(

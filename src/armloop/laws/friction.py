@@ -90,6 +90,12 @@ class Element:
             early, late = (self.value(Sliding(*_SOMEWHERE, t), 0.9, NUMPY) for t in (0.5, 1.5))
         return not np.array_equal(early, late, equal_nan=True)
 
+    @property
+    def dry(self) -> bool:
+        """Whether it turns with the direction of sliding."""
+        back, forth = (self.value(Sliding(*_SOMEWHERE[:2], sign, 1.0), 0.9, NUMPY) for sign in (-1.0, 1.0))
+        return bool(back != forth)
+
 
 class Acting(NamedTuple):
     """An element with its coefficient and parameter."""
@@ -283,6 +289,10 @@ class FrictionLaw:
                 if term.step <= step:
                     tau[:, j] += term.coefficient * term.column(motion, j, load)
         return tau
+
+    def remembers(self, joint: int) -> bool:
+        """Whether the friction of a joint (0-based) has memory."""
+        return any(term.element.way == "memory" for term in self.terms[joint])
 
     def stribeck_parameters(self, joint: int) -> dict[str, float]:
         """f_s, f_c, f_v, v_s of Eq. (34) for a joint (0-based), where the law has that form."""

@@ -299,7 +299,7 @@ class ReconstructedModel:
 
     def legend(self) -> list[str]:
         """What symbols in the formulas stand for, an entry each; empty where they speak for themselves."""
-        remembers = any(term.element.way == "memory" for terms in self.friction.terms for term in terms)
+        remembers = any(self.friction.remembers(j) for j in range(len(self.friction.terms)))
         return [line for component in self.components for line in component.legend()] + [_STOP] * remembers
 
     def save(self, path: str | Path) -> None:

@@ -31,6 +31,7 @@ from armloop.laws.effects import (
 )
 from armloop.laws.effects.base import entry, fill, std_errors
 from armloop.laws.effects.found import RANGE
+from armloop.laws.friction import KINDS
 from armloop.robot.arm import load_arm
 from armloop.util.errors import InputError, ModelError
 
@@ -337,3 +338,9 @@ def test_what_is_not_said_of_a_load_or_of_friction_with_memory_is_nothing() -> N
         given: Any = Context(an_arm(), motion)
         assert_allclose(torque(given, said), torque(given, {**said, left_out: 0.0}))
         assert EFFECTS[name].parameters[-1].default == 0.0
+
+
+def test_friction_is_dry_that_turns_with_the_direction_whatever_the_speed() -> None:
+    dry = {kind for kind, element in KINDS.items() if element.dry}
+    assert {"sign", "smooth_sign", "stribeck_peak", "load_sign", "fading_sign", "hysteresis"} <= dry
+    assert not dry & {"viscous", "quadratic", "cubic", "root", "offset", "both_ways", "viscous_forward"}
