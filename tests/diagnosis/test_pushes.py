@@ -29,6 +29,7 @@ class TestChoice:
         joints: int = 7,
         own: float = 0.9,
         shown: Any = (0, 1),
+        tool: float = 0.1,
     ) -> tuple[str, list[tuple[str, int | None, float]]] | None:
         asked: list[str] = []
         weights: list[Any] = []
@@ -44,13 +45,17 @@ class TestChoice:
 
         monkeypatch.setattr(pushes, "_trial", trial)
         monkeypatch.setattr(pushes, "_somewhere", lambda found, points: found)
+        X_tool = np.eye(4)
+        X_tool[2, 3] = tool
         evidence: Any = SimpleNamespace(
-            model=SimpleNamespace(arm=SimpleNamespace(n=joints)), scale=np.array([0.5, 4.0])
+            model=SimpleNamespace(arm=SimpleNamespace(n=joints, X_tool=X_tool)), scale=np.array([0.5, 4.0])
         )
         nothing: Any = None
         counted = np.array([[True, True], [True, False]])
         found = pushes.push(evidence, nothing, slice(0, 2), counted, list(shown))
-        links = [f"f{link}" for link in range(joints - 1, 2, -1)]
+        links = [f"f{link}" for link in range(joints - 1 if tool else joints, 2, -1)]
+        if not tool and joints < 3:
+            links = [f"f{joints}"]
         first = [*(f"t{j + 1}" for j in shown), "f0", *links]
         # where a force may act besides, only its error asks
         forceful = found is not None and found.added.name[0] == "f"  # type: ignore[attr-defined]
@@ -79,6 +84,12 @@ class TestChoice:
         assert self.pushed(monkeypatch, {"f0": 0.86, "f5": 0.9}) == ("f0", [])
         assert self.pushed(monkeypatch, {"f0": 0.5, "f4": 0.88, "f5": 0.9}) == ("f5", [])
         assert self.pushed(monkeypatch, {"t1": 0.88, "t2": 0.9}) == ("t2", [("external_torque", 1, 0.88)])
+
+    def test_where_no_tool_is_known_it_may_be_on_the_last_link(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        assert self.pushed(monkeypatch, {"t1": 0.6, "f0": 0.4, "f3": 0.9}, 3, tool=0.0) == ("f3", [])
+        assert self.pushed(monkeypatch, {"t1": 0.6, "f2": 0.9}, 2, tool=0.0) == ("f2", [])
+        # where it explains no more than one at the last joint's place, that is named
+        assert self.pushed(monkeypatch, {"f0": 0.86, "f4": 0.9}, 4, tool=0.0) == ("f0", [])
 
     def test_it_must_explain_half_of_the_joints_that_showed_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.pushed(monkeypatch, {"f0": 0.9}, own=0.5) == ("f0", [])

@@ -6,7 +6,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from armloop.robot.arm import load_arm
-from armloop.robot.kinematics import nominal_parameters, regressor
+from armloop.robot.kinematics import nominal_parameters, regressor, tool_jacobian
 from armloop.robot.newton_euler import joint_torques
 
 ODD_ARM = """<robot name="odd">
@@ -80,3 +80,18 @@ def test_samples_are_carried_along_the_chain_each_by_itself():
     np.testing.assert_allclose(
         tau, joint_torques(arm, nominal_parameters(arm), q, v, vdot), atol=1e-12 * np.abs(tau).max()
     )
+
+
+def test_the_far_end_of_a_last_link_without_a_tool_is_as_far_beyond_its_centre_as_the_joint_is_before_it(
+    odd_arm,
+):
+    """A weight at its middle loads the joints as the link's own mass and first moment do."""
+    arm = load_arm(str(odd_arm))
+    q = np.random.default_rng(2).normal(size=(5, arm.n))
+    static = regressor(arm, q, 0 * q, 0 * q, np.array([3.0, -4.0, 5.0]), links=[arm.n - 1])
+    weight = static[..., :4] @ [1.0, *arm.com[-1]]
+    middle = -np.array([3.0, -4.0, 5.0]) @ tool_jacobian(arm, q, arm.n - 0.5)
+    np.testing.assert_allclose(middle, weight, atol=1e-12)
+    root, far = (tool_jacobian(arm, q, link) for link in (None, arm.n))
+    np.testing.assert_allclose(far - root, 2 * (tool_jacobian(arm, q, arm.n - 0.5) - root), atol=1e-12)
+    assert np.abs(root[..., -1]).max() < 1e-12 < np.abs(far[..., -1]).min()

@@ -92,7 +92,9 @@ def push(
     weight = counted / evidence.scale
     kinds = [_Kind(effect("external_torque", j + 1)) for j in shown]
     # Two or three joints cannot tell a force on a link from one on the tool, or from torques on the joints before it.
-    kinds += [_Kind(effect("external_contact", None), link) for link in (0, *range(n - 1, 2, -1))]
+    # Where no tool is known, its place is an axis: the last joint feels only what pushes the last link elsewhere.
+    last = () if evidence.model.arm.X_tool[:3, 3].any() else (n,)
+    kinds += [_Kind(effect("external_contact", None), link) for link in (0, *last, *range(n - 1, 2, -1))]
     tried = [
         (trial, kind)
         for kind in kinds

@@ -163,9 +163,12 @@ def tool_jacobian(arm: Arm, q: Array, link: float | None = None) -> Array:
 
     Args:
         link: of the far end of this link (from 1) instead: where the next joint sits, which with all joints beyond
-            does not move the point. Of a point between a link's ends with a fraction: 2.5 is the middle of link 3.
+            does not move the point; of the last link the tool, and where there is none, as far beyond the centre of
+            mass as the joint is before it, as of a rod. Of a point between a link's ends with a fraction: 2.5 is the
+            middle of link 3.
     """
     N, n = q.shape
+    end = arm.X_tool[:3, 3] if link is None or arm.X_tool[:3, 3].any() else 2 * arm.com[n - 1]
     link = n if link is None else link
     last = int(np.ceil(link))
     R, p = np.broadcast_to(np.eye(3), (N, 3, 3)), np.zeros((N, 3))
@@ -181,7 +184,7 @@ def tool_jacobian(arm: Arm, q: Array, link: float | None = None) -> Array:
             p = p + q[:, i : i + 1] * axes[i]
         if last == i + 1:
             break
-    tip = p + (link - last + 1) * (R @ (arm.X_tool if last == n else arm.X_PF[last])[:3, 3])
+    tip = p + (link - last + 1) * (R @ (end if last == n else arm.X_PF[last, :3, 3]))
     turning = np.asarray(arm.revolute)[:, None, None]
     J = np.moveaxis(np.where(turning, np.cross(axes, tip - origins), axes), 0, 2)
     J[:, :, last:] = 0.0
