@@ -129,6 +129,9 @@ def test_how_the_joints_followed_fits_a_terminal() -> None:
     text = str(metrics_table({"pid": result, "computed_torque": result, "pid_step3": measured}))
     assert max(map(len, text.splitlines())) <= 80
     assert "joint 2 [mm]" in text and "12.5" in text  # a share in percent, as the header says
+    assert "[N·m, N]" in text
+    turning = str(metrics_table({"pid": SimpleNamespace(**{**vars(result), "unit": ("deg", "deg")})}))
+    assert "[N·m]" in turning and "[N·m, N]" not in turning
 
 
 def test_of_the_joints_samples_a_step_has_the_least_and_the_most() -> None:

@@ -71,6 +71,8 @@ def metrics_table(results: Mapping[str, TrackingResult]) -> Table:
                 ]
             )
             rows.append(row)
-    errors = ["RMS error", "largest error", "RMS torque [N·m, N]", "clipped [%]"]
+    turning = {unit == "deg" for result in results.values() for unit in result.unit}
+    units = ", ".join("N·m" if turns else "N" for turns in sorted(turning, reverse=True))
+    errors = ["RMS error", "largest error", f"RMS torque [{units}]", "clipped [%]"]
     after = ["stuck [s]", "settled after [s]", "not settled [%]"]
     return make_table(["controller", *errors, *after], rows, "How the joints followed")
