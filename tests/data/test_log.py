@@ -233,7 +233,7 @@ def test_a_missing_file_a_folder_and_an_unknown_suffix_are_named(tmp_path: Path)
     for name, expected in (
         ("none.csv", "no such file"),
         ("none.parquet", "no such file"),
-        ("folder.csv", "not a file"),
+        ("folder.csv", "is a folder"),
         ("run.xlsx", r"unknown suffix '.xlsx'; a motion log ends in .csv or .parquet"),
         ("run", r"unknown suffix ''"),
     ):
