@@ -16,7 +16,7 @@ from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
-from armloop.diagnosis.innovations import at_rest, innovations
+from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import outlying
@@ -24,7 +24,7 @@ from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import TINY, Array, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
@@ -80,6 +80,9 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     known = known_contacts(evidence)
     if evidence.rows.any():
         innovation, rest = innovations(evidence, residual, found)
+        held = (
+            np.abs(innovation) * deviations(evidence, residual) / np.maximum(dry_level(evidence, found), TINY)
+        )
         far = far_outside(motion, evidence.model.history.get("range"))
         tells = innovation != 0.0
         rows, new = novelty(evidence, innovation, rest)
@@ -90,7 +93,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
             burst
             for burst in bursts
             if not _comes_back(evidence, rows, level, burst)
-            and not _sticks(evidence, burst)
+            and not _sticks(evidence, burst, held)
             and not _strays(far, burst)
         ]
         bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
@@ -99,7 +102,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
             if (
                 not any(_meet(motion, burst, other) for other in bursts)
                 and not _comes_back(evidence, rows, pulse.level[rows], burst)
-                and not _sticks(evidence, burst)
+                and not _sticks(evidence, burst, held)
             ):
                 bursts.append(burst)
     else:
@@ -156,14 +159,18 @@ def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: 
     return kept
 
 
-def _sticks(evidence: Evidence, burst: Burst) -> bool:
-    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that."""
+def _sticks(evidence: Evidence, burst: Burst, held: Array) -> bool:
+    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that.
+
+    Args:
+        held: (N, n) what is left beyond the dry friction that the model knows, in parts of that; as much again may be held.
+    """
     motion = evidence.samples.motion
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
     slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > 0.5
-    return bool(slides.any() and not slides[j])
+    return bool(slides.any() and not slides[j] and held[burst.rows, j].mean() <= 1.0)
 
 
 def _strays(far: Mask, burst: Burst) -> bool:
