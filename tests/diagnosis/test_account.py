@@ -44,10 +44,10 @@ def test_a_joint_that_rested_so_long_ago_is_recorded_at_rest() -> None:
     motion = Motion(time, *np.zeros((3, 20, 1)), np.array([0, 10]))
     moving = np.ones((20, 1), dtype=bool)
     moving[4] = moving[10] = False
-    slid = accounts.slid_then(motion, moving, 0.15)
+    slid = accounts.slid_since(motion, moving, 0.15)
     # between two samples of which one is at rest it may have been; before a run it was as at its beginning
-    assert np.flatnonzero(~slid[:, 0]).tolist() == [5, 6, 10, 11, 12]
-    assert np.flatnonzero(~accounts.slid_then(motion, moving, 0.0)[:, 0]).tolist() == [4, 10]
+    assert np.flatnonzero(~slid[:, 0]).tolist() == [4, 5, 6, 10, 11, 12]
+    assert np.flatnonzero(~accounts.slid_since(motion, moving, 0.0)[:, 0]).tolist() == [4, 10]
 
 
 def test_a_joint_that_is_recorded_at_rest_tells_nothing_there() -> None:
@@ -103,16 +103,25 @@ def test_delays_add_up() -> None:
     assert accounts._delay(outcome(effect("time_delay", 0.25), effect("time_delay", 0.5))) == 0.75
 
 
-@pytest.mark.parametrize(("late", "known", "searches"), [(0.0, False, 1), (0.3, False, 2), (0.3, True, 1)])
-def test_the_search_is_made_anew_once_if_the_torque_is_late(
-    late: float, known: bool, searches: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("late", "known", "reach"),
+    [
+        ([0.0], False, 0.0),
+        ([0.3, 1.2], False, 1.2),
+        ([-0.3, -0.4], False, -1.2),
+        ([0.3, 1.3, 1.4], False, 5.2),  # longer than what had been left out
+        ([0.3], True, 0.0),
+    ],
+)
+def test_the_search_is_made_anew_while_the_torque_is_later_than_was_left_out(
+    late: list[float], known: bool, reach: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[Any] = []
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: (whole, len(contacts)))
     monkeypatch.setattr(
         accounts, "search", lambda evidence, progress, panel: made.append(evidence) or len(made)
     )
-    monkeypatch.setattr(accounts, "_delay", lambda outcome: late)
+    monkeypatch.setattr(accounts, "_delay", lambda outcome: late[outcome - 1])
     monkeypatch.setattr(accounts, "_resting_late", lambda whole, seconds: ("later", seconds))
     monkeypatch.setattr(
         accounts, "find_law", lambda evidence, outcome, progress: (f"law of {evidence}", outcome)
@@ -122,7 +131,7 @@ def test_the_search_is_made_anew_once_if_the_torque_is_late(
     whole: Any = SimpleNamespace(unknown="known" if known else None)
     contact: Any = "contact"
     found = Account.of(whole, [contact], lambda text: None)
-    final = ("later", 0.3) if searches == 2 else whole
+    searches, final = len(late), ("later", reach) if reach else whole
     assert found.whole == final and found.outcome == searches and made[-1] == (final, 1)  # type: ignore[comparison-overlap]
     assert found.unlisted == f"law of {(final, 1)}" and len(made) == searches  # type: ignore[comparison-overlap]
     assert asked == [searches]

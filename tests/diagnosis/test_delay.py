@@ -6,7 +6,7 @@ from synthetic import measured, rigid_torque, three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import diagnose
-from armloop.diagnosis.account import slid_then
+from armloop.diagnosis.account import slid_since
 from armloop.laws.effects import effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import ReconstructedModel
@@ -53,7 +53,7 @@ def test_a_delay_is_found_alone_beside_joints_that_rest(seed: int, monkeypatch: 
     assert seconds.value == pytest.approx(DELAY, abs=max(4 * seconds.std_error, 0.01 * DELAY))
 
 
-@pytest.mark.parametrize(("seconds", "first"), [(0.2, 5), (-0.2, 1)])
+@pytest.mark.parametrize(("seconds", "first"), [(0.2, 3), (-0.2, 1)])
 def test_what_was_recorded_late_of_a_rest_is_left_out(seconds: float, first: int) -> None:
     """Ten samples a second; the joint rests in the fourth and the fifth, in another run never."""
     time = np.concatenate([0.1 * np.arange(10), 0.1 * np.arange(10)])
@@ -61,5 +61,5 @@ def test_what_was_recorded_late_of_a_rest_is_left_out(seconds: float, first: int
     moving = np.ones((20, 1), dtype=bool)
     moving[[3, 4]] = False
     expected = np.ones((20, 1), dtype=bool)
-    expected[first : first + 2] = False
-    assert (slid_then(motion, moving, seconds) == expected).all()
+    expected[first : first + 4] = False
+    assert (slid_since(motion, moving, seconds) == expected).all()

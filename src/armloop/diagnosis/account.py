@@ -21,6 +21,9 @@ from armloop.util.progress import Progress
 #: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
 EXPLAINS = 0.8
 
+#: What may have been recorded of a rest is left out for so many times the delay found: it may be longer than it looks.
+_AHEAD = 4.0
+
 
 @dataclass(frozen=True, eq=False)
 class Account:
@@ -47,10 +50,12 @@ class Account:
         """Search a run in which these contacts are taken for granted."""
         evidence = without(whole, contacts)
         outcome = search(evidence, progress, panel)
-        late = _delay(outcome)
-        if late and whole.unknown is None:
+        given, reach = whole, 0.0
+        # Torques of joints at rest, recorded among those of joints that slide, make a delay look shorter than it is.
+        while given.unknown is None and abs(_delay(outcome)) > abs(reach):
+            reach = _AHEAD * _delay(outcome)
             progress("what was recorded late of joints at rest is left out, and the search made anew")
-            whole = _resting_late(whole, late)
+            whole = _resting_late(given, reach)
             evidence = without(whole, contacts)
             outcome = search(evidence, progress, panel)
         unlisted, kept = find_law(evidence, outcome, progress)
@@ -145,23 +150,26 @@ class Account:
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), TINY)
 
 
-def slid_then(motion: Motion, moving: Mask, seconds: float) -> Mask:
-    """(N, n) samples whose torque, recorded so many seconds late, is that of a joint that slid.
+def slid_since(motion: Motion, moving: Mask, seconds: float) -> Mask:
+    """(N, n) samples in which a joint slides, and has slid for so many seconds; negative: will for so many more.
 
-    A joint's torque while it rests is not determined by its motion; a delay brings it into the samples that follow.
+    A joint's torque while it rests is not determined by its motion; a delay of up to so many seconds brings it into samples
+    that follow. Before a run it was as at its beginning.
     """
+    way = -1 if seconds < 0 else 1
     slid = np.zeros_like(moving)
     for run in motion.runs():
-        time = motion.time[run]
-        for j, mine in enumerate(moving[run].T):
-            slid[run, j] = np.interp(time - seconds, time, mine.astype(float)) >= 1.0
+        time, mine = way * motion.time[run][::way], moving[run][::way]
+        begins = mine & ~np.vstack([mine[:1], mine[:-1]])
+        since = np.maximum.accumulate(np.where(begins, time[:, None], -np.inf), axis=0)
+        slid[run] = (mine & (time[:, None] - abs(seconds) >= since))[::way]
     return slid
 
 
 def _resting_late(evidence: Evidence, seconds: float) -> Evidence:
     """The run in which a joint rests for as long as its rest is recorded, too, and its torque there says nothing."""
     samples = evidence.samples
-    slid = samples.moving & slid_then(samples.motion, samples.moving, seconds)
+    slid = slid_since(samples.motion, samples.moving, seconds)
     return replace(evidence, samples=replace(samples, moving=slid), rows=evidence.rows & slid, unknown=~slid)
 
 
