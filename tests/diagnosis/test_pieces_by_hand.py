@@ -251,7 +251,7 @@ class TestContrast:
         assert contrast._widths(samples, 2.0) == (16, 4)
 
     def test_as_many_are_events_as_stand_out_most(self) -> None:
-        least, clear = contrast._LEAST, contrast._CLEAR
+        least, clear = judgement.MULTIPLE, contrast._CLEAR
         low = least
         middle, high = 2.0 * clear * low, 1.5 * clear * 2.0 * clear * low
         assert contrast._clear([high, middle, low], [True, True, False]) == (pytest.approx(2.0 * clear), 2)

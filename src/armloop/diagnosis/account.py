@@ -9,17 +9,14 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.judgement import CHANCE, MOST, MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE, gain, lead
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
-from armloop.diagnosis.unlisted import FAR_LESS, Unlisted, find_law
+from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects.found import RANGE
 from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
-
-#: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
-EXPLAINS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +79,7 @@ class Account:
         mine, others = self.score(evidence.rows), other.score(evidence.rows)
         if self.unlisted is not None:
             return other if lead(others, mine) <= CHANCE else self
-        least = FAR_LESS * float((mine.energy - mine.rows).sum())
+        least = MOSTLY * float((mine.energy - mine.rows).sum())
         return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
 
     def _least_explained(self) -> int:
@@ -203,7 +200,8 @@ def best_account(
         return account
     if contacts:
         plain = Account.of(whole, [], progress, panel)
-    enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
+    # nearly all of the bursts, or as much as the contacts explain
+    enough = min(NEARLY_ALL, max(contact.share for contact in account.contacts))
     # A law of which these are the bursts; a residual without a law explains none of them.
     law = plain.unlisted if plain.unlisted is not None and plain.unlisted.parameters else None
     same = law is not None and account.unlisted is not None and account.unlisted.joint == law.joint

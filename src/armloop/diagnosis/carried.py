@@ -18,11 +18,10 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MULTIPLE, gain, leaves_more, soaked
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, gain, leaves_more, soaked
 from armloop.diagnosis.reasons import too_still
 from armloop.diagnosis.search import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
-from armloop.diagnosis.unlisted import FAR_LESS
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
 from armloop.model import AddedEffect
@@ -64,7 +63,7 @@ def account_with_load(
     left = account.left(account.remaining()) - float(account.whole.rows.sum())
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
     score = _with(plain, load, account).fit.score
-    if score.error - float(score.rows.sum()) > (1 - FAR_LESS) * left:
+    if score.error - float(score.rows.sum()) > (1 - MOSTLY) * left:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(_TURNS):
@@ -79,7 +78,7 @@ def account_with_load(
         other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
-    if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - FAR_LESS) * left:
+    if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - MOSTLY) * left:
         return None
     evidence = whole.only(other.evidence.rows)
     nothing, alone = Known.of(evidence), Known.of(evidence, [load], [_shape(load)])

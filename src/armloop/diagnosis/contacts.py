@@ -17,9 +17,9 @@ from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import at_rest, innovations
-from armloop.diagnosis.judgement import MULTIPLE
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
-from armloop.diagnosis.outliers import outlying
+from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
@@ -28,8 +28,6 @@ from armloop.util.arrays import Array, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
-#: At one of its joints it exceeds the most of the rest of the run so many times: a model that errs much errs often.
-_STANDS_OUT = 1.5
 #: It lasts while the novelty is above this part of its peak, and this long at least, s.
 _EDGE, _SHORTEST = 0.25, 0.1
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
@@ -151,7 +149,7 @@ def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: 
     for burst in bursts:
         inside = (rows >= burst.rows.start) & (rows < burst.rows.stop)
         peak = level[inside].max(axis=0, initial=0.0)
-        if any(peak[j] >= _STANDS_OUT * rest[j] for j in burst.joints):
+        if any(peak[j] >= STANDS_OUT * rest[j] for j in burst.joints):
             kept.append(burst)
     return kept
 
@@ -162,13 +160,13 @@ def _sticks(evidence: Evidence, burst: Burst) -> bool:
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
-    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > 0.5
+    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
     return bool(slides.any() and not slides[j])
 
 
 def _strays(far: Mask, burst: Burst) -> bool:
     """Whether the joints that show a burst are, for most of it, where the model was not trained: nothing is judged there."""
-    return bool(far[burst.rows, sorted(burst.joints)].mean() > 0.5)
+    return bool(far[burst.rows, sorted(burst.joints)].mean() > MOSTLY)
 
 
 def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
@@ -198,7 +196,7 @@ def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst:
     passages: list[NDArray[np.intp]] = (
         np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
     )
-    high = 0.5 * float(level[peak, joints].max())
+    high = MOSTLY * float(level[peak, joints].max())
     there = [float(level[np.ix_(passage, joints)].max()) > high for passage in passages]
     return len(there) > 0 and 2 * sum(there) > len(there)
 
@@ -216,7 +214,7 @@ def _together(bursts: list[list[slice]]) -> list[Burst]:
         for rows in own:
             for k, other in enumerate(found):
                 common = min(rows.stop, other.rows.stop) - max(rows.start, other.rows.start)
-                if common >= 0.5 * min(rows.stop - rows.start, other.rows.stop - other.rows.start):
+                if common >= MOSTLY * min(rows.stop - rows.start, other.rows.stop - other.rows.start):
                     both = slice(min(rows.start, other.rows.start), max(rows.stop, other.rows.stop))
                     found[k] = Burst(both, other.joints | {j})
                     break

@@ -31,6 +31,8 @@ BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
 FOLDS = 2
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
+#: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
+STILL = 0.01
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
 #: Places of a joint (low, middle, high), and speeds (back, slow, forth), that make the cells of its motion.
@@ -222,7 +224,7 @@ class Evidence:
 def creep(model: ReconstructedModel) -> Array:
     """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
     ranges = model.history.get("range")
-    return 0.01 * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
+    return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
 
 
 def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:

@@ -21,7 +21,8 @@ from armloop.util.arrays import TINY
 
 Array = NDArray[np.float64]
 
-_REFINEMENTS = 3
+#: Coefficients and a nonlinear parameter are found in turn so many times more.
+REFINEMENTS = 3
 _RIDGE = 1e-8
 
 
@@ -145,7 +146,7 @@ def _solved(
         The rows, coefficients, free parameters per effect, derivative, and the refined nonlinear parameters.
     """
     values, effects, evidence = list(values), problem.effects, problem.evidence
-    for attempt in range(_REFINEMENTS + 1):
+    for attempt in range(REFINEMENTS + 1):
         stacked, sizes = problem.rows(values)
         rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
         beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
@@ -153,7 +154,7 @@ def _solved(
             _bounded(e, evidence, e.refined(free, value))
             for e, free, value in zip(effects, x, values, strict=True)
         ]
-        if attempt == _REFINEMENTS or np.allclose(better, values, rtol=1e-3):
+        if attempt == REFINEMENTS or np.allclose(better, values, rtol=1e-3):
             break
         values = better
     return stacked, beta, x, J, values

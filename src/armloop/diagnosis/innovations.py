@@ -19,7 +19,7 @@ from armloop.data.creep import CREEPING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import NEARLY
+from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array
@@ -29,9 +29,9 @@ from armloop.util.errors import ModelError
 WINDOW = 0.2
 #: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
 CREEP = 0.01
-#: Dry friction of a joint that creeps is known but for so many times what the model leaves there on its training logs, at
-#: most, and where nobody knows that, but for this part …
-_MARGIN, _UNSURE = 3.0, 0.8
+#: Dry friction of a joint that creeps is known but for what may, by chance, be left there as on the model's training
+#: logs, at most, and where nobody knows that, but for this part …
+_UNSURE = 0.8
 #: … and at rest it can hold this many times its sliding level.
 _STICTION = 1.2
 #: Torque and motion of one sample may be apart by this part of a sample period.
@@ -62,7 +62,7 @@ def innovations(
     ranges = model.history.get("range")
     slow = CREEPING * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
-    creeping = np.minimum(_MARGIN * np.array(left) + more, _UNSURE * dry)
+    creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)

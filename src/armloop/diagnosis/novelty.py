@@ -20,7 +20,7 @@ _STEP = 0.04
 #: Like motion is sought so many seconds away at least, and counts once within so many …
 _APART, _VISIT = 1.0, 0.5
 #: … at so many occasions at most, within a spread of the motion, among so many of the nearest samples.
-_OCCASIONS, _NEAREST, _LIKE = 15, 300, 1.0
+_OCCASIONS, _NEAREST = 15, 300
 #: The baseline, on which a model errs by nothing on average, counts for so many occasions more: of a short run the few
 #: that there are may be other events.
 _BASELINE = 5
@@ -56,7 +56,7 @@ def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> t
         far, near = cKDTree(features).query(features, k=list(range(1, min(len(rows), _NEAREST) + 1)))
         away = np.abs(seconds[near] - seconds[:, None]) > _APART
         first = _first_of_each(np.where(away, visit[near], -1)) & away
-        first &= far <= _LIKE
+        first &= far <= 1.0
         chosen = first & (np.cumsum(first, axis=1) <= _OCCASIONS)
         value, baseline = mean[rows, j], np.zeros((len(rows), _BASELINE))
         middle, spread = _middle(np.column_stack([baseline, np.where(chosen, value[near], np.nan)]))

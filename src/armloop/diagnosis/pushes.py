@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import enough, leaves_more
+from armloop.diagnosis.fit import REFINEMENTS
+from armloop.diagnosis.judgement import MOSTLY, enough, leaves_more
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
@@ -19,11 +20,8 @@ from armloop.util.arrays import Array, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
-#: Interval and size are found in turn so many times.
-_REFINEMENTS = 3
-#: What was there must explain this part of the event's energy …
-_EXPLAINED = 0.5
-#: … and a torque on one joint, or a force on the tool, is it if nothing with more freedom explains so much more.
+#: What was there must explain most of the event's energy, and a torque on one joint, or a force on the tool, is it if
+#: nothing with more freedom explains so much more.
 _MORE = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 _FEW = 3
@@ -102,7 +100,7 @@ def push(
     ]
     # What explains the joints that show an event is none of it if others would have had to show it, and do not.
     agreed = [(trial, kind) for trial, kind in tried if not trial.contradicted]
-    tried = agreed if any(trial.own >= _EXPLAINED for trial, _ in agreed) else tried
+    tried = agreed if any(trial.own >= MOSTLY for trial, _ in agreed) else tried
     if not tried:
         return None
     most = max(trial.share for trial, _ in tried)
@@ -116,7 +114,7 @@ def push(
         return unlikely, kind.effect.complexity, bool(kind.link), -trial.share
 
     best, chosen = min(equals, key=order)
-    if best.own < _EXPLAINED:
+    if best.own < MOSTLY:
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
     rivals.pop(chosen.effect.place, None)
@@ -141,7 +139,7 @@ def _trial(
     evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind, shown: list[int]
 ) -> Contact | None:
     motion = evidence.samples.motion
-    for _ in range(_REFINEMENTS):
+    for _ in range(REFINEMENTS):
         burst = _interval(evidence, residual, weight, burst, kind)
     part, columns, y = _burst(evidence, residual, weight, burst, kind)
     # Every other piece of a tenth of a second, of those that tell of it, is held out in turn.

@@ -20,35 +20,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.stats import norm, t
 
 from armloop.data.blocks import block_sums
 from armloop.data.reversals import at_reversals, turning
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.search import Found, Outcome, clear
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, SIGNIFICANCE
+from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
 
-#: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
-#: found at another joint, this part …
-PLAIN, LIKELY = 0.75, 0.5
+#: An effect must remove this part of a joint's squared error at reversals, so that it was a multiple of what remains;
+#: where the effect was found at another joint, most of it …
+PLAIN = 1 - 1 / MULTIPLE**2
 #: … which must be at least this part of the joint's torque, both root mean square …
 NOTICEABLE = 0.03
-#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors): in
+#: … and the log ratio of the errors in the blocks must be positive with the chance of error of a normal variable: in
 #: ratios, so that no fast reversal outweighs the others, of errors beside the least noticeable one, so that none does
 #: at which there is nothing to remove; by Student's t, for they may be few.
-_CHANCE = 0.00135
+_CHANCE = float(norm.sf(SIGNIFICANCE))
 #: A simpler effect that leaves no more of the squared error than this part of it is as good.
 ALIKE = 0.1
-#: Effects that explain this much of what the chosen one explains are its alternatives.
-RIVAL_SHARE = 0.94
-#: It was there all along if the training logs show this part of it: from run to run reversals differ.
-MOSTLY = 0.5
 #: Fewest blocks with a reversal of a joint that tell anything of it.
 _FEWEST = 4
 
@@ -247,7 +244,7 @@ class _Gains:
         return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
 
     def _least(self, effect: Effect) -> float:
-        return LIKELY if effect.name in self.found else PLAIN
+        return MOSTLY if effect.name in self.found else PLAIN
 
     def best(self) -> Found | None:
         """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
-from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, gain, lead
+from armloop.diagnosis.judgement import CHANCE, MOSTLY, MULTIPLE, SIGNIFICANCE, enough, gain, lead
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, pruned, without_effects_at
 from armloop.diagnosis.trials import Known
@@ -33,16 +33,15 @@ from armloop.util.progress import Progress
 Array = NDArray[np.float64]
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
-#: it is this many times what the model leaves on the worst tenth of its baseline, even without the blocks that show most
-#: of it: one or two are an event of the run, no law.
-EXCESS, EVENTS = 2.0, 2
+#: it is a multiple of what the model leaves on the worst tenth of its baseline, even without so many blocks that show
+#: most of it: one or two are an event of the run, no law.
+EVENTS = 2
 #: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
 #: exactly, and no further effect.
 REMAINDER = 0.03
-#: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
+#: Effects that leave more than this part of a joint's energy as a real residual are not what is there; nor are those of
+#: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
-#: Nor are those of whose remainder, beyond the baseline's, a law of no more parameters in their place removes this part.
-FAR_LESS = 0.5
 _FEWEST = 50
 _MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
@@ -162,7 +161,7 @@ def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     named = outcome.after.score.of_joint(j)
     # what the model leaves on its baseline is left by either
     own = float(named.rows.sum())
-    far_less = gain(named, law.score) >= max(FAR_LESS * (named.error - own), own)
+    far_less = gain(named, law.score) >= max(MOSTLY * (named.error - own), own)
     return lead(named, law.score) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
 
 
@@ -193,7 +192,7 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
             continue
         # Noise has energy, too, but no memory: only what lasts can be a law.
         error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
-        sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
+        sums = block_sums(error - MULTIPLE**2 * evidence.variation[j], after.stacked.block[mine])
         if np.sort(sums)[:-EVENTS].sum() > 0 or _follows_a_law(evidence, after, j):
             ratios[j] = np.sqrt((after.held_out[mine] ** 2).mean())
     return int(np.argmax(ratios)) if ratios.any() else None
@@ -291,7 +290,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     stable = np.array(
         sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
     )
-    if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
+    if not len(stable) or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
         return _Law([], y, after.stacked.block[mine])
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))

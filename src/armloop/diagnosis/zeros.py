@@ -16,12 +16,11 @@ from armloop.data.filters import INDEPENDENT
 from armloop.data.log import MotionLog
 from armloop.data.signals import ShortRunError, preprocess
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
 
-#: A zero more than so many spreads away has been changed.
-_BEYOND = 3.0
 #: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less; rounds of it.
 _FREEDOM, _ROUNDS = 4.0, 30
 
@@ -75,7 +74,7 @@ def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
     own, zeros = usual > 0, np.zeros(model.arm.n)
     # one that was changed is regressed beside the others, so that they do not stand in for it
     zeros[own] = _robust(slopes[:, own], left, usual[own])
-    return np.where(np.abs(zeros) > _BEYOND * usual, 0.0, zeros)
+    return np.where(np.abs(zeros) > SIGNIFICANCE * usual, 0.0, zeros)
 
 
 def _robust(X: Array, y: Array, spreads: Array) -> Array:
