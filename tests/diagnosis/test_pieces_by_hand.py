@@ -158,16 +158,6 @@ class TestTrials:
         agree = trials.Known.agrees_with
         assert agree(self.known(values, [1e9] * 3), self.known([0.0] * 3, errors)) is agrees
 
-    def test_an_effect_that_is_taken_back_is_none_of_what_is_known(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(trials.Known, "of", staticmethod(lambda *given: given))
-        effects = [SimpleNamespace(place=place) for place in "abc"]
-        known: Any = SimpleNamespace(fit=SimpleNamespace(effects=effects, shapes=[1, 2, 3]))
-        whole: Any = "whole"
-        place: Any = "b"
-        assert trials.Known.without(known, place, whole) == ("whole", [effects[0], effects[2]], [1, 3])
-
     def test_what_is_known_is_fitted_once_a_task(self, monkeypatch: pytest.MonkeyPatch) -> None:
         asked = []
 

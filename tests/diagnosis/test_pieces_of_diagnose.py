@@ -168,7 +168,7 @@ def test_a_run_that_rests_is_judged_by_its_events_alone(
     assert answers.asked["standing"] == ("left", model, "errors", [1, 2, 3]) and found.model == model
     assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
     assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
-    assert found.outcome.residual == "residual of left" and found.evidence.name == "left"
+    assert found.outcome.before == found.outcome.after and found.evidence.name == "left"
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -32,13 +32,13 @@ class TestRefits:
             fits.append((evidence, residual))
             error, value = next(made)
             score = SimpleNamespace(error=error)
-            return SimpleNamespace(score=score, effects=(), parameters=({"x": Estimate(value, 1.0, "1")},))
+            parameters = ({"x": Estimate(value, 1.0, "1")},)
+            return SimpleNamespace(score=score, effects=(), parameters=parameters, added=list)
 
         monkeypatch.setattr(trials, "fit", fitted)
         monkeypatch.setattr(trials, "lead", lambda worse, better: worse.error - better.error)
         evidence: Any = SimpleNamespace(residual=lambda added: len(fits))
         evidence.knowing = lambda added: SimpleNamespace(of=len(fits))
-        monkeypatch.setattr(Known, "added", lambda self: [])
         return Known.of(evidence, effects, [None] * len(effects)), len(fits)  # type: ignore[list-item]
 
     def test_effects_are_fitted_anew_with_what_they_change_of_each_other(

@@ -69,7 +69,7 @@ def account_with_load(
     for _ in range(_TURNS):
         # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
-        others = _with(plain.only(other.evidence.rows), load, other).added()[1:]
+        others = _with(plain.only(other.evidence.rows), load, other).fit.added()[1:]
         found = find_carried(without(_by(whole, others), [])) if others else None
         if found is None:
             break
@@ -81,11 +81,11 @@ def account_with_load(
     if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - MOSTLY) * left:
         return None
     evidence = whole.only(other.evidence.rows)
-    nothing, alone = Known.of(evidence), Known.of(evidence, [load], [_shape(load)])
-    bare = nothing.fit.score
-    share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
+    nothing, alone = (Known.of(evidence, *given).fit for given in ((), ([load], [_shape(load)])))
+    bare = nothing.score
+    share = gain(bare, alone.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
     every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
-    together = Outcome(every, nothing.fit, _with(evidence, load, other).fit, nothing.residual)
+    together = Outcome(every, nothing, _with(evidence, load, other).fit)
     # of the model as it is: the load is among the effects found
     run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
     outcome = clear(evidence, pruned(evidence, together))
@@ -118,7 +118,7 @@ def _by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
 
 def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
     """The account of a run by a model that has the load, the first of what is known."""
-    again = _by(whole, known.added()[:1])
+    again = _by(whole, known.fit.added()[:1])
     if again.unknown is not None:
         unknown = unknown | again.unknown
     again = replace(again, rows=again.rows & ~unknown, unknown=unknown)

@@ -277,12 +277,11 @@ def diagnose(
 
 def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact]) -> Diagnosis:
     """The verdict on a run in which too little moves to look for anything but events."""
-    left = evidence.residual([])
-    nothing = fit(evidence, left, [], [])
+    nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
     found = Diagnosis(
         "effects_found" if contacts else "no_effect" if known_contacts(whole).any() else "cannot_tell",
-        Outcome([], nothing, nothing, left),
+        Outcome([], nothing, nothing),
         augmented,
         None,
         evidence,

@@ -14,6 +14,7 @@ from scipy.stats import chi2, norm
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
+from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
@@ -63,6 +64,11 @@ class Fit:
     wald: tuple[tuple[float, int], ...]
     outside: Array
     stacked: Stacked
+
+    def added(self) -> list[AddedEffect]:
+        """The effects with their parameters, ready to be composed with the model."""
+        pairs = zip(self.effects, self.parameters, strict=True)
+        return [AddedEffect(effect, parameters) for effect, parameters in pairs]
 
     @cached_property
     def held_out(self) -> Array:

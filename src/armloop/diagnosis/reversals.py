@@ -105,8 +105,8 @@ def judge_reversals(
         gains.forget(best.effect, changed)
     if not found:
         return None
-    after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
-    every = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
+    after = Known.of(own, known.fit.effects, known.fit.shapes).fit
+    every = Outcome([*outcome.found, *found], Known.of(own).fit, after)
     whole = clear(own, every, settled=len(outcome.found), alike=True)
     found = whole.found[len(outcome.found) :]
     if not found:

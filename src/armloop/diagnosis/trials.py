@@ -14,7 +14,6 @@ from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
-from armloop.model import AddedEffect
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
@@ -44,7 +43,7 @@ class Known:
         residual = evidence.residual([])
         known = Known(evidence, residual, fit(evidence, residual, effects, shapes))
         for _ in range(_REFITS if effects else 0):
-            added = known.added()
+            added = known.fit.added()
             knowing, residual = evidence.knowing(added), evidence.residual(added)
             again = Known(knowing, residual, fit(knowing, residual, effects, shapes))
             # What spans the same leaves as much, and yet its parameters are others: those of the effects together.
@@ -60,16 +59,6 @@ class Known:
         )
         errors = np.hstack([e.std_error for p in other.fit.parameters for e in p.values()])
         return bool((np.abs(mine - others) <= _SAME * errors)[np.isfinite(errors)].all())
-
-    def added(self) -> list[AddedEffect]:
-        """The effects with their parameters, ready to be composed with the model."""
-        pairs = zip(self.fit.effects, self.fit.parameters, strict=True)
-        return [AddedEffect(effect, parameters) for effect, parameters in pairs]
-
-    def without(self, place: tuple[str, int | None, int | None], whole: Evidence) -> Known:
-        """What is known if one effect is taken back."""
-        kept = [k for k, effect in enumerate(self.fit.effects) if effect.place != place]
-        return Known.of(whole, [self.fit.effects[k] for k in kept], [self.fit.shapes[k] for k in kept])
 
     def trial(self, effect: Effect) -> Fit | None:
         """All effects fitted with one more; None where it cannot be there or shows nothing on this run."""

@@ -60,7 +60,7 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     instants = diagnosis.samples.motion.time[left.rows[shown]]
     clock = diagnosis.samples.motion.time[again]
     measured = diagnosis.samples.tau[again, j]
-    expected = measured - diagnosis.outcome.residual[again, j]
+    expected = measured - diagnosis.evidence.residual([])[again, j]
     floor, u = errors["noise_floor"][j], unit(errors["unit"][j])
     limit = 1.05 * max(float(np.nanmax(np.abs(before))), 3 * floor)
     count = sum(log.samples for log in result.logs.values())
