@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.data.reversals import turning
@@ -24,7 +23,7 @@ from armloop.diagnosis.pushes import PAUSE, Contact, around, push
 from armloop.laws.effects.base import number
 from armloop.laws.effects.events import during
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
@@ -139,7 +138,7 @@ def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
     return [burst for burst in bursts if rare[sorted(burst.joints)].any()]
 
 
-def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: list[Burst]) -> list[Burst]:
+def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]) -> list[Burst]:
     """Those of the bursts that exceed by far all that the run holds outside of them."""
     outside = np.ones(len(rows), dtype=bool)
     for burst in bursts:
@@ -179,7 +178,7 @@ def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
     return [contact for mine, contact in sorted(found, key=lambda one: int(np.argmax(one[0])))]
 
 
-def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst: Burst) -> bool:
+def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> bool:
     """Whether a burst is there most times that the arm passes the same posture at the same speed: then it is none."""
     motion = evidence.samples.motion
     q, v = motion.q[rows], motion.v[rows]
@@ -193,9 +192,7 @@ def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst:
     same = off < _SAME
     same[max(inside[0] - len(inside), 0) : inside[-1] + len(inside)] = False
     times = np.flatnonzero(same)
-    passages: list[NDArray[np.intp]] = (
-        np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
-    )
+    passages: list[Index] = np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
     high = MOSTLY * float(level[peak, joints].max())
     there = [float(level[np.ix_(passage, joints)].max()) > high for passage in passages]
     return len(there) > 0 and 2 * sum(there) > len(there)
@@ -223,7 +220,7 @@ def _together(bursts: list[list[slice]]) -> list[Burst]:
     return sorted(found, key=lambda burst: burst.rows.start)
 
 
-def _bursts(motion: Motion, rows: NDArray[np.intp], new: Array) -> list[slice]:
+def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
     """Stretches around every peak of the novelty, of one sign, as long as it is above a part of the peak.
 
     An event is seen to begin and to end; what is there from a run's start is a past that friction remembers.

@@ -42,7 +42,7 @@ from armloop.laws.effects.base import entry
 from armloop.laws.effects.listed import listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
@@ -204,7 +204,7 @@ class Diagnosis:
         }
 
 
-def _by_joint(joint: NDArray[np.intp], n: int, values: Array) -> Array:
+def _by_joint(joint: Index, n: int, values: Array) -> Array:
     """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
     return _ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
 

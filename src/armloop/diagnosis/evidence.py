@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers, halves, widened
 from armloop.data.filters import INDEPENDENT
@@ -24,7 +23,7 @@ from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, stretches
+from armloop.util.arrays import Array, Index, Mask, stretches
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
 BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
@@ -74,11 +73,11 @@ class Evidence:
     samples: Samples
     scale: Array
     variation: Array
-    rows: NDArray[np.bool_]
-    blocks: NDArray[np.intp]
+    rows: Mask
+    blocks: Index
     context: Context
     asked: tuple[Effect, ...] = ()
-    unknown: NDArray[np.bool_] | None = None
+    unknown: Mask | None = None
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
 
@@ -113,7 +112,7 @@ class Evidence:
         return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
 
     @property
-    def fold(self) -> NDArray[np.intp]:
+    def fold(self) -> Index:
         """(N,) fold of each sample."""
         return halves(self.blocks)
 
@@ -134,7 +133,7 @@ class Evidence:
         return residual(model, self.samples)
 
     @cached_property
-    def _cells(self) -> NDArray[np.intp]:
+    def _cells(self) -> Index:
         """(N, n) cell of a joint's motion that each sample lies in: like places and speeds, as many samples in each.
 
         What lies so near a standstill that the filter still brings in some of its torque, which no motion determines, is a
@@ -163,17 +162,17 @@ class Evidence:
         return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
-    def kept(self) -> NDArray[np.intp]:
+    def kept(self) -> Index:
         """(K,) samples that count for some joint."""
         return np.flatnonzero(self.rows.any(axis=1))
 
     @cached_property
-    def row_samples(self) -> NDArray[np.intp]:
+    def row_samples(self) -> Index:
         """(R,) sample of every stacked row."""
         return np.nonzero(self.rows)[0]
 
     @cached_property
-    def independent(self) -> NDArray[np.intp]:
+    def independent(self) -> Index:
         """(M,) samples of which the filter has left each something of its own to say."""
         return np.flatnonzero(independent_rows(self.samples))
 
@@ -194,12 +193,12 @@ class Evidence:
         return effect.on_all_joints(self.smoothed(effect, shape)[self._places], self.rows.shape[1])
 
     @cached_property
-    def _places(self) -> NDArray[np.intp]:
+    def _places(self) -> Index:
         places = np.searchsorted(self.independent, self.kept)
         assert (self.independent.take(places, mode="clip") == self.kept).all()
         return places
 
-    def only(self, rows: NDArray[np.bool_]) -> Evidence:
+    def only(self, rows: Mask) -> Evidence:
         """The same run where only rows (N, n) count."""
         return replace(self, rows=rows)
 
@@ -227,7 +226,7 @@ def creep(model: ReconstructedModel) -> Array:
     return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
 
 
-def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
+def far_outside(motion: Motion, ranges: Any) -> Mask:
     """(N, n) samples in which a joint's q, v or vdot lies so far beyond the trained range that nothing is judged there."""
     if not ranges:
         return np.zeros(motion.q.shape, dtype=bool)
@@ -236,22 +235,22 @@ def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
-def too_slow(model: ReconstructedModel, motion: Motion) -> NDArray[np.bool_]:
+def too_slow(model: ReconstructedModel, motion: Motion) -> Mask:
     """(N, n) samples in which a joint is slower than it slid in training: what friction is there, the model cannot know."""
     return np.asarray(np.abs(motion.v) < np.asarray(model.history.get("slowest") or 0.0))
 
 
-def near_standstill(samples: Samples) -> NDArray[np.bool_]:
+def near_standstill(samples: Samples) -> Mask:
     """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
     return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
 
 
-def sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+def sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     """(N, n) samples in which a joint slides, no closer than the filter can tell apart."""
     return np.asarray(_sliding(samples, model) & independent_rows(samples)[:, None])
 
 
-def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+def _sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     """(N, n) moving samples of stretches in which a joint gets anywhere.
 
     Other joints shake a joint at rest: it moves, but within its friction, and its torque is not determined by that.
@@ -282,14 +281,14 @@ class Stacked:
 
     X: Array
     y: Array
-    block: NDArray[np.intp]
-    fold: NDArray[np.intp]
-    joint: NDArray[np.intp]
+    block: Index
+    fold: Index
+    joint: Index
     joints: int
-    cell: NDArray[np.intp]
+    cell: Index
     model_errors: Array
 
-    def only(self, rows: NDArray[np.bool_]) -> Stacked:
+    def only(self, rows: Mask) -> Stacked:
         """Some of the rows (R,)."""
         arrays = ("X", "y", "block", "fold", "joint", "cell", "model_errors")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})

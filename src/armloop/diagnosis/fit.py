@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
@@ -18,9 +17,7 @@ from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import solve, unit_scale
 from armloop.regression.moments import Moments
-from armloop.util.arrays import TINY
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import TINY, Array
 
 #: Coefficients and a nonlinear parameter are found in turn so many times more.
 REFINEMENTS = 3

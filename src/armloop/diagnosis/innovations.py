@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from armloop.data.blocks import widened
@@ -22,7 +21,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import ModelError
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
@@ -38,9 +37,7 @@ _STICTION = 1.2
 _APART = 0.5
 
 
-def innovations(
-    evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()
-) -> tuple[Array, NDArray[np.bool_]]:
+def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()) -> tuple[Array, Mask]:
     """(N, n) signed innovations in standard deviations, and (N, n) whether a joint rests.
 
     Args:
@@ -79,7 +76,7 @@ def innovations(
     return sign * size / deviations(evidence, residual), rest
 
 
-def at_rest(samples: Samples) -> NDArray[np.bool_]:
+def at_rest(samples: Samples) -> Mask:
     """(N, n) whether a joint stands still; around a standstill the filter has smeared only its torque."""
     rest = ~samples.moving
     reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import widened
 from armloop.data.motion import Motion, Samples
@@ -15,7 +14,7 @@ from armloop.diagnosis.evidence import STILL, Evidence
 from armloop.experiment.excitation import Reference
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Least singular value, relative to the largest, of columns of unit size that is more than round-off.
 _ROUND_OFF = 1e-6
@@ -43,7 +42,7 @@ class Stage:
     """
 
     samples: Samples
-    rows: NDArray[np.bool_]
+    rows: Mask
     scale: Array
     context: Context
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.score import Score
-
-Array = NDArray[np.float64]
+from armloop.util.arrays import Array
 
 #: What is no chance: so many standard errors. An effect must lower the held-out error by as many (over blocks), and,
 #: over its joints together, by the energy that the model leaves on the worst tenth of its own baseline: a run may be all

@@ -8,12 +8,11 @@ and is no news; a push does not.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import averaged
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index, Mask
 
 #: Innovations are looked at that often, s.
 _STEP = 0.04
@@ -28,7 +27,7 @@ _BASELINE = 5
 _AT_REST = 3.0
 
 
-def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array]:
+def novelty(evidence: Evidence, innovation: Array, rest: Mask) -> tuple[Index, Array]:
     """Instants (M,) looked at, and (M, n) signed distance of each joint from its like, in standard deviations.
 
     The deviation is that of the noise and of like motion together: where like motion differs, little is new. Where there
@@ -64,7 +63,7 @@ def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> t
     return rows, new
 
 
-def _first_of_each(x: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _first_of_each(x: Index) -> Mask:
     """(M, K) whether a number stands there for the first time in its row."""
     order = np.argsort(x, axis=1, kind="stable")
     ordered = np.take_along_axis(x, order, axis=1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
@@ -16,7 +15,7 @@ from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
@@ -184,7 +183,7 @@ def _trial(
     )
 
 
-def _elsewhere(left: Array, weight: Array, pieces: NDArray[np.intp], shown: list[int]) -> Score:
+def _elsewhere(left: Array, weight: Array, pieces: Index, shown: list[int]) -> Score:
     """The score of what is left (N, n), weighted, of joints that an event was not noticed at, where it counts."""
     counted = weight > 0
     counted[:, shown] = False
@@ -234,7 +233,7 @@ def _size(columns: Array, y: Array) -> Array:
     return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=_FELT)[0])
 
 
-def _size_error(columns: Array, size: Array, left: Array, pieces: NDArray[np.intp]) -> Array:
+def _size_error(columns: Array, size: Array, left: Array, pieces: Index) -> Array:
     """(p,) standard error of the mean force or torque, pieces being the independent units.
 
     Along directions in which the arm does not feel a force, it may be as large as the one that is felt.

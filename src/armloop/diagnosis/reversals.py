@@ -19,7 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm, t
 
 from armloop.data.blocks import block_sums
@@ -32,7 +31,7 @@ from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.progress import Progress
 
 #: An effect must remove this part of a joint's squared error at reversals, so that it was a multiple of what remains;
@@ -115,13 +114,13 @@ def judge_reversals(
     return AtReversals(found, whole, own, before, left)
 
 
-def _never_seen(evidence: Evidence) -> NDArray[np.bool_]:
+def _never_seen(evidence: Evidence) -> Mask:
     """(n,) joints that turned round nowhere in the training logs: how the model errs there, nobody knows."""
     left = evidence.model.baseline.get("reversals")
     return np.array([x is None for x in left]) if left else np.zeros(evidence.rows.shape[1], dtype=bool)
 
 
-def _remembering(evidence: Evidence, outcome: Outcome) -> NDArray[np.bool_]:
+def _remembering(evidence: Evidence, outcome: Outcome) -> Mask:
     """(n,) joints in which dry friction was found, and whose friction has memory in the model: so has what was added."""
     remembering, friction = np.zeros(evidence.rows.shape[1], dtype=bool), evidence.model.friction
     for one in outcome.added():
@@ -152,8 +151,8 @@ class _View:
     """
 
     rows: Mask
-    joint: NDArray[np.intp]
-    block: NDArray[np.intp]
+    joint: Index
+    block: Index
     noticeable: Array
     usual: Array
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +21,10 @@ class Score:
 
     complexity: int
     errors: Array
-    counts: NDArray[np.intp]
+    counts: Index
 
     @staticmethod
-    def of(
-        complexity: int, held_out: Array, joint: NDArray[np.intp], block: NDArray[np.intp], n: int
-    ) -> Score:
+    def of(complexity: int, held_out: Array, joint: Index, block: Index, n: int) -> Score:
         """Sums of what is left (R,) of rows of ``n`` joints."""
         blocks, index = np.unique(block, return_inverse=True)
         cell, cells = joint * len(blocks) + index, n * len(blocks)
@@ -50,12 +47,12 @@ class Score:
         return np.asarray(self.errors.sum(axis=1))
 
     @property
-    def rows(self) -> NDArray[np.intp]:
+    def rows(self) -> Index:
         """(n,) rows of each joint."""
         return np.asarray(self.counts.sum(axis=1))
 
     @property
-    def seen(self) -> NDArray[np.intp]:
+    def seen(self) -> Index:
         """(n,) blocks in which a joint has rows."""
         return np.asarray((self.counts > 0).sum(axis=1))
 

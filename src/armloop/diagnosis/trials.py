@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
 
@@ -182,7 +181,7 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
 
 def _shape_problem(
     known: Known, effect: Effect, shapes: list[float], joints: Iterable[int]
-) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+) -> tuple[Array, Array, Array, Index]:
     """Of the effect's joints: columns (R, S, p) of every shape, what is left on held-out rows (R,) and after a fit
     outside each fold (FOLDS, R), and the fold of each row.
     """

@@ -12,7 +12,6 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
@@ -27,10 +26,8 @@ from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import TINY
+from armloop.util.arrays import TINY, Array, Index
 from armloop.util.progress import Progress
-
-Array = NDArray[np.float64]
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
 #: it is a multiple of what the model leaves on the worst tenth of its baseline, even without so many blocks that show
@@ -232,7 +229,7 @@ class _Law:
 
     terms: list[tuple[float, str]]
     left: Array
-    block: NDArray[np.intp]
+    block: Index
     errors: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
 from armloop.diagnosis.judgement import MOSTLY, NEARLY_ALL
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
     )
 
 
-def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tuple[str, NDArray[np.bool_]]]:
+def _halves(evidence: Evidence, rows: Index, joint: int) -> list[tuple[str, Mask]]:
     """Conditions in words, each met by half of a joint's samples (or by one direction of its motion)."""
     motion, joints = evidence.samples.motion, evidence.model.arm.joints
     load, of = evidence.context.load, joints[joint]
@@ -90,7 +89,7 @@ def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tupl
     return found
 
 
-def _stretch(time: Array, block: NDArray[np.intp], energy: Array) -> tuple[float, float] | None:
+def _stretch(time: Array, block: Index, energy: Array) -> tuple[float, float] | None:
     """The shortest stretch of whole blocks that holds most of the energy, if it is short."""
     names, index = np.unique(block, return_inverse=True)
     sums = np.concatenate([[0.0], np.cumsum(np.bincount(index, weights=energy))])
