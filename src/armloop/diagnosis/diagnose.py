@@ -15,13 +15,11 @@ from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account
-from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.reasons import Standing, event_in_doubt, in_doubt, standing, too_still
-from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
 from armloop.diagnosis.search import (
     Found,
@@ -39,7 +37,7 @@ from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.base import entry
-from armloop.laws.effects.listed import listed
+from armloop.laws.effects.listed import EFFECTS, listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array, Index, Mask
@@ -167,7 +165,7 @@ class Diagnosis:
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
-                    **({"remedy": remedy(added)} if added.effect.sensor else {}),
+                    **({"remedy": added.effect.remedy(added.parameters)} if added.effect.sensor else {}),
                     "alternatives": _alternatives(added.effect, found.rivals),
                 }
             )
@@ -217,6 +215,26 @@ def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
 def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:
     """Entries of what this motion cannot tell from an effect."""
     return [{**entry(*one.place), "share": share, "why": why_alike(effect, one)} for one, share in confounded]
+
+
+def why_alike(found: Effect, rival: Effect) -> str:
+    """Why two effects can look alike on one motion, and which motion would tell them apart: a sentence."""
+    listed = _said(found, rival)
+    if listed and (found.joint is None or rival.joint is None or found.joint == rival.joint):
+        return listed
+    return (
+        f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}; a run over other "
+        "postures and speeds may tell them apart: armloop diagnose --next-run designs one"
+    )
+
+
+def _said(found: Effect, rival: Effect) -> str | None:
+    """What either says of the other, or else of what that looks like."""
+    own = found.alike.get(rival.name) or rival.alike.get(found.name)
+    if own:
+        return own
+    stand_ins = [EFFECTS.get(effect.looks_like, type(effect)) for effect in (found, rival)]
+    return stand_ins[0].alike.get(stand_ins[1].name) or stand_ins[1].alike.get(stand_ins[0].name)
 
 
 @one_thread
