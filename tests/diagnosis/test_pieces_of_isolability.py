@@ -176,13 +176,11 @@ class TestIsolability:
             assert (found.predicted, found.inertial, found.period) == (predicted, "kept", 0.02)
 
     def test_effects_share_a_joint_or_are_the_whole_arms(self) -> None:
-        def of(joint: int | None, other: int | None = None) -> Any:
-            return SimpleNamespace(joint=joint, other_joint=other)
+        def of(*joints: int) -> Any:
+            return SimpleNamespace(indices=joints)
 
-        assert (
-            _share_joints(of(1), of(1)) and _share_joints(of(None), of(1)) and _share_joints(of(2), of(1, 2))
-        )
-        assert not _share_joints(of(1), of(2)) and not _share_joints(of(3), of(1, 2))
+        assert _share_joints(of(0), of(0)) and _share_joints(of(), of(0)) and _share_joints(of(1), of(0, 1))
+        assert not _share_joints(of(0), of(1)) and not _share_joints(of(2), of(0, 1))
 
     def test_a_rival_is_tried_at_few_shapes_on_several_motions(self) -> None:
         many = 20
@@ -215,7 +213,9 @@ class TestIsolability:
 
     @staticmethod
     def of(name: str, joint: int | None = 1, shape: float | None = 5.0) -> Any:
-        return SimpleNamespace(place=(name, joint, None), joint=joint, other_joint=None, shape=shape)
+        return SimpleNamespace(
+            place=(name, joint, None), indices=() if joint is None else (joint - 1,), shape=shape
+        )
 
     @staticmethod
     def law(effect: Any) -> Law:

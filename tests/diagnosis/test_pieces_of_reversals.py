@@ -34,6 +34,10 @@ class Effect:
         return self.name, self.joint, self.other_joint
 
     @property
+    def indices(self) -> tuple[int, ...]:
+        return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
+
+    @property
     def pair_wise(self) -> bool:
         return self.other_joint is not None
 

@@ -130,8 +130,7 @@ def lookalikes(
 
 def _share_joints(one: Effect, other: Effect) -> bool:
     """Whether two effects act on a joint in common; those of the whole arm act on all."""
-    joints = [{e.joint, e.other_joint} - {None} for e in (one, other)]
-    return not all(joints) or bool(joints[0] & joints[1])
+    return not (one.indices and other.indices) or not set(one.indices).isdisjoint(other.indices)
 
 
 def _as_fitted(

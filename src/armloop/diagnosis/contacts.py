@@ -20,8 +20,7 @@ from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import PAUSE, Contact, around, push
-from armloop.laws.effects.base import number
-from armloop.laws.effects.events import during
+from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask
 
@@ -55,7 +54,7 @@ def known_contacts(evidence: Evidence) -> Mask:
     motion = evidence.samples.motion
     rows = np.zeros(motion.samples, dtype=bool)
     for added in filter(is_event, evidence.model.effects):
-        mine = during(motion, {key: e.value for key, e in added.parameters.items()})
+        mine = during(motion, added.values)
         for run in motion.runs():
             inside = run.start + np.flatnonzero(mine[run])
             if len(inside):
@@ -120,7 +119,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
 
 def _seen_whole(motion: Motion, contact: Contact) -> bool:
     """Whether an event begins after its run does and ends before it: else it may be a past that friction remembers."""
-    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(contact.added.parameters)
     run = next(run for run in motion.runs() if contact.rows[run].any())
     time = motion.time[run]
     return bool(start - time[0] >= _SHORTEST and time[-1] - end >= _SHORTEST)
@@ -172,7 +171,7 @@ def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
     """Events without those that are, for most of the shorter one, another with a larger share."""
     found: list[tuple[Mask, Contact]] = []
     for contact in sorted(contacts, key=lambda contact: -contact.share):
-        mine = during(motion, {key: e.value for key, e in contact.added.parameters.items()})
+        mine = during(motion, contact.added.values)
         if all(2 * (mine & other).sum() <= min(mine.sum(), other.sum()) for other, _ in found):
             found.append((mine, contact))
     return [contact for mine, contact in sorted(found, key=lambda one: int(np.argmax(one[0])))]
@@ -276,7 +275,7 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
     """
     motion, kept, rows = evidence.samples.motion, evidence.independent, evidence.rows
     left = (np.where(rows, evidence.left_by(model), 0.0)[kept] / evidence.scale) ** 2
-    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(contact.added.parameters)
     time = motion.time[kept]
     length = max(int((contact.rows[kept] & (time >= start) & (time <= end)).sum()), 1)
     removed = np.maximum(contact.before**2 - contact.after**2, 0.0) / evidence.scale**2

@@ -69,8 +69,7 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
         judged: (N, n) whether anything is said of a sample.
     """
     found: dict[int, tuple[float, list[Pulse]]] = {}
-    seconds = sum(float(np.ptp(samples.motion.time[run])) for run in samples.motion.runs())
-    for length in (length for length in LENGTHS if seconds >= _OTHERS * length):
+    for length in (length for length in LENGTHS if samples.motion.seconds >= _OTHERS * length):
         width, gap = _widths(samples, length)
         every, one_way = contrast(samples, innovation, length)
         every = np.where(judged, every, 0.0)
@@ -86,7 +85,7 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
 def beside(samples: Samples, residual: Array, rows: slice) -> Array:
     """(N, n) residual less the line through what is left before and after a stretch."""
     length, gap = rows.stop - rows.start, round(2 * samples.reach / samples.period)
-    run = next(run for run in samples.motion.runs() if run.start <= rows.start < run.stop)
+    run = samples.motion.run_of(rows.start)
     before = slice(max(run.start, rows.start - gap - length), max(run.start + 1, rows.start - gap))
     after = slice(min(rows.stop + gap, run.stop - 1), min(rows.stop + gap + length, run.stop))
     time = samples.motion.time

@@ -268,8 +268,7 @@ def _sliding(samples: Samples, model: ReconstructedModel) -> Mask:
 
 def _block_seconds(motion: Motion) -> float:
     """Length of a block that leaves enough of them in all runs together, within the bounds."""
-    seconds = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
-    return float(np.clip(seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
+    return float(np.clip(motion.seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
 
 
 @dataclass(frozen=True, eq=False)

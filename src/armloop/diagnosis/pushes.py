@@ -69,7 +69,7 @@ class _Kind:
 
 def around(motion: Motion, burst: slice) -> Mask:
     """(N,) samples of a stretch of one run, with a margin."""
-    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    run = motion.run_of(burst.start)
     start, end = motion.time[burst.start] - PAUSE, motion.time[burst.stop - 1] + PAUSE
     rows = np.zeros(motion.samples, dtype=bool)
     rows[run] = (motion.time[run] >= start) & (motion.time[run] <= end)
@@ -206,7 +206,7 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     A burst's edges are where the novelty falls, and how the arm moves can make it fall within a push.
     """
     motion = evidence.samples.motion
-    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    run = motion.run_of(burst.start)
     period = evidence.samples.period
     # The filter has smeared an event's edges.
     inner = round(min(evidence.samples.reach / period, 0.2 * (burst.stop - burst.start)))

@@ -11,7 +11,7 @@ import numpy as np
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
-from armloop.laws.effects.base import number
+from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Mask
 
@@ -102,7 +102,7 @@ def in_doubt(label: str, share: float) -> str:
 
 def event_in_doubt(event: AddedEffect) -> str:
     """A sentence on an event that removes no more than what nothing accounts for at other times."""
-    start, end = (number(event.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(event.parameters)
     return (
         f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but as much is left there "
         "at other times that nothing accounts for: it may be of the same origin, and is not stated"

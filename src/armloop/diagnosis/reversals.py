@@ -99,7 +99,7 @@ def judge_reversals(
         assert trial is not None
         found.append(replace(best, shape=trial.shapes[-1]))
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of the error at its reversals")
-        changed = _joints(best.effect) or set(view.suspects(known.fit))
+        changed = set(best.effect.indices or view.suspects(known.fit))
         known = replace(known, fit=trial)
         gains.forget(best.effect, changed)
     if not found:
@@ -130,18 +130,17 @@ def _remembering(evidence: Evidence, outcome: Outcome) -> Mask:
     return remembering
 
 
-def _joints(effect: Effect) -> set[int]:
-    """Joints (0-based) that an effect sits in; none if it concerns all."""
-    return {j - 1 for j in (effect.joint, effect.other_joint) if j is not None}
-
-
 def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
     """Effects in some joints that were not found yet.
 
     A sensor's fault, a load or a tilt is there while a joint slides, too, where the search has asked for it.
     """
     taken = {effect.place for effect in current.effects}
-    return [e for e in hypotheses(arm) if e.place not in taken and not e.sensor and _joints(e) & joints]
+    return [
+        e
+        for e in hypotheses(arm)
+        if e.place not in taken and not e.sensor and not joints.isdisjoint(e.indices)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +229,8 @@ class _Gains:
         """Drop the effect that was found, and what depends on joints (0-based) where something was found."""
         self.found.add(found.name)
         for effect in list(self.by_effect):
-            if effect.place == found.place or not _joints(effect) or _joints(effect) & joints:
+            own = effect.indices
+            if effect.place == found.place or not own or not joints.isdisjoint(own):
                 del self.by_effect[effect]
 
     def _sure(self, effect: Effect, j: int) -> bool:

@@ -397,6 +397,6 @@ def _tied(effect: Effect) -> int:
 def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:
     """Whether an effect's columns, weighted, are largest on a joint."""
     if effect.joint is not None:
-        return joint + 1 in (effect.joint, effect.other_joint)
+        return joint in effect.indices
     columns = evidence.columns(effect, shape.final) / evidence.scale[:, None]
     return int(np.argmax((columns**2).sum(axis=(0, 2)))) == joint

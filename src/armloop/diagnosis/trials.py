@@ -62,8 +62,7 @@ class Known:
     def trial(self, effect: Effect) -> Fit | None:
         """All effects fitted with one more; None where it cannot be there or shows nothing on this run."""
         evidence, current = self.evidence, self.fit
-        joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
-        if not all(evidence.rows[:, j].any() for j in joints):
+        if not all(evidence.rows[:, j].any() for j in effect.indices):
             return None  # a joint at rest shows nothing
         shapes = list(effect.shapes(evidence.context))
         if not shapes:
@@ -157,7 +156,7 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     blocks, and on what the known effects leave there when they, too, are fitted without that fold.
     """
     n = known.residual.shape[1]
-    joints = range(n) if effect.other_joint or effect.joint is None else [effect.joint - 1]
+    joints = effect.indices if len(effect.indices) == 1 else range(n)
     columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
     every = list(range(FOLDS))
     # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.

@@ -122,7 +122,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
 def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[Unlisted | None, Outcome]:
     """One law in place of what was named at a joint, where it is simpler and leaves far less of it."""
     for j in range(evidence.samples.motion.joints):
-        there = [f for f in outcome.found if f.effect.joint == j + 1 and f.effect.other_joint is None]
+        there = [f for f in outcome.found if f.effect.indices == (j,)]
         bare = without_effects_at(evidence, outcome, j)
         rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:

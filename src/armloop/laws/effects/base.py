@@ -210,6 +210,11 @@ class Effect(ABC):
         return self.joint - 1
 
     @property
+    def indices(self) -> tuple[int, ...]:
+        """The joints that it sits in, counted from 0; none if it concerns the whole arm."""
+        return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
+
+    @property
     def place(self) -> tuple[str, int | None, int | None]:
         """Name and joints: what makes two effects the same."""
         return self.name, self.joint, self.other_joint
