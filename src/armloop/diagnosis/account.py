@@ -169,17 +169,12 @@ def _delay(outcome: Outcome) -> float:
 
 
 def best_account(
-    whole: Evidence,
-    contacts: list[Contact],
-    plain_counts: bool,
-    progress: Progress,
-    panel: Hypotheses | None = None,
+    whole: Evidence, contacts: list[Contact], progress: Progress, panel: Hypotheses | None = None
 ) -> Account:
     """The account with contacts where there are any, unless effects or a law explain those bursts as well.
 
     Args:
         contacts: what looks like contacts before anything else is known.
-        plain_counts: whether the run moves enough to be judged without contacts, too.
         panel: who tries the hypotheses; in this process by default.
     """
     account = plain = Account.of(whole, contacts, progress, panel)
@@ -196,7 +191,7 @@ def best_account(
         if not again and looked.left(residual) < account.left(residual):
             law = looked.unlisted
             return looked if law is None else replace(looked, unlisted=law.over(whole))
-    if not account.contacts or not plain_counts:
+    if not account.contacts:
         return account
     if contacts:
         plain = Account.of(whole, [], progress, panel)

@@ -19,7 +19,6 @@ from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, gain, leaves_more, soaked
-from armloop.diagnosis.reasons import too_still
 from armloop.diagnosis.search import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
@@ -124,7 +123,7 @@ def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jo
     again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
     with Hypotheses(again, jobs) as panel:
         contacts = find_contacts(again, again.residual([]))
-        return best_account(again, contacts, not too_still(again), progress, panel)
+        return best_account(again, contacts, progress, panel)
 
 
 def _much_is_left(account: Account) -> bool:

@@ -286,7 +286,7 @@ def diagnose(
         blocks = len(np.unique(evidence.blocks))
         progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
         with Hypotheses(whole, jobs) as panel:
-            account = best_account(whole, contacts, not too_still(whole), progress, panel)
+            account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])

@@ -7,6 +7,7 @@ judged on folds that were not fitted.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -20,6 +21,7 @@ from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
+from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.regression.moments import Moments
@@ -41,16 +43,20 @@ CELLS = 3
 _KEPT = 1 << 28
 
 
-class _Columns(dict[tuple[tuple[str, int | None, int | None], float], Array]):
+class _Columns(dict[tuple[Place, float], Array]):
     """Columns by the effect's place and shape, as many as there is room for."""
 
     size = 0
 
-    def keep(self, key: tuple[tuple[str, int | None, int | None], float], columns: Array) -> None:
-        """Keep columns while there is room."""
+    def of(self, place: Place, shape: float, make: Callable[[], Array]) -> Array:
+        """Columns as they were made before, if they were; else they are made, and kept while there is room."""
+        if (place, shape) in self:
+            return self[place, shape]
+        columns = make()
         if self.size < _KEPT:
-            self[key] = columns
+            self[place, shape] = columns
             self.size += columns.nbytes
+        return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,12 +158,11 @@ class Evidence:
     @cached_property
     def _model_errors(self) -> Array:
         """(R, r) torque of the model's own errors at the rows that count, weighted."""
-        key = (("the model's own errors", None, None), 0.0)
-        if key not in self._of_motion:
-            errors = torque_errors(self.model, self.samples)[self.independent]
-            self._of_motion.keep(key, errors)
-        else:
-            errors = self._of_motion[key]
+        errors = self._of_motion.of(
+            ("the model's own errors", None, None),
+            0.0,
+            lambda: torque_errors(self.model, self.samples)[self.independent],
+        )
         places, joints = np.nonzero(self.rows[self.kept])
         return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
 
@@ -180,13 +185,12 @@ class Evidence:
         """(M, p) columns of an effect on its joint, or (M, n, p) on all, through the run's filter, at
         :attr:`independent` samples; computed once.
         """
-        key = (effect.place, shape)
-        cache = self._of_model if effect.needs_model else self._of_motion
-        if key in cache:
-            return cache[key]
-        columns = smooth(self.samples, effect.columns(self.context, shape))[self.independent]
-        cache.keep(key, columns)
-        return columns
+        kept = self._of_model if effect.needs_model else self._of_motion
+        return kept.of(
+            effect.place,
+            shape,
+            lambda: smooth(self.samples, effect.columns(self.context, shape))[self.independent],
+        )
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(K, n, p) columns of an effect through the run's filter, at the samples kept."""

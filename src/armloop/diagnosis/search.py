@@ -29,12 +29,11 @@ from armloop.diagnosis.judgement import (
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects.base import Place
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced
 
-#: Name and joints of an effect.
-Place = tuple[str, int | None, int | None]
 #: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
 #: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for
 #: small ones. But what is left of that is of many kinds, and one law explains not this part of it.

@@ -24,6 +24,8 @@ from armloop.util.functions import Functions
 
 Value = float | list[float]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
+#: Name and joints of an effect: what makes two the same.
+Place = tuple[str, int | None, int | None]
 #: Torques (n) of positions and speeds (n) of any kind of number, by the functions for it.
 StateLaw = Callable[[Functions, Sequence[Any], Sequence[Any]], list[Any]]
 
@@ -215,8 +217,8 @@ class Effect(ABC):
         return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
 
     @property
-    def place(self) -> tuple[str, int | None, int | None]:
-        """Name and joints: what makes two effects the same."""
+    def place(self) -> Place:
+        """Name and joints."""
         return self.name, self.joint, self.other_joint
 
     def shapes(self, context: Context) -> Sequence[float]:
