@@ -93,7 +93,7 @@ class TestJudgement:
 
 class TestSearch:
     def test_what_can_be_explained_is_more_than_the_baselines(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        score = SimpleNamespace(energy=np.array([9.0, 2.0]), rows=np.array([4.0, 5.0]))
+        score = SimpleNamespace(excess=np.array([5.0, -3.0]))
         nothing = SimpleNamespace(fit=SimpleNamespace(score=score))
         monkeypatch.setattr(search.Known, "of", staticmethod(lambda *given: nothing))
         given: Any = None

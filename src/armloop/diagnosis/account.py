@@ -9,7 +9,16 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import CHANCE, MOST, MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.judgement import (
+    CHANCE,
+    MOST,
+    MOSTLY,
+    NEARLY_ALL,
+    SIGNIFICANCE,
+    gain,
+    lead,
+    much_is_left,
+)
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
@@ -64,11 +73,11 @@ class Account:
         Args:
             first: what the search found.
         """
-        evidence, after = self.evidence, self.outcome.after
+        evidence = self.evidence
         j = self._least_explained() if self.unlisted is None else self.unlisted.joint - 1
         elsewhere = without_effects_at(evidence, first, j).found
         there = [f.effect for f in first.found if f not in elsewhere]
-        if not there or (self.unlisted is None and after.score.energy[j] < MULTIPLE**2 * after.score.rows[j]):
+        if not there or (self.unlisted is None and not much_is_left(self.outcome.after.score)[j]):
             return self
         progress(f"joint {j + 1}: whether other listed effects do better than {there[0].label()}")
         again = search(evidence, progress, panel, barred=[there[0].place])
@@ -79,7 +88,7 @@ class Account:
         mine, others = self.score(evidence.rows), other.score(evidence.rows)
         if self.unlisted is not None:
             return other if lead(others, mine) <= CHANCE else self
-        least = MOSTLY * float((mine.energy - mine.rows).sum())
+        least = MOSTLY * float(mine.excess.sum())
         return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
 
     def _least_explained(self) -> int:

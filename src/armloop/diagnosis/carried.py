@@ -18,7 +18,7 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, gain, leaves_more, soaked
+from armloop.diagnosis.judgement import MOSTLY, gain, leaves_more, much_is_left, soaked
 from armloop.diagnosis.search import Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
@@ -62,7 +62,7 @@ def account_with_load(
     left = account.left(account.remaining()) - float(account.whole.rows.sum())
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
     score = _with(plain, load, account).fit.score
-    if score.error - float(score.rows.sum()) > (1 - MOSTLY) * left:
+    if float(score.excess.sum()) > (1 - MOSTLY) * left:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(_TURNS):
@@ -82,7 +82,7 @@ def account_with_load(
     evidence = whole.only(other.evidence.rows)
     nothing, alone = (Known.of(evidence, *given).fit for given in ((), ([load], [_shape(load)])))
     bare = nothing.score
-    share = gain(bare, alone.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
+    share = gain(bare, alone.score) / max(float(bare.excess.sum()), 1e-9)
     every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
     together = Outcome(every, nothing, _with(evidence, load, other).fit)
     # of the model as it is: the load is among the effects found
@@ -128,8 +128,7 @@ def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jo
 
 def _much_is_left(account: Account) -> bool:
     """Whether a law was stated, or some joint's error is a multiple of the baseline."""
-    score = account.outcome.after.score
-    return account.unlisted is not None or bool((score.energy >= MULTIPLE**2 * score.rows).any())
+    return account.unlisted is not None or bool(much_is_left(account.outcome.after.score).any())
 
 
 def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:

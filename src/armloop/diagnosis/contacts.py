@@ -145,8 +145,7 @@ def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]
     rest = np.maximum(level[outside].max(axis=0, initial=0.0), 1.0)
     kept = []
     for burst in bursts:
-        inside = (rows >= burst.rows.start) & (rows < burst.rows.stop)
-        peak = level[inside].max(axis=0, initial=0.0)
+        peak = level[_within(rows, burst.rows)].max(axis=0, initial=0.0)
         if any(peak[j] >= STANDS_OUT * rest[j] for j in burst.joints):
             kept.append(burst)
     return kept
@@ -181,20 +180,26 @@ def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> 
     """Whether a burst is there most times that the arm passes the same posture at the same speed: then it is none."""
     motion = evidence.samples.motion
     q, v = motion.q[rows], motion.v[rows]
-    joints = np.array(sorted(burst.joints), dtype=np.intp)
-    inside = np.flatnonzero((rows >= burst.rows.start) & (rows < burst.rows.stop))
-    if len(inside) == 0:
+    joints = sorted(burst.joints)
+    inside = _within(rows, burst.rows)
+    length = inside.stop - inside.start
+    if length == 0:
         return False
-    peak = inside[int(np.argmax(level[np.ix_(inside, joints)].max(axis=1)))]
+    peak = inside.start + int(np.argmax(level[inside, joints].max(axis=1)))
     size = [np.maximum(np.ptp(x, axis=0) / 2, 1e-9) for x in (q, v)]
     off = np.maximum(np.abs((q - q[peak]) / size[0]).max(axis=1), np.abs((v - v[peak]) / size[1]).max(axis=1))
     same = off < _SAME
-    same[max(inside[0] - len(inside), 0) : inside[-1] + len(inside)] = False
+    same[max(inside.start - length, 0) : inside.stop - 1 + length] = False
     times = np.flatnonzero(same)
     passages: list[Index] = np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
     high = MOSTLY * float(level[peak, joints].max())
-    there = [float(level[np.ix_(passage, joints)].max()) > high for passage in passages]
+    there = [float(level[passage][:, joints].max()) > high for passage in passages]
     return len(there) > 0 and 2 * sum(there) > len(there)
+
+
+def _within(rows: Index, stretch: slice) -> slice:
+    """Which of some samples (M,), in order, lie in a stretch."""
+    return slice(*np.searchsorted(rows, [stretch.start, stretch.stop]).tolist())
 
 
 def _meet(motion: Motion, one: Burst, other: Burst) -> bool:
@@ -230,8 +235,8 @@ def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
     level = np.abs(new)
     threshold = _RISE * max(1.0, float(np.median(level)))
     for run in motion.runs():
-        mine = np.flatnonzero((rows >= run.start) & (rows < run.stop))
-        above = mine[level[mine] > threshold]
+        mine = _within(rows, run)
+        above = mine.start + np.flatnonzero(level[mine] > threshold)
         if len(above) == 0:
             continue
         time = motion.time[rows]
@@ -240,12 +245,12 @@ def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
             one = new * np.sign(new[group[0]])
             peak = float(one[group[0] : group[-1] + 1].max())
             first, last = int(group[0]), int(group[-1])
-            while first > mine[0] and one[first - 1] > _EDGE * peak:
+            while first > mine.start and one[first - 1] > _EDGE * peak:
                 first -= 1
-            while last < mine[-1] and one[last + 1] > _EDGE * peak:
+            while last < mine.stop - 1 and one[last + 1] > _EDGE * peak:
                 last += 1
-            begins = first > mine[0] and time[first] - time[mine[0]] >= _SHORTEST
-            ends = last < mine[-1] and time[mine[-1]] - time[last] >= _SHORTEST
+            begins = first > mine.start and time[first] - time[mine.start] >= _SHORTEST
+            ends = last < mine.stop - 1 and time[mine.stop - 1] - time[last] >= _SHORTEST
             if begins and ends and time[last] - time[first] >= _SHORTEST:
                 burst = slice(int(rows[first]), int(rows[last]) + 1)
                 if bursts and bursts[-1].stop > burst.start:
@@ -284,7 +289,7 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
         if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
             continue
         for run in motion.runs():
-            sums = np.cumsum(np.append(0.0, left[(kept >= run.start) & (kept < run.stop), j]))
+            sums = np.cumsum(np.append(0.0, left[_within(kept, run), j]))
             most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
             rest[j] = max(rest[j], most - 1.0)
     return bool(removed @ (removed - rest) < 0)

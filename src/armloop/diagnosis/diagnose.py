@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
@@ -21,6 +20,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.reasons import Standing, event_in_doubt, in_doubt, standing, too_still
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
+from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.search import (
     Found,
     Outcome,
@@ -40,7 +40,7 @@ from armloop.laws.effects.base import entry
 from armloop.laws.effects.listed import EFFECTS, listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import Array, Mask
 from armloop.util.errors import InputError
 from armloop.util.finite import finite
 from armloop.util.progress import Progress, silent
@@ -119,7 +119,7 @@ class Diagnosis:
         scale, slides = self.evidence.scale, self.sliding[self.evidence.rows]
         joint, n = self.outcome.before.stacked.joint[slides], len(scale)
         tau, before, after = (
-            np.sqrt(_by_joint(joint, n, x[slides] ** 2))
+            np.sqrt(mean_by_joint(joint, n, x[slides] ** 2))
             for x in (
                 self.samples.tau[self.evidence.rows],
                 self.outcome.before.held_out * scale[self.outcome.before.stacked.joint],
@@ -135,7 +135,7 @@ class Diagnosis:
             "before": before.tolist(),
             "after": after.tolist(),
             "noise_floor": scale.tolist(),
-            "nrmse": {"before": _ratio(before, tau).tolist(), "after": _ratio(after, tau).tolist()},
+            "nrmse": {"before": ratio(before, tau).tolist(), "after": ratio(after, tau).tolist()},
             **self._at_reversals(),
         }
 
@@ -200,16 +200,6 @@ class Diagnosis:
             "effects": effects,
             "error": finite(self.errors()),
         }
-
-
-def _by_joint(joint: Index, n: int, values: Array) -> Array:
-    """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
-    return _ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
-
-
-def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """x / y, NaN where y is zero."""
-    return np.divide(x, y, out=np.full(len(x), np.nan), where=y != 0)
 
 
 def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:

@@ -24,7 +24,6 @@ from armloop.laws.effects import Context, Effect
 from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
 
 #: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
@@ -295,7 +294,3 @@ class Stacked:
         """Some of the rows (R,)."""
         arrays = ("X", "y", "block", "fold", "joint", "cell", "model_errors")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
-
-    def moments(self) -> list[Moments]:
-        """Moments of each fold."""
-        return [Moments.of(self.X[self.fold == k], self.y[self.fold == k]) for k in range(FOLDS)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.score import Score
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: What is no chance: so many standard errors. An effect must lower the held-out error by as many (over blocks), and,
 #: over its joints together, by the energy that the model leaves on the worst tenth of its own baseline: a run may be all
@@ -76,6 +76,11 @@ def is_behind(current: Score, trial: Score, best: Score) -> bool:
         lead(trial.of_joint(j), best.of_joint(j)) <= SIGNIFICANCE for j in worse
     )
     return not (chance or not worse) or gain(current, trial) < MOST * gain(current, best)
+
+
+def much_is_left(score: Score) -> Mask:
+    """(n,) joints of which a multiple of the baseline is left."""
+    return np.asarray(score.energy >= MULTIPLE**2 * score.rows)
 
 
 def soaked(current: Score, best: Score) -> Array:

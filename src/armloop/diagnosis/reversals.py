@@ -27,6 +27,7 @@ from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, SIGNIFICANCE
+from armloop.diagnosis.score import mean_by_joint
 from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
@@ -165,11 +166,7 @@ class _View:
 
     def mean_squares(self, fit: Fit) -> Array:
         """(n,) mean held-out squared error at reversals, weighted; NaN where there is none."""
-        n = fit.stacked.joints
-        joint = self.joint[self.rows]
-        counts = np.bincount(joint, minlength=n)
-        sums = np.bincount(joint, weights=fit.held_out[self.rows] ** 2, minlength=n)
-        return np.divide(sums, counts, out=np.full(n, np.nan), where=counts > 0)
+        return mean_by_joint(self.joint[self.rows], fit.stacked.joints, fit.held_out[self.rows] ** 2)
 
     def suspects(self, current: Fit) -> list[int]:
         """Joints (0-based) with enough reversals and an error there that an effect could noticeably lower."""

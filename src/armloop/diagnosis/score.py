@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armloop.util.arrays import Array, Index, Mask
 
@@ -52,6 +54,11 @@ class Score:
         return np.asarray(self.counts.sum(axis=1))
 
     @property
+    def excess(self) -> Array:
+        """(n,) what is left of each joint beyond the baseline."""
+        return self.energy - self.rows
+
+    @property
     def seen(self) -> Index:
         """(n,) blocks in which a joint has rows."""
         return np.asarray((self.counts > 0).sum(axis=1))
@@ -60,3 +67,13 @@ class Score:
     def error(self) -> float:
         """Held-out squared error, weighted."""
         return float(self.errors.sum())
+
+
+def mean_by_joint(joint: Index, n: int, values: Array) -> Array:
+    """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
+    return ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
+
+
+def ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """x / y, NaN where y is zero."""
+    return np.divide(x, y, out=np.full(len(x), np.nan), where=y != 0)

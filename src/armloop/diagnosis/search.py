@@ -16,13 +16,13 @@ from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     CHANCE,
     MOST,
-    MULTIPLE,
     SIGNIFICANCE,
     enough,
     gain,
     is_behind,
     is_worth,
     lead,
+    much_is_left,
     simplest_of_equals,
     times_enough,
 )
@@ -114,8 +114,7 @@ class _Search:
     ) -> None:
         self.evidence, self.progress, self.panel, self.barred = evidence, progress, panel, barred
         self.nothing = Known.of(evidence)
-        bare = self.nothing.fit.score
-        self.explainable: Array = np.maximum(bare.energy - bare.rows, 1e-9)
+        self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
         self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
@@ -166,7 +165,7 @@ class _Search:
         beside the other.
         """
         current, trials = self._asked(beside)
-        if (current.energy < MULTIPLE**2 * current.rows).all() or len(beside) + 2 > _MOST_EFFECTS:
+        if not much_is_left(current).any() or len(beside) + 2 > _MOST_EFFECTS:
             return []
         doubtful = [
             trial
@@ -216,8 +215,8 @@ class _Search:
 
     def _is_much(self, current: Score, trial: Score) -> bool:
         """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""
-        removed, left = current.energy - trial.energy, current.energy - current.rows
-        of_the_rest = (removed >= MOST_OF_REST * left) & (removed > enough(self.evidence, current))
+        removed = current.energy - trial.energy
+        of_the_rest = (removed >= MOST_OF_REST * current.excess) & (removed > enough(self.evidence, current))
         return bool(((removed >= LEAST_SHARE * self.explainable) | of_the_rest).any())
 
     def _exchanged(self, found: list[Found]) -> list[Found]:
@@ -321,7 +320,7 @@ def outweighed(
 
     after = score(outcome.after)
     rest = np.zeros(len(after.energy))
-    rest[list(left)] = np.maximum(after.energy - after.rows, 0.0)[list(left)]
+    rest[list(left)] = np.maximum(after.excess, 0.0)[list(left)]
     margins = []
     for effect in among:
         others = score(without_effect(evidence, outcome, effect).after)

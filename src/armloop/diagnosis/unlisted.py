@@ -269,14 +269,13 @@ def _names(library: AngleSums, j: int) -> list[str]:
 
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
-    y = after.held_out[mine]
+    y, block, fold = after.held_out[mine], after.stacked.block[mine], after.stacked.fold[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
     moving = evidence.samples.motion.take(rows)
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, own = library.columns(moving), moving.v[:, [j]]
     X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
     names = _names(library, j)
-    fold = after.stacked.fold[mine]
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
     sparse = Sparse(max_terms=_MOST_TERMS, correlation=20.0)
@@ -288,11 +287,11 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
         sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
     )
     if not len(stable) or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
-        return _Law([], y, after.stacked.block[mine])
+        return _Law([], y, block)
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
     errors = np.sqrt(np.diag(spread))
     if (np.abs(beta) < SIGNIFICANCE * errors).all():
-        return _Law([], y, after.stacked.block[mine])  # as an effect of which no coefficient is clear
+        return _Law([], y, block)  # as an effect of which no coefficient is clear
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, after.stacked.block[mine], errors)
+    return _Law(terms, error, block, errors)
