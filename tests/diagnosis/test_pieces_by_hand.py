@@ -118,7 +118,7 @@ class TestSearch:
         monkeypatch.setattr(search, "_known", lambda evidence, found: SimpleNamespace(fit=len(found)))
         monkeypatch.setattr(search, "clear", lambda evidence, outcome: outcome)
         outcome = made.outcome()
-        assert len(outcome.found) == outcome.after == min(worth, search._MOST_EFFECTS)
+        assert len(outcome.found) == outcome.after == min(worth, search.MOST_EFFECTS)
         # what is added and taken back again is the end of it
         made._exchanged = lambda found: found[:1]
         assert len(made.outcome().found) == 1

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from armloop.data.blocks import block_numbers, halves, widened
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
@@ -26,9 +26,8 @@ from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask, stretches
 
-#: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
-BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
-FOLDS = 2
+#: Shortest block, s, and number of folds.
+SHORTEST_BLOCK, FOLDS = 1.0, 2
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.

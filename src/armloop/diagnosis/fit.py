@@ -15,13 +15,12 @@ from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
 from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
-from armloop.regression.embedded import solve, unit_scale
+from armloop.regression.embedded import RIDGE, solve, unit_scale
 from armloop.regression.moments import Moments
 from armloop.util.arrays import TINY, Array
 
 #: Coefficients and a nonlinear parameter are found in turn so many times more.
 REFINEMENTS = 3
-_RIDGE = 1e-8
 
 
 class Shape(NamedTuple):
@@ -109,7 +108,7 @@ def _wald(x: Array, spread: Array) -> tuple[float, int]:
     known = np.flatnonzero(np.isfinite(np.diag(spread)) & (np.diag(spread) > 0))
     size = np.sqrt(np.diag(spread)[known])
     R, z = spread[np.ix_(known, known)] / np.outer(size, size), x[known] / size
-    return float(z @ np.linalg.solve(R + _RIDGE * np.eye(len(known)), z)), len(known)
+    return float(z @ np.linalg.solve(R + RIDGE * np.eye(len(known)), z)), len(known)
 
 
 def deviate(chi_square: float, freedom: int) -> float:
@@ -197,7 +196,7 @@ def covariance(X: Array, left: Array, rows: Stacked) -> Array:
     scale = unit_scale(G)
     values, vectors = np.linalg.eigh(again / np.outer(scale, scale).clip(min=TINY))
     spread = in_time + (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
-    unit = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
+    unit = G * np.outer(scale, scale) + RIDGE * np.eye(len(G))
     own = scale[:, None] * np.linalg.solve(unit, scale[:, None] * (X.T @ rows.model_errors))
     spread += own @ own.T
     spread[scale == 0, scale == 0] = np.inf

@@ -33,8 +33,6 @@ CREEP = 0.01
 _UNSURE = 0.8
 #: … and at rest it can hold this many times its sliding level.
 _STICTION = 1.2
-#: Torque and motion of one sample may be apart by this part of a sample period.
-_APART = 0.5
 
 
 def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()) -> tuple[Array, Mask]:
@@ -114,7 +112,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     for run in motion.runs():
         if run.stop - run.start > 2:
             rate[run] = np.gradient(tau[run], motion.time[run], axis=0)
-    late = _APART * evidence.samples.period * rate
+    late = 0.5 * evidence.samples.period * rate  # torque and motion of a sample may be half a period apart
     supplied = NEARLY * (evidence.residual([]) - residual) ** 2
     return np.asarray(
         np.sqrt(np.maximum(own, 1e-12) ** 2 + late**2 + contradiction(model, motion) ** 2 + supplied)

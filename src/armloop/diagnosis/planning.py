@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armloop.data.blocks import BLOCK_SECONDS
 from armloop.data.motion import Motion
 from armloop.diagnosis.confounded import Law, Rivalry
 from armloop.diagnosis.diagnose import Diagnosis
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.isolability import Stage, context_of
 from armloop.experiment.design import (
     CRITERIA,
@@ -35,8 +36,9 @@ from armloop.util.progress import Progress
 
 #: s of a period, repeated, and its harmonics: up to 0.4 Hz.
 PERIOD, _HARMONICS = 20.0, 8
-#: s that a diagnosis needs at least, and that an arm is asked to move at most.
-_SHORTEST, _LONGEST = 12.0, 3600.0
+#: s that a diagnosis needs at least, in blocks of their full length, and that an arm is asked to move at most.
+_SHORTEST = FEWEST_BLOCKS * BLOCK_SECONDS
+_LONGEST = 3600.0
 #: Random motions that show what is possible within the limits, and s between their samples.
 _TYPICAL, _STEP = 8, 0.05
 #: Of those, motions on which it is judged whether two effects can be told apart at all.

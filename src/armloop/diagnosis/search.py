@@ -40,7 +40,8 @@ from armloop.util.progress import Progress, paced
 LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
-_MOST_EFFECTS = 4
+#: A run tells so many effects apart, or terms of a law, at most.
+MOST_EFFECTS = 4
 _ROUNDS = 2
 
 
@@ -122,7 +123,7 @@ class _Search:
         found: list[Found] = []
         known = self.nothing
         seen: set[frozenset[Place]] = {frozenset()}
-        while len(found) < _MOST_EFFECTS:
+        while len(found) < MOST_EFFECTS:
             best = self._best(found)
             more = self._pair(found) if best is None else [best]
             if not more:
@@ -165,7 +166,7 @@ class _Search:
         beside the other.
         """
         current, trials = self._asked(beside)
-        if not much_is_left(current).any() or len(beside) + 2 > _MOST_EFFECTS:
+        if not much_is_left(current).any() or len(beside) + 2 > MOST_EFFECTS:
             return []
         doubtful = [
             trial

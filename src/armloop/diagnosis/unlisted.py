@@ -18,7 +18,7 @@ from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
 from armloop.diagnosis.judgement import CHANCE, MOSTLY, MULTIPLE, SIGNIFICANCE, enough, gain, lead
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import Outcome, pruned, without_effects_at
+from armloop.diagnosis.search import MOST_EFFECTS, Outcome, pruned, without_effects_at
 from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law
@@ -40,7 +40,6 @@ REMAINDER = 0.03
 #: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
 _FEWEST = 50
-_MOST_TERMS = 4
 _MOST_CANDIDATES = 1500
 _RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
@@ -278,7 +277,7 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     names = _names(library, j)
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
-    sparse = Sparse(max_terms=_MOST_TERMS, correlation=20.0)
+    sparse = Sparse(max_terms=MOST_EFFECTS, correlation=20.0)
     supports = [sparse.support(whole - part, none) for part in parts]
     error = np.array(y)
     for k, (part, support) in enumerate(zip(parts, supports, strict=True)):

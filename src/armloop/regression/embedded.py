@@ -11,8 +11,10 @@ from scipy.linalg import block_diag
 from armloop.regression.moments import Moments, unit_length
 from armloop.util.arrays import Array
 
+#: Ridge beside columns of unit length: what they do not determine is next to nothing.
+RIDGE = 1e-8
 _ITERATIONS = 30
-_RIDGE, _STRONG_RIDGE = 1e-8, 1e-3
+_STRONG_RIDGE = 1e-3
 _NOTHING = 1e-20
 
 
@@ -50,7 +52,7 @@ def solve(
         return np.zeros(0), [], np.zeros((0, 0))
     edges, found = np.cumsum(sizes)[:-1], []
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
-    for part in (_RIDGE, _STRONG_RIDGE):
+    for part in (RIDGE, _STRONG_RIDGE):
         free = np.split(ridge(moments.G, moments.b, part), edges)
         x = [effect.start(own) for effect, own in zip(effects, free, strict=True)]
         found.append(_gauss_newton(moments, effects, x))
@@ -87,7 +89,7 @@ def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Arr
     return np.concatenate(betas), np.asarray(block_diag(*slopes))
 
 
-def ridge(G: Array, b: Array, part: float = _RIDGE) -> Array:
+def ridge(G: Array, b: Array, part: float = RIDGE) -> Array:
     """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
     scale = unit_scale(G)
     scaled = G * np.outer(scale, scale) + part * np.eye(len(G))

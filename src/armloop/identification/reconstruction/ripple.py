@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from armloop.data.blocks import block_numbers
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import Conditioning, ShortRunError, preprocess
@@ -32,7 +32,7 @@ _BAND = 0.4
 _WORTH = 0.005
 #: Probability that noise alone shows any line.
 _CHANCE = 1e-3
-_MOST, _FOLDS, _BLOCK_SECONDS, _FEWEST = 3, 5, 1.5, 500
+_MOST, _FOLDS, _FEWEST = 3, 5, 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def _residuals(
             number += 1
             tau = np.column_stack([np.interp(time, full.motion.time, x) for x in full.tau.T])
             left = tau - model.predict(low.motion)
-            block = following + block_numbers(low.motion, _BLOCK_SECONDS)
+            block = following + block_numbers(low.motion, BLOCK_SECONDS)
             following = int(block[-1]) + 1
             fitted = ~held_out[nearest]
             for j in range(model.arm.n):
