@@ -21,6 +21,7 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.bandwidth import LEAST, Table, table_at
+from armloop.identification.reconstruction.projected import RIDGE
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -36,7 +37,6 @@ _ROUNDS, _BEGIN = 30, 0.05
 _KNOWN = 0.5
 #: Half the step of the derivative by q, rad (m).
 _STEP = 0.01
-_RIDGE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +191,7 @@ class _Mixed:
         X, y, joint = self.table.weighed(self.table.tau, rows, self.scale)
         instant = np.nonzero(rows.T)[1]
         A, b = X.T @ X, X.T @ y
-        ridge = np.diag(_RIDGE * np.maximum(np.diag(A), 1e-12))
+        ridge = np.diag(RIDGE * np.maximum(np.diag(A), 1e-12))
         theta: Any = np.linalg.solve(A + ridge, b)
         found, spread = np.zeros((self.logs, n)), np.full(n, _BEGIN)
         variances = np.zeros(n)

@@ -19,7 +19,7 @@ _STANDS_OUT = 20.0
 #: … from a quarter below to a quarter above, and of six at least, and pass so many times within the travel.
 _BESIDE, _FEWEST, _PERIODS = 0.25, 6, 1.5
 #: Lines that are handed out, and peaks that are looked at for each.
-_MOST, _TRIED = 3, 6
+MOST, _TRIED = 3, 6
 
 
 def spectrum(q: Array, x: Array, orders: Array) -> Array:
@@ -53,7 +53,7 @@ def lines(q: Array, x: Array, orders: Sequence[float], worth: float) -> Iterator
     every = np.arange(1.0, orders[-1] + 1)
     may = np.isin(every, np.asarray(orders)) & (every >= _PERIODS * resolved)
     least = worth * float(left @ left)
-    for _ in range(_MOST):
+    for _ in range(MOST):
         power = spectrum(q, left, every)
         strong = np.flatnonzero(may & (power >= max(least, TINY)))
         strongest = strong[np.argsort(-power[strong], kind="stable")]
