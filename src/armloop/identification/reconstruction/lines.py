@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: A line must be so many times as strong as the median of the orders beside it …
 _STANDS_OUT = 20.0
@@ -74,7 +73,7 @@ def lines(q: Array, x: Array, orders: Sequence[float], worth: float) -> Iterator
             return
 
 
-def _beside(orders: Array, order: float, resolved: float) -> NDArray[np.intp]:
+def _beside(orders: Array, order: float, resolved: float) -> Index:
     """Places of the orders beside one that are not the same line: within a quarter of it, or the nearest six."""
     away = np.abs(orders - order)
     apart = np.flatnonzero(away > max(resolved, 0.5))
