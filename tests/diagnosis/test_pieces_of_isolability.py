@@ -239,7 +239,7 @@ class TestIsolability:
         )
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
         diagnosis: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
-        listed = confounded.Pair(laws[0], self.law(rivals["listed"][0]), ())
+        listed = confounded.Rivalry(laws[0], self.law(rivals["listed"][0]), ())
         found = confounded.lookalikes(diagnosis, laws, [listed], run)
         names = [(way.law, way.rival.effect.place[0], way.rival.shape, way.others) for way in found]
         assert names == [(laws[0], "like", 5.0, (laws[1],)), (laws[1], "like", 5.0, (laws[0],))]
@@ -267,7 +267,7 @@ class TestIsolability:
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
         (pair,) = confounded.pairs(diagnosis, laws, run)
         assert asked == [(["second", "third", "rival"], [1.0, 1.0, 5.0], "all of it")]
-        assert (pair.found, pair.others) == (laws[0], (laws[1], laws[2]))
+        assert (pair.law, pair.others) == (laws[0], (laws[1], laws[2]))
         assert (pair.rival.effect.place[0], pair.rival.shape) == ("rival", 5.0)
         assert pair.rival.added.parameters == "of the rival"
 
@@ -308,7 +308,7 @@ class TestNextRun:
             made = tuple(SimpleNamespace(left=lambda stage, of=of: of[stage]) for of in both)
             name = next(names)
             side: Any = SimpleNamespace(effect=name)
-            pairs.append(SimpleNamespace(found=side, rival=side, rivalries=lambda made=made: made))
+            pairs.append(SimpleNamespace(law=side, rival=side, both_ways=lambda made=made: made))
         design = SimpleNamespace(reference="made")
         planner = SimpleNamespace(
             possible=lambda ways: [way for way in ways if possible and way.left(1) is not None],
