@@ -19,7 +19,7 @@ from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
 from armloop.diagnosis.judgement import MOSTLY, gain, leaves_more, much_is_left, soaked
-from armloop.diagnosis.search import Found, Outcome, clear, pruned
+from armloop.diagnosis.search import ROUNDS, Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
@@ -34,8 +34,6 @@ _PRICE = 40.0
 #: A load that is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
 _LEAST, _SHORTEST = 0.05, 0.4
 _ROUNDS = 30
-#: Load and what is beside it are found in turn so many times more.
-_TURNS = 2
 #: Seconds over which the residual's size is averaged to begin with.
 _WINDOW = 0.5
 
@@ -65,7 +63,7 @@ def account_with_load(
     if float(score.excess.sum()) > (1 - MOSTLY) * left:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
-    for _ in range(_TURNS):
+    for _ in range(ROUNDS):
         # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
         others = _with(plain.only(other.evidence.rows), load, other).fit.added()[1:]

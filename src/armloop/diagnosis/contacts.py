@@ -19,15 +19,15 @@ from armloop.diagnosis.innovations import at_rest, innovations
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
-from armloop.diagnosis.pushes import PAUSE, Contact, around, push
+from armloop.diagnosis.pushes import PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Array, Index, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
-#: It lasts while the novelty is above this part of its peak, and this long at least, s.
-_EDGE, _SHORTEST = 0.25, 0.1
+#: It lasts while the novelty is above this part of its peak.
+_EDGE = 0.25
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
 _SAME = 0.05
 #: Events fill at most this part of a joint's motion: what is there longer is none.
@@ -122,7 +122,7 @@ def _seen_whole(motion: Motion, contact: Contact) -> bool:
     start, end = ends(contact.added.parameters)
     run = next(run for run in motion.runs() if contact.rows[run].any())
     time = motion.time[run]
-    return bool(start - time[0] >= _SHORTEST and time[-1] - end >= _SHORTEST)
+    return bool(start - time[0] >= SHORTEST and time[-1] - end >= SHORTEST)
 
 
 def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
@@ -249,9 +249,9 @@ def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
                 first -= 1
             while last < mine.stop - 1 and one[last + 1] > _EDGE * peak:
                 last += 1
-            begins = first > mine.start and time[first] - time[mine.start] >= _SHORTEST
-            ends = last < mine.stop - 1 and time[mine.stop - 1] - time[last] >= _SHORTEST
-            if begins and ends and time[last] - time[first] >= _SHORTEST:
+            begins = first > mine.start and time[first] - time[mine.start] >= SHORTEST
+            ends = last < mine.stop - 1 and time[mine.stop - 1] - time[last] >= SHORTEST
+            if begins and ends and time[last] - time[first] >= SHORTEST:
                 burst = slice(int(rows[first]), int(rows[last]) + 1)
                 if bursts and bursts[-1].stop > burst.start:
                     burst = slice(bursts.pop().start, burst.stop)

@@ -25,6 +25,8 @@ MOST = 0.75
 MULTIPLE = 2.0
 #: More than this part of anything is most of it, and this part is nearly all.
 MOSTLY, NEARLY_ALL = 0.5, 0.8
+#: Less than this part of a torque, or of a force, is not noticed beside the rest of it.
+NOTICEABLE = 0.03
 
 
 def gain(current: Score, trial: Score) -> float:

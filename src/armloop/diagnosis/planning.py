@@ -13,6 +13,7 @@ from armloop.diagnosis.confounded import Law, Rivalry
 from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.isolability import Stage, context_of
+from armloop.diagnosis.judgement import NOTICEABLE
 from armloop.experiment.design import (
     CRITERIA,
     Columns,
@@ -45,8 +46,6 @@ _TYPICAL, _STEP = 8, 0.05
 _STAGES = 2
 #: How often a motion is designed anew, with what its rivals turned out to be able to.
 _ROUNDS = 2
-#: A law of whose torque all those motions together leave less than this part cannot be told from its rival.
-_NEVER = 0.03
 #: An effect of this many baselines, root mean square, is beyond doubt; what counts from there on is its shape.
 _ENOUGH = 5.0
 #: Part of the optimiser's usual iterations.
@@ -160,8 +159,8 @@ class Planner:
         return PERIOD / (40 * _HARMONICS)
 
     def possible(self, ways: Sequence[Rivalry]) -> list[Rivalry]:
-        """Those of which some motion within the limits shows that the rival is not the law."""
-        return [way for way in ways if way.left_on_all(self.stages) > _NEVER]
+        """Those of which motions within the limits leave a noticeable part of the law's torque to its rival."""
+        return [way for way in ways if way.left_on_all(self.stages) > NOTICEABLE]
 
     def whole(self, design: Design) -> FourierReference:
         """The motion in its full length."""

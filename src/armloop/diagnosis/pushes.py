@@ -10,7 +10,7 @@ from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import REFINEMENTS
-from armloop.diagnosis.judgement import MOSTLY, enough, leaves_more
+from armloop.diagnosis.judgement import MOSTLY, NOTICEABLE, enough, leaves_more
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
@@ -19,13 +19,13 @@ from armloop.util.arrays import Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
+#: An event lasts this long at least, s; pieces of it that are as long tell by themselves.
+SHORTEST = 0.1
 #: What was there must explain most of the event's energy, and a torque on one joint, or a force on the tool, is it if
 #: nothing with more freedom explains so much more.
 _MORE = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 _FEW = 3
-#: Directions in which the arm feels a force less than this part of what it feels of another tell nothing of it.
-_FELT = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +141,8 @@ def _trial(
     for _ in range(REFINEMENTS):
         burst = _interval(evidence, residual, weight, burst, kind)
     part, columns, y = _burst(evidence, residual, weight, burst, kind)
-    # Every other piece of a tenth of a second, of those that tell of it, is held out in turn.
-    pieces = block_numbers(part, 0.1)
+    # Every other piece, of those that tell of it, is held out in turn.
+    pieces = block_numbers(part, SHORTEST)
     telling = np.unique(pieces[columns.any(axis=(1, 2))])
     pieces = np.searchsorted(telling, pieces)
     left = np.array(y)
@@ -229,8 +229,9 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
 
 
 def _size(columns: Array, y: Array) -> Array:
+    """(p,) mean force or torque; along directions in which the arm hardly feels a force, none."""
     X = columns.reshape(-1, columns.shape[2])
-    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=_FELT)[0])
+    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=NOTICEABLE)[0])
 
 
 def _size_error(columns: Array, size: Array, left: Array, pieces: Index) -> Array:
@@ -240,7 +241,7 @@ def _size_error(columns: Array, size: Array, left: Array, pieces: Index) -> Arra
     """
     X = columns.reshape(-1, columns.shape[2])
     G = X.T @ X
-    bread = np.linalg.pinv(G, rcond=_FELT**2)
+    bread = np.linalg.pinv(G, rcond=NOTICEABLE**2)
     scores = np.einsum("njf,nj->nf", columns, left)
     sums = np.array([scores[pieces == piece].sum(axis=0) for piece in np.unique(pieces)])
     hidden = np.clip(np.diag(np.eye(len(G)) - bread @ G), 0.0, 1.0) * float(size @ size)

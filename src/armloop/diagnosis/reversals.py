@@ -26,7 +26,7 @@ from armloop.data.reversals import at_reversals, turning
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, SIGNIFICANCE
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NOTICEABLE, SIGNIFICANCE
 from armloop.diagnosis.score import mean_by_joint
 from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
 from armloop.diagnosis.trials import Known
@@ -36,13 +36,12 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.progress import Progress
 
 #: An effect must remove this part of a joint's squared error at reversals, so that it was a multiple of what remains;
-#: where the effect was found at another joint, most of it …
+#: where the effect was found at another joint, most of it.
 PLAIN = 1 - 1 / MULTIPLE**2
-#: … which must be at least this part of the joint's torque, both root mean square …
-NOTICEABLE = 0.03
-#: … and the log ratio of the errors in the blocks must be positive with the chance of error of a normal variable: in
-#: ratios, so that no fast reversal outweighs the others, of errors beside the least noticeable one, so that none does
-#: at which there is nothing to remove; by Student's t, for they may be few.
+#: That must be a noticeable part of the joint's torque, both root mean square, and the log ratio of the errors in the
+#: blocks must be positive with the chance of error of a normal variable: in ratios, so that no fast reversal outweighs the
+#: others, of errors beside the least noticeable one, so that none does at which there is nothing to remove; by Student's
+#: t, for they may be few.
 _CHANCE = float(norm.sf(SIGNIFICANCE))
 #: A simpler effect that leaves no more of the squared error than this part of it is as good.
 ALIKE = 0.1

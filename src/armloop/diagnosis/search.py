@@ -42,7 +42,8 @@ LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
 RIVAL_SHARE = 0.94
 #: A run tells so many effects apart, or terms of a law, at most.
 MOST_EFFECTS = 4
-_ROUNDS = 2
+#: What was found is found anew beside the rest so many times.
+ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +223,7 @@ class _Search:
 
     def _exchanged(self, found: list[Found]) -> list[Found]:
         """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
-        for _ in range(_ROUNDS if len(found) > 1 else 0):
+        for _ in range(ROUNDS if len(found) > 1 else 0):
             changed = False
             for k in range(len(found) - 1, -1, -1):
                 others = _others(found, k)
