@@ -76,28 +76,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     known = known_contacts(evidence)
     if evidence.rows.any():
         innovation, rest = innovations(evidence, residual, found)
-        far = far_outside(motion, evidence.model.history.get("range"))
-        tells = innovation != 0.0
-        rows, new = novelty(evidence, innovation, rest)
-        new = np.where(known[rows][:, None], 0.0, new)
-        level = np.abs(new)
-        bursts = _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
-        bursts = [
-            burst
-            for burst in bursts
-            if not _comes_back(evidence, rows, level, burst)
-            and not _sticks(evidence, burst)
-            and not _strays(far, burst)
-        ]
-        bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
-        for pulse in pulses(evidence.samples, innovation, ~far & ~known[:, None]):
-            burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
-            if (
-                not any(_meet(motion, burst, other) for other in bursts)
-                and not _comes_back(evidence, rows, pulse.level[rows], burst)
-                and not _sticks(evidence, burst)
-            ):
-                bursts.append(burst)
+        tells, bursts = innovation != 0.0, _unlike(evidence, innovation, rest, known)
     else:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
@@ -115,6 +94,37 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
         contacts.append(push(evidence, left, burst.rows, counted, own))
     return _distinct(motion, [contact for contact in contacts if contact and _seen_whole(motion, contact)])
+
+
+def _unlike(evidence: Evidence, innovation: Array, rest: Mask, known: Mask) -> list[Burst]:
+    """Stretches unlike what the same joints leave in like motion, then those unlike what is left just before and after.
+
+    Args:
+        innovation, rest: (N, n) of :func:`innovations`.
+        known: (N,) samples of events that are known.
+    """
+    motion = evidence.samples.motion
+    far = far_outside(motion, evidence.model.history.get("range"))
+    rows, new = novelty(evidence, innovation, rest)
+    new = np.where(known[rows][:, None], 0.0, new)
+    level = np.abs(new)
+    bursts = [
+        burst
+        for burst in _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
+        if not _comes_back(evidence, rows, level, burst)
+        and not _sticks(evidence, burst)
+        and not _strays(far, burst)
+    ]
+    bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
+    for pulse in pulses(evidence.samples, innovation, ~far & ~known[:, None]):
+        burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
+        if (
+            not any(_meet(motion, burst, other) for other in bursts)
+            and not _comes_back(evidence, rows, pulse.level[rows], burst)
+            and not _sticks(evidence, burst)
+        ):
+            bursts.append(burst)
+    return bursts
 
 
 def _seen_whole(motion: Motion, contact: Contact) -> bool:
