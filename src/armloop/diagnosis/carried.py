@@ -53,14 +53,13 @@ def account_with_load(
     if found is None:
         return None
     load, unknown = found
-    plain = without(whole.only(whole.rows & ~unknown), [])
+    plain = _known_part(whole, unknown)
     known = Known.of(plain, [load], [_shape(load)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
-    left = account.left(account.remaining()) - float(account.whole.rows.sum())
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
-    score = _with(plain, load, account).fit.score
-    if float(score.excess.sum()) > (1 - MOSTLY) * left:
+    least = (1 - MOSTLY) * _excess(account)
+    if float(_with(plain, load, account).fit.score.excess.sum()) > least:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
     for _ in range(ROUNDS):
@@ -71,23 +70,36 @@ def account_with_load(
         if found is None:
             break
         load, unknown = found
-        plain = without(whole.only(whole.rows & ~unknown), [])
+        plain = _known_part(whole, unknown)
         other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
-    if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - MOSTLY) * left:
+    if _excess(other) > least:
         return None
+    loaded = _loaded(whole, load, other)
+    return None if _at_the_cost_of_others(account, loaded) else loaded
+
+
+def _known_part(whole: Evidence, unknown: Mask) -> Evidence:
+    """The run without known events, and without samples (N, n) of which nothing is to be said."""
+    return without(whole.only(whole.rows & ~unknown), [])
+
+
+def _excess(account: Account) -> float:
+    """Squared error, weighted, that an account leaves of its whole run beyond the baseline."""
+    return account.left(account.remaining()) - float(account.whole.rows.sum())
+
+
+def _loaded(whole: Evidence, load: CarriedLoad, other: Account) -> Account:
+    """The account by the model as it is of one by a model that has the load: that is among the effects found."""
     evidence = whole.only(other.evidence.rows)
     nothing, alone = (Known.of(evidence, *given).fit for given in ((), ([load], [_shape(load)])))
     bare = nothing.score
     share = gain(bare, alone.score) / max(float(bare.excess.sum()), 1e-9)
     every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
     together = Outcome(every, nothing, _with(evidence, load, other).fit)
-    # of the model as it is: the load is among the effects found
     run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
-    outcome = clear(evidence, pruned(evidence, together))
-    loaded = replace(other, whole=run, evidence=evidence, outcome=outcome)
-    return None if _at_the_cost_of_others(account, loaded) else loaded
+    return replace(other, whole=run, evidence=evidence, outcome=clear(evidence, pruned(evidence, together)))
 
 
 def _at_the_cost_of_others(account: Account, loaded: Account) -> bool:

@@ -39,7 +39,9 @@ REMAINDER = 0.03
 #: Effects that leave more than this part of a joint's energy as a real residual are not what is there; nor are those of
 #: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
+#: Fewest rows of a joint that tell of a law.
 _FEWEST = 50
+#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be.
 _MOST_CANDIDATES = 1500
 _RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
