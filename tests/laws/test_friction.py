@@ -56,6 +56,49 @@ def test_the_parameters_of_equation_34_are_read_back():
     plain = FrictionLaw(((FrictionTerm("sign", 0.7),),))
     assert plain.stribeck_parameters(0) == {"static": 0.7, "coulomb": 0.7}
     assert FrictionLaw(((),)).stribeck_parameters(0) == {"static": 0.0, "coulomb": 0.0}
+    falling = (
+        FrictionTerm("smooth_sign", FC, 0.003),
+        FrictionTerm("viscous", FV),
+        FrictionTerm("stribeck_peak", FS - FC, VS),
+    )
+    assert FrictionLaw((falling,)).stribeck_parameters(0) == pytest.approx(
+        stribeck_law().stribeck_parameters(0)
+    )
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        [FrictionTerm("smooth_sign", FC, 0.003)],
+        [FrictionTerm("smooth_sign", FC, 0.5 * VS), FrictionTerm("stribeck_peak", FS, VS)],
+        [
+            FrictionTerm("sign", FC),
+            FrictionTerm("stribeck_peak", FS, VS),
+            FrictionTerm("stribeck_peak", FS, 9.0),
+        ],
+        [
+            FrictionTerm("sign", FC),
+            FrictionTerm("smooth_sign", FC, 0.003),
+            FrictionTerm("stribeck_peak", FS, VS),
+        ],
+        [FrictionTerm("sign", FC), FrictionTerm("stribeck", FS, VS), FrictionTerm("hysteresis", FS, 0.01)],
+    ],
+    ids=["only fades in", "not there where the fall ends", "two falls", "two levels", "memory"],
+)
+def test_dry_friction_of_another_form_has_no_such_parameters(others: list[FrictionTerm]) -> None:
+    assert FrictionLaw(((*others, FrictionTerm("viscous", FV)),)).stribeck_parameters(0) == {}
+
+
+@pytest.mark.parametrize("kind", ["stribeck", "stribeck_peak", "smooth_sign"])
+def test_the_slope_by_the_parameter_is_the_derivative(kind: str) -> None:
+    v = np.linspace(-1.0, 1.0, 41)
+    exact = {
+        "stribeck": -2 * v * np.abs(v) / 0.3**3 * np.exp(-((v / 0.3) ** 2)),
+        "stribeck_peak": 2 * v * np.abs(v) / 0.3**3 * np.exp(-((v / 0.3) ** 2)),
+        "smooth_sign": -v / 0.3**2 / np.cosh(v / 0.3) ** 2,
+    }
+    found = FrictionTerm(kind, 1.7, 0.3).slope(at_speeds(v), 0)
+    np.testing.assert_allclose(found, 1.7 * exact[kind], atol=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -15,14 +15,14 @@ from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
-from armloop.diagnosis.innovations import at_rest, innovations
+from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
@@ -75,8 +75,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     motion = evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
-        innovation, rest = innovations(evidence, residual, found)
-        tells, bursts = innovation != 0.0, _unlike(evidence, innovation, rest, known)
+        tells, bursts = _unlike(evidence, residual, found, known)
     else:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
@@ -96,14 +95,20 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     return _distinct(motion, [contact for contact in contacts if contact and _seen_whole(motion, contact)])
 
 
-def _unlike(evidence: Evidence, innovation: Array, rest: Mask, known: Mask) -> list[Burst]:
+def _unlike(
+    evidence: Evidence, residual: Array, found: Sequence[AddedEffect], known: Mask
+) -> tuple[Mask, list[Burst]]:
     """Stretches unlike what the same joints leave in like motion, then those unlike what is left just before and after.
 
     Args:
-        innovation, rest: (N, n) of :func:`innovations`.
         known: (N,) samples of events that are known.
+
+    Returns:
+        (N, n) samples that tell of an event, and the stretches.
     """
     motion = evidence.samples.motion
+    innovation, rest = innovations(evidence, residual, found)
+    held = np.abs(innovation) * deviations(evidence, residual) / np.maximum(dry_level(evidence, found), TINY)
     far = far_outside(motion, evidence.model.history.get("range"))
     rows, new = novelty(evidence, innovation, rest)
     new = np.where(known[rows][:, None], 0.0, new)
@@ -112,7 +117,7 @@ def _unlike(evidence: Evidence, innovation: Array, rest: Mask, known: Mask) -> l
         burst
         for burst in _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
         if not _comes_back(evidence, rows, level, burst)
-        and not _sticks(evidence, burst)
+        and not _sticks(evidence, burst, held)
         and not _strays(far, burst)
     ]
     bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
@@ -121,10 +126,10 @@ def _unlike(evidence: Evidence, innovation: Array, rest: Mask, known: Mask) -> l
         if (
             not any(_meet(motion, burst, other) for other in bursts)
             and not _comes_back(evidence, rows, pulse.level[rows], burst)
-            and not _sticks(evidence, burst)
+            and not _sticks(evidence, burst, held)
         ):
             bursts.append(burst)
-    return bursts
+    return innovation != 0.0, bursts
 
 
 def _seen_whole(motion: Motion, contact: Contact) -> bool:
@@ -161,14 +166,18 @@ def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]
     return kept
 
 
-def _sticks(evidence: Evidence, burst: Burst) -> bool:
-    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that."""
+def _sticks(evidence: Evidence, burst: Burst, held: Array) -> bool:
+    """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that.
+
+    Args:
+        held: (N, n) what is left beyond the dry friction that the model knows, in parts of that; as much again may be held.
+    """
     motion = evidence.samples.motion
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
     slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
-    return bool(slides.any() and not slides[j])
+    return bool(slides.any() and not slides[j] and held[burst.rows, j].mean() <= 1.0)
 
 
 def _strays(far: Mask, burst: Burst) -> bool:

@@ -15,7 +15,7 @@ touching the level inherited from the first: with level f_s and coefficient f_c 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,8 @@ from armloop.util.functions import NUMPY, Functions
 
 #: A joint that is no faster than this when a run begins, rad/s or m/s, begins at rest.
 _AT_REST = 0.005
+#: Part of a parameter by which a central difference steps: the third root of the rounding, where its error is least.
+_STEP = float(np.finfo(float).eps) ** (1 / 3)
 #: A state of which it is asked whether an element changes with the time: position, velocity, direction.
 _SOMEWHERE = (np.float64(0.3), np.float64(0.7), np.float64(1.0))
 
@@ -170,6 +172,10 @@ KINDS: dict[str, Element] = {
         lambda x, p, f: (1.0 - stribeck_fall(x.v, p, f)) * x.sign, "(1-exp(-(v{j}/{p:g})^2))*sign(v{j})", 2
     ),
 }
+#: Eq. (34) by kinds of elements: a level, and a rise from it (the level is f_s) or a fall onto it (the level is f_c).
+_EQUATION_34 = ("sign", "smooth_sign"), ("stribeck",), ("stribeck_peak",)
+#: A direction that fades in as tanh(v/p) is all there from this many p on, to half a percent.
+FADED = 3.0
 #: What a user calls the friction laws of the selection, and the kinds of elements that each consists of. Of the directions
 #: that fade in, plain Coulomb friction is the sharpest: the others stand in for what happens before the joint slides.
 FRICTION_LAWS: dict[str, tuple[str, ...]] = {
@@ -262,6 +268,12 @@ class FrictionTerm:
         """Whether it is proportional to the torque that passes the joint."""
         return self.element.by_load
 
+    def slope(self, motion: Motion, joint: int) -> Array:
+        """(N,) derivative of its torque by its parameter: the column of the parameter as an unknown (delta method)."""
+        h = _STEP * self.parameter
+        low, high = (replace(self, parameter=self.parameter + by).column(motion, joint) for by in (-h, h))
+        return np.asarray(self.coefficient * (high - low) / (2 * h))
+
     def column(
         self, motion: Motion, joint: int, load: Array | None = None, sign: Array | None = None
     ) -> Array:
@@ -273,6 +285,12 @@ class FrictionTerm:
         if self.by_load and load is None:
             raise ModelError(f"friction term {self.kind!r} needs the load torque")
         return column(self.element, motion, Direction(joint), self.parameter, load, sign)
+
+
+def stribeck_term(law: Iterable[FrictionTerm]) -> FrictionTerm | None:
+    """The term of a joint's law whose parameter is the Stribeck velocity; None without one, or of a row of several."""
+    falls = [term for term in law if term.kind in _EQUATION_34[1] + _EQUATION_34[2]]
+    return falls[0] if len(falls) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -294,17 +312,31 @@ class FrictionLaw:
         """Whether the friction of a joint (0-based) has memory."""
         return any(term.element.way == "memory" for term in self.terms[joint])
 
+    def stribeck_sums(self, joint: int) -> dict[str, list[FrictionTerm]]:
+        """f_s, f_c, f_v of Eq. (34) for a joint (0-based), each by the terms whose coefficients add up to it.
+
+        Empty where the dry friction has another form: of several levels, with falls at several velocities, with memory, or
+        with a level that is not yet all there where the fall ends.
+        """
+        terms = self.terms[joint]
+        level, rise, fall = ([t for t in terms if t.kind in kinds] for kinds in _EQUATION_34)
+        dry = [t for t in terms if t.element.dry and not t.by_load]
+        fades = any(t.element.way == "fading" for t in level)
+        if len(level) > 1 or len(rise + fall) > 1 or len(dry) > len(level + rise + fall):
+            return {}
+        if fades and not (fall and fall[0].parameter > FADED * level[0].parameter):
+            return {}
+        viscous = [t for t in terms if t.kind == "viscous"]
+        sums = {"static": level + fall, "coulomb": level + rise}
+        return {**sums, "viscous": viscous} if viscous else sums
+
     def stribeck_parameters(self, joint: int) -> dict[str, float]:
         """f_s, f_c, f_v, v_s of Eq. (34) for a joint (0-based), where the law has that form."""
-        by_kind = {term.kind: term for term in self.terms[joint]}
-        static = by_kind["sign"].coefficient if "sign" in by_kind else 0.0
-        values = {"static": static, "coulomb": static}
-        if "stribeck" in by_kind:
-            values["coulomb"] += by_kind["stribeck"].coefficient
-            values["stribeck_velocity"] = by_kind["stribeck"].parameter
-        if "viscous" in by_kind:
-            values["viscous"] = by_kind["viscous"].coefficient
-        return values
+        values = {
+            key: sum(term.coefficient for term in terms) for key, terms in self.stribeck_sums(joint).items()
+        }
+        fall = stribeck_term(self.terms[joint])
+        return {**values, "stribeck_velocity": fall.parameter} if values and fall else values
 
     def to_dict(self) -> list[list[dict[str, Any]]]:
         """JSON-ready values, one list of terms per joint."""

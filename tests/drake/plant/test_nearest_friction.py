@@ -40,6 +40,8 @@ def test_a_law_of_that_form_is_taken_as_it_is_and_none_drives(arm) -> None:
         pytest.approx((0.75, 0.75, 0.3, 0.0)),
         (0.0, 0.0, 0.3, 0.0),
     ]
+    falling = (FrictionTerm("smooth_sign", 0.5, 0.003), FrictionTerm("stribeck_peak", 0.25, 0.123))
+    assert numbers(nearest.nearest_friction(of_joints(arm, falling, (), ()))[0]) == (0.75, 0.5, 0.123, 0.0)
     plain = nearest.nearest_friction(of_joints(arm, (FrictionTerm("sign", 0.5),), (), ()))
     assert [numbers(one) for one in plain] == [
         (0.5, 0.5, 0.1, 0.0),

@@ -1,6 +1,7 @@
 """Standard errors reach the model file under the terms' names and do not depend on how samples are cut."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -66,6 +67,43 @@ def test_the_coulomb_level_is_the_sum_of_two_coefficients_that_are_correlated(fi
         excess = next(e["std_error"] for name, e in parts.items() if name.startswith("(1-exp"))
         assert errors["stribeck"][j]["static"]["std_error"] == pytest.approx(static)
         assert errors["stribeck"][j]["coulomb"]["std_error"] < 0.9 * np.hypot(static, excess)
+
+
+def test_the_same_law_as_a_fall_has_the_same_errors_of_its_velocity_too(fit: Any) -> None:
+    """Level and rise, or level and fall onto it: f_s, f_c, f_v and v_s are the same numbers."""
+    model, samples, fitted = fit
+    as_rise = standard_errors(model, samples, fitted)["stribeck"]
+    other = replace(model, friction=FrictionLaw(tuple(map(_as_fall, model.friction.terms))))
+    as_fall = standard_errors(other, samples, fitted)
+    for j, (rise, fall) in enumerate(zip(as_rise, as_fall["stribeck"], strict=True)):
+        assert set(rise) == set(fall) == {"static", "coulomb", "viscous", "stribeck_velocity"}
+        assert as_fall["friction"][j]["v_s"]["std_error"] == fall["stribeck_velocity"]["std_error"]
+        for key, one in rise.items():
+            assert fall[key]["value"] == pytest.approx(one["value"])
+            assert fall[key]["std_error"] == pytest.approx(one["std_error"], rel=1e-3)
+
+
+def test_a_file_from_before_the_falls_velocity_was_unknown_still_tells_the_torques_errors(fit: Any) -> None:
+    model, samples, fitted = fit
+    model = replace(model, friction=FrictionLaw(tuple(map(_as_fall, model.friction.terms))))
+    errors = standard_errors(model, samples, fitted)
+    now = torque_errors(replace(model, uncertainty=errors), samples)
+    for one in errors["torque"]:
+        kept = [k for k, name in enumerate(one["unknowns"]) if name != "v_s"]
+        one["unknowns"] = [one["unknowns"][k] for k in kept]
+        one["directions"] = [one["directions"][k] for k in kept]
+    before = torque_errors(replace(model, uncertainty=errors), samples)
+    assert before.shape == now.shape and 0 < np.linalg.norm(before) < np.linalg.norm(now)
+
+
+def _as_fall(law: Sequence[FrictionTerm]) -> tuple[FrictionTerm, ...]:
+    """f_s sign(v) with the rise to f_c, written as f_c with the fall from f_s; other terms as they are."""
+    sign, rise = (next(term for term in law if term.kind == kind) for kind in ("sign", "stribeck"))
+    return (
+        FrictionTerm("smooth_sign", sign.coefficient + rise.coefficient, 1e-9),
+        FrictionTerm("stribeck_peak", -rise.coefficient, rise.parameter),
+        *(term for term in law if term not in (sign, rise)),
+    )
 
 
 def test_pieces_do_not_show(fit, monkeypatch):

@@ -14,7 +14,7 @@ from armloop.util.functions import NUMPY
 
 _SPEEDS = 60
 _VELOCITIES = np.geomspace(0.005, 1.0, 40)  # v_s tried, as parts of the largest speed
-_EXACT = {"sign", "stribeck", "viscous"}
+_EXACT = {"sign", "smooth_sign", "stribeck", "stribeck_peak", "viscous"}
 _POSTURES = 20
 
 
@@ -29,8 +29,8 @@ def nearest_friction(model: ReconstructedModel) -> tuple[JointFriction, ...]:
     curves: tuple[Array, Array] | None = None
     for j, terms in enumerate(model.friction.terms):
         effects = [a for a in model.effects if a.effect.joint == j + 1 and a.effect.name.endswith("friction")]
-        if {t.kind for t in terms} <= _EXACT and not effects:
-            p = model.friction.stribeck_parameters(j)
+        p = model.friction.stribeck_parameters(j)
+        if p and {t.kind for t in terms} <= _EXACT and not effects:
             static, coulomb = max(p["static"], 0.0), max(p["coulomb"], 0.0)
             speed = p.get("stribeck_velocity", 0.1)
             found.append(JointFriction(max(static, coulomb), coulomb, speed, max(p.get("viscous", 0.0), 0.0)))

@@ -7,21 +7,19 @@ is a linear function of them, so that its standard errors follow from their cova
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from armloop.data.motion import Motion, Samples
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY
-from armloop.laws.friction import FrictionTerm, stribeck_fall
+from armloop.laws.friction import FADED, FrictionTerm, stribeck_term
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
 #: Speeds at which a law is compared with its line, and the quantiles of the fitted speeds that they lie between.
 _SPEEDS, _BETWEEN = 100, (0.1, 0.95)
-#: Parameter of what fades in, of the slowest of these speeds: nearer to rest the direction is not yet all there.
-_FADED = 3.0
 
 
 def friction_line(
@@ -47,11 +45,10 @@ def friction_line(
     if not terms or not len(moving):
         return {}
     low, high = np.quantile(moving, _BETWEEN)
-    fades = [_FADED * t.parameter for t in terms if t.kind == "smooth_sign"]
+    fades = [FADED * t.parameter for t in terms if t.kind == "smooth_sign"]
     low = min(max(low, *fades, 0.0), 0.5 * high) if fades else low
     v = np.linspace(low, high, _SPEEDS)
-    # Half the difference of both directions: what an offset adds to each is no friction.
-    columns = np.column_stack([0.5 * (_column(t, v) - _column(t, -v)) for t in terms])
+    columns = np.column_stack([_odd(_column, t, v) for t in terms])
     fit = np.linalg.pinv(np.column_stack([np.ones_like(v), v]))
     line = fit @ columns
     places = {t.name(joint + 1): k for k, t in enumerate(terms)}
@@ -60,9 +57,9 @@ def friction_line(
         if name in places:
             weights[:, k] = line[:, places[name]]
         elif name == STRIBECK_VELOCITY:
-            own = next(t for t in terms if t.kind == "stribeck")
-            slope = -2 * v**2 / own.parameter**3 * stribeck_fall(v, own.parameter)
-            weights[:, k] = fit @ (own.coefficient * slope)
+            own = stribeck_term(terms)
+            assert own is not None
+            weights[:, k] = fit @ _odd(_slope, own, v)
     values = line @ [t.coefficient for t in terms]
     errors = np.sqrt(np.maximum(np.einsum("ik,kl,il->i", weights, covariance, weights), 0.0))
     pairs = zip(("coulomb", "viscous"), values, errors, strict=True)
@@ -75,10 +72,17 @@ def entry(error: float, freedom: float) -> dict[str, float]:
     return {"std_error": float(error), "degrees_of_freedom": round(float(freedom), 1)}
 
 
-def _column(term: FrictionTerm, v: Array) -> Array:
-    """A term's values at speeds that have lasted: memory is fully slid."""
-    rates = v[:, None]
-    motion = Motion(
-        np.arange(float(len(v))), np.zeros_like(rates), rates, np.zeros_like(rates), np.arange(len(v))
-    )
-    return np.sign(v) if term.kind == "hysteresis" else term.column(motion, 0)
+def _column(term: FrictionTerm, motion: Motion) -> Array:
+    """A term's values where speeds have lasted: memory is fully slid."""
+    return np.sign(motion.v[:, 0]) if term.kind == "hysteresis" else term.column(motion, 0)
+
+
+def _slope(term: FrictionTerm, motion: Motion) -> Array:
+    return term.slope(motion, 0)
+
+
+def _odd(of: Callable[[FrictionTerm, Motion], Array], term: FrictionTerm, v: Array) -> Array:
+    """Half the difference of both directions: what an offset adds to each is no friction."""
+    still, index = np.zeros((len(v), 1)), np.arange(len(v))
+    ways = [Motion(index.astype(float), still, way * v[:, None], still, index) for way in (1.0, -1.0)]
+    return 0.5 * (of(term, ways[0]) - of(term, ways[1]))

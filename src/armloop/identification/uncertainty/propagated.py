@@ -65,9 +65,15 @@ def torque_errors(model: ReconstructedModel, samples: Samples) -> Array:
     known = {tuple(one["unknowns"]): _directions(one["directions"]) for one in kept}
     parts = []
     for problem in problems(model) if known else []:
-        directions = known.get(tuple(unknown.name for unknown in problem.unknowns))
-        if directions is None:
+        # files from before a fall's velocity was an unknown tell those of the coefficients
+        every = [[True] * len(problem.unknowns), [unknown.linear for unknown in problem.unknowns]]
+        names = np.array([unknown.name for unknown in problem.unknowns])
+        told = next((which for which in every if tuple(names[which]) in known), None)
+        if told is None:
             continue
+        found = known[tuple(names[told])]
+        directions = np.zeros((len(names), found.shape[1]))
+        directions[told] = found
         torque = np.zeros((*samples.motion.q.shape, directions.shape[1]))
         for design in problem.designs(samples):
             torque[:, design.joint] += design.X @ directions[design.where]

@@ -17,7 +17,7 @@ from armloop.identification.uncertainty.standard_errors import (
     gauss_newton_steps,
 )
 from armloop.identification.uncertainty.unknowns import STRIBECK_VELOCITY, Unknown
-from armloop.laws.friction import FrictionLaw
+from armloop.laws.friction import FrictionLaw, stribeck_term
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.robot.kinematics import nominal_parameters
@@ -83,7 +83,7 @@ def moved(model: ReconstructedModel, steps: Sequence[tuple[list[Unknown], Array]
                 term,
                 coefficient=values["friction", j, term.name(j + 1)],
                 parameter=values["friction", j, STRIBECK_VELOCITY]
-                if term.kind == "stribeck"
+                if term is stribeck_term(law)
                 else term.parameter,
             )
             for term in law

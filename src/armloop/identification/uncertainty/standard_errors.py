@@ -347,16 +347,10 @@ def _equations(
 
 def _stribeck(model: ReconstructedModel, parts: Sequence[Errors], joint: int) -> dict[str, dict[str, float]]:
     """f_s, f_c, f_v, v_s of Eq. (34) of a joint, each a sum of friction coefficients, with standard errors."""
-    kinds = {term.kind: term.name(joint + 1) for term in model.friction.terms[joint]}
-    sums = {"static": ("sign",), "coulomb": ("sign", "stribeck"), "viscous": ("viscous",)}
-    if "sign" not in kinds:
-        return {}
+    sums = model.friction.stribeck_sums(joint)
     found = {}
     for key, value in model.friction.stribeck_parameters(joint).items():
-        if key == "stribeck_velocity":
-            names = {STRIBECK_VELOCITY}
-        else:
-            names = {kinds[kind] for kind in sums.get(key, ()) if kind in kinds}
+        names = {term.name(joint + 1) for term in sums[key]} if key in sums else {STRIBECK_VELOCITY}
         for part in parts:
             chosen = np.array(
                 [u.kind == "friction" and u.joint == joint and u.name in names for u in part.unknowns], float

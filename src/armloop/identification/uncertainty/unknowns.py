@@ -17,7 +17,7 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.features.double_feature_set import products
 from armloop.features.rigid_body import BaseParameters, rotor_names
-from armloop.laws.friction import FrictionTerm, stribeck_fall
+from armloop.laws.friction import FrictionTerm, stribeck_term
 from armloop.model import ReconstructedModel
 from armloop.model.components import Lagrangian, RigidBody, SparseTerms
 from armloop.util.arrays import Array, Index
@@ -136,10 +136,10 @@ def _shared(model: ReconstructedModel, body: RigidBody | Lagrangian) -> Problem:
 
 
 def _friction_unknowns(law: Sequence[FrictionTerm], joint: int) -> list[Unknown]:
-    found = []
+    found, own = [], stribeck_term(law)
     for term in law:
         found.append(Unknown("friction", joint, term.name(joint + 1), term.coefficient, term.step))
-        if term.kind == "stribeck":
+        if term is own:
             found.append(
                 Unknown("friction", joint, STRIBECK_VELOCITY, term.parameter, term.step, linear=False)
             )
@@ -149,11 +149,9 @@ def _friction_unknowns(law: Sequence[FrictionTerm], joint: int) -> list[Unknown]
 def _friction_columns(
     law: Sequence[FrictionTerm], motion: Motion, joint: int, load: Array | None
 ) -> list[Array]:
-    columns = []
+    columns, own = [], stribeck_term(law)
     for term in law:
         columns.append(term.column(motion, joint, load))
-        if term.kind == "stribeck":
-            v, vs = motion.v[:, joint], term.parameter
-            slope = -2 * v * np.abs(v) / vs**3 * stribeck_fall(v, vs)
-            columns.append(term.coefficient * slope)
+        if term is own:
+            columns.append(term.slope(motion, joint))
     return columns
