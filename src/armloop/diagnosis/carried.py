@@ -24,7 +24,7 @@ from armloop.diagnosis.trials import Hypotheses, Known
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
 from armloop.model import AddedEffect
-from armloop.regression.embedded import solve
+from armloop.regression.embedded import ITERATIONS, solve
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
 from armloop.util.progress import Progress
@@ -33,7 +33,6 @@ from armloop.util.progress import Progress
 _PRICE = 40.0
 #: A load that is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
 _LEAST, _SHORTEST = 0.05, 0.4
-_ROUNDS = 30
 #: Seconds over which the residual's size is averaged to begin with.
 _WINDOW = 0.5
 
@@ -157,7 +156,7 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     theta, most = np.zeros(X.shape[2]), 0.0
     for carried in _starts(y, time, run):
         gains, beta = np.zeros(len(y)), theta
-        for _ in range(_ROUNDS):
+        for _ in range(ITERATIONS):
             if carried.sum() < 2 * X.shape[2]:
                 break
             beta, _, _ = solve(

@@ -14,6 +14,7 @@ from armloop.diagnosis.diagnose import Diagnosis
 from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.isolability import Stage, context_of
 from armloop.diagnosis.judgement import NOTICEABLE
+from armloop.diagnosis.search import ROUNDS
 from armloop.experiment.design import (
     CRITERIA,
     Columns,
@@ -44,8 +45,6 @@ _LONGEST = 3600.0
 _TYPICAL, _STEP = 8, 0.05
 #: Of those, motions on which it is judged whether two effects can be told apart at all.
 _STAGES = 2
-#: How often a motion is designed anew, with what its rivals turned out to be able to.
-_ROUNDS = 2
 #: An effect of this many baselines, root mean square, is beyond doubt; what counts from there on is its shape.
 _ENOUGH = 5.0
 #: Part of the optimiser's usual iterations.
@@ -175,7 +174,7 @@ class Planner:
         found = len({id(way.law) for way in ways})
         self.progress(f"designing a motion that tells {found} laws from their rivals")
         rivals, best, made = list(ways), -np.inf, None
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             regression, rivalries = self._regression(rivals)
             design = self._optimised(regression, unexplained(rivalries, _ENOUGH**2))
             stage = Stage.of_reference(self.evidence, self.whole(design))

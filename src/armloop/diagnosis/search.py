@@ -42,7 +42,7 @@ LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
 RIVAL_SHARE = 0.94
 #: A run tells so many effects apart, or terms of a law, at most.
 MOST_EFFECTS = 4
-#: What was found is found anew beside the rest so many times.
+#: What depends on one another is found, or designed, in turn so many times.
 ROUNDS = 2
 
 

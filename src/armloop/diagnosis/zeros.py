@@ -19,10 +19,11 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
+from armloop.regression.embedded import ITERATIONS
 from armloop.util.arrays import Array
 
-#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less; rounds of it.
-_FREEDOM, _ROUNDS = 4.0, 30
+#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less.
+_FREEDOM = 4.0
 
 
 def spread(model: ReconstructedModel) -> Array:
@@ -84,7 +85,7 @@ def _robust(X: Array, y: Array, spreads: Array) -> Array:
     """
     weight: Array = np.ones(len(y))
     x: Array = np.zeros(X.shape[1])
-    for _ in range(_ROUNDS):
+    for _ in range(ITERATIONS):
         G = (X.T * weight) @ X / INDEPENDENT + np.diag(1 / spreads**2)
         x = np.asarray(np.linalg.solve(G, (X.T * weight) @ y / INDEPENDENT))
         weight = np.asarray((_FREEDOM + 1) / (_FREEDOM + (y - X @ x) ** 2))

@@ -13,7 +13,8 @@ from armloop.util.arrays import Array
 
 #: Ridge beside columns of unit length: what they do not determine is next to nothing.
 RIDGE = 1e-8
-_ITERATIONS = 30
+#: Rounds of what is solved in turn, at most: it has settled by then.
+ITERATIONS = 30
 _STRONG_RIDGE = 1e-3
 _NOTHING = 1e-20
 
@@ -67,7 +68,7 @@ def _gauss_newton(
     """Squared error, coefficients, free parameters and derivative at the minimum reached from x."""
     beta, J = _embed(effects, x)
     error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         step = ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
         for damping in (1.0, 0.3, 0.1, 0.03):
             trial = list(np.split(np.concatenate(x) + damping * step, edges))
