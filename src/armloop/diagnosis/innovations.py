@@ -21,7 +21,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import PER_MEDIAN, Array, Mask
 from armloop.util.errors import ModelError
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
@@ -101,7 +101,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     own = np.broadcast_to(evidence.scale, motion.q.shape)
     rough = np.abs(residual - averaged(evidence.samples, residual))
     noise = [
-        1.4826 * float(np.median(rough[rows, j])) if (rows := evidence.rows[:, j]).any() else 0.0
+        PER_MEDIAN * float(np.median(rough[rows, j])) if (rows := evidence.rows[:, j]).any() else 0.0
         for j in range(motion.joints)
     ]
     if evidence.samples.cutoff_hz > 0:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import averaged
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import PER_MEDIAN, Array, Index, Mask
 
 #: Innovations are looked at that often, s.
 _STEP = 0.04
@@ -76,7 +76,7 @@ def _middle(x: Array) -> tuple[Array, Array]:
     """(M,) median and spread (scaled median absolute deviation) of each row's numbers."""
     few = np.sort(x, axis=1)[:, : _OCCASIONS + _BASELINE]
     middle = np.nanmedian(few, axis=1)
-    return middle, 1.4826 * np.nanmedian(np.abs(few - middle[:, None]), axis=1)
+    return middle, PER_MEDIAN * np.nanmedian(np.abs(few - middle[:, None]), axis=1)
 
 
 def _spread(x: Array) -> Array:
