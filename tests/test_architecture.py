@@ -148,6 +148,22 @@ def test_the_paper_is_known_to_its_command_alone() -> None:
                 assert not is_within(name, "armloop_paper"), f"{module} imports {name}"
 
 
+def test_a_number_of_the_diagnosis_is_stated_once() -> None:
+    """Two modules that call a number the same and give it the same value state one idea twice."""
+    stated: dict[tuple[str, str], str] = {}
+    for module in (name for name in MODULES if is_within(name, "armloop.diagnosis")):
+        for node in ast.parse(MODULES[module].read_text(encoding="utf-8")).body:
+            if not isinstance(node, ast.Assign):
+                continue
+            target, value = node.targets[0], node.value
+            several = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs = zip(target.elts, value.elts, strict=True) if several else [(target, value)]
+            for name, number in pairs:
+                if isinstance(name, ast.Name) and isinstance(number, ast.Constant):
+                    key = name.id.lstrip("_"), str(number.value)
+                    assert stated.setdefault(key, module) == module, f"{module} and {stated[key]}: {key}"
+
+
 FORMER = re.compile(r"(?<![\w.])armloop(?:\.\w+)+")
 #: What tells or tests the former names.
 TELLING = {"tests/test_moved.py", "src/armloop/moved.py", "docs/moved.md"}

@@ -47,8 +47,10 @@ MOVED = {
 } | {
     "armloop.conditions": "armloop.data.regimes",
     "armloop.conditions.study": "armloop_paper.sorting_study",
+    "armloop.diagnosis.alternatives": "armloop.diagnosis.diagnose",
     "armloop.diagnosis.apart": "armloop.diagnosis.isolability",
     "armloop.diagnosis.closing": "armloop.diagnosis.compensation",
+    "armloop.diagnosis.remedies": "armloop.diagnosis.diagnose",
     "armloop.diagnosis.rivals": "armloop.diagnosis.confounded",
     "armloop.drake.plant.own_effects": "armloop.drake.plant.fault_injection",
     "armloop.drake_systems": "armloop.drake",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from armloop.diagnosis.alternatives import why_alike
+from armloop.diagnosis.diagnose import why_alike
 from armloop.laws.effects import effect
 
 

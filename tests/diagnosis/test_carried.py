@@ -211,7 +211,7 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
 ) -> None:
     """However much it removes of all joints together."""
     whole = evidence(model, run(1, TIMES))
-    account = best_account(whole, [], True, silent)
+    account = best_account(whole, [], silent)
     asked: list[Any] = []
 
     def leaves_more(loaded: Any, plain: Any, least: np.ndarray) -> bool:
@@ -229,7 +229,7 @@ def test_a_load_at_the_cost_of_other_joints_is_none(
 def test_the_account_with_a_load_is_one_of_the_model_as_it_is(model: ReconstructedModel) -> None:
     """What remains of it is what the model leaves with the load once, not twice."""
     whole = evidence(model, run(1, TIMES))
-    account = best_account(whole, [], True, silent)
+    account = best_account(whole, [], silent)
     found = account_with_load(whole, account, silent, 1)
     assert found is not None and found.whole.model is model
     assert [each.effect.name for each in found.outcome.found] == ["carried_load"]

@@ -31,7 +31,7 @@ def test_columns_are_kept_while_there_is_room(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(evidence, "_KEPT", room)
         columns = evidence._Columns()
         for shape in range(4):
-            columns.keep((("a", 1, None), float(shape)), np.zeros(1))  # eight bytes
+            columns.of(("a", 1, None), float(shape), lambda: np.zeros(1))  # eight bytes
         assert len(columns) == kept and columns.size == 8 * kept
 
 

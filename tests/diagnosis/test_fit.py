@@ -50,7 +50,7 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     y = np.array([6.0, 6.0, 12.0, 12.0]) if without is not None else np.full(4, 6.0)
     doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)])
     rows, beta, _, J, values = fit._solved(doubling, [1.0], without)
-    last = 2.0**fit._REFINEMENTS
+    last = 2.0**fit.REFINEMENTS
     # what is returned belongs to the rows that are returned
     assert values == [last] and (rows.X == last).all() and J.shape == (1, 1)
     assert_allclose(beta, 6.0 / last)

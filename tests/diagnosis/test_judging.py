@@ -97,7 +97,7 @@ def accounted(
     monkeypatch.setattr(accounts, "find_contacts", lambda whole, residual, found: looked[found[0]])
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: of(whole, contacts, None).evidence)
     monkeypatch.setattr(accounts.Account, "remaining", lambda self: tau)
-    return accounts.best_account(whole, [first], True, lambda text: None)
+    return accounts.best_account(whole, [first], lambda text: None)
 
 
 @pytest.mark.parametrize(("by_effects", "kept"), [(50.0, 0), (150.0, 1)])
@@ -241,5 +241,5 @@ def test_a_law_found_beside_an_event_that_it_explains_is_kept_without_the_event(
     beside: Any = SimpleNamespace(rows=np.zeros((4, 1), dtype=bool))
     monkeypatch.setattr(accounts, "without", lambda whole, contacts: beside if contacts else every)
     event: Any = SimpleNamespace(share=0.9)
-    found = accounts.best_account(every, [event], True, lambda text: None)
+    found = accounts.best_account(every, [event], lambda text: None)
     assert (found.unlisted == "everywhere") == kept and not found.contacts  # type: ignore[comparison-overlap]

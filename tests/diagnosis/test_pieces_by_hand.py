@@ -93,7 +93,7 @@ class TestJudgement:
 
 class TestSearch:
     def test_what_can_be_explained_is_more_than_the_baselines(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        score = SimpleNamespace(energy=np.array([9.0, 2.0]), rows=np.array([4.0, 5.0]))
+        score = SimpleNamespace(excess=np.array([5.0, -3.0]))
         nothing = SimpleNamespace(fit=SimpleNamespace(score=score))
         monkeypatch.setattr(search.Known, "of", staticmethod(lambda *given: nothing))
         given: Any = None
@@ -118,7 +118,7 @@ class TestSearch:
         monkeypatch.setattr(search, "_known", lambda evidence, found: SimpleNamespace(fit=len(found)))
         monkeypatch.setattr(search, "clear", lambda evidence, outcome: outcome)
         outcome = made.outcome()
-        assert len(outcome.found) == outcome.after == min(worth, search._MOST_EFFECTS)
+        assert len(outcome.found) == outcome.after == min(worth, search.MOST_EFFECTS)
         # what is added and taken back again is the end of it
         made._exchanged = lambda found: found[:1]
         assert len(made.outcome().found) == 1
@@ -157,16 +157,6 @@ class TestTrials:
     ) -> None:
         agree = trials.Known.agrees_with
         assert agree(self.known(values, [1e9] * 3), self.known([0.0] * 3, errors)) is agrees
-
-    def test_an_effect_that_is_taken_back_is_none_of_what_is_known(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(trials.Known, "of", staticmethod(lambda *given: given))
-        effects = [SimpleNamespace(place=place) for place in "abc"]
-        known: Any = SimpleNamespace(fit=SimpleNamespace(effects=effects, shapes=[1, 2, 3]))
-        whole: Any = "whole"
-        place: Any = "b"
-        assert trials.Known.without(known, place, whole) == ("whole", [effects[0], effects[2]], [1, 3])
 
     def test_what_is_known_is_fitted_once_a_task(self, monkeypatch: pytest.MonkeyPatch) -> None:
         asked = []
@@ -251,7 +241,7 @@ class TestContrast:
         assert contrast._widths(samples, 2.0) == (16, 4)
 
     def test_as_many_are_events_as_stand_out_most(self) -> None:
-        least, clear = contrast._LEAST, contrast._CLEAR
+        least, clear = judgement.MULTIPLE, contrast._CLEAR
         low = least
         middle, high = 2.0 * clear * low, 1.5 * clear * 2.0 * clear * low
         assert contrast._clear([high, middle, low], [True, True, False]) == (pytest.approx(2.0 * clear), 2)

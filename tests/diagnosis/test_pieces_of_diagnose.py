@@ -54,7 +54,7 @@ class Answers:
             "carried": False,
             "unknown": False,
         }
-        self.given = given | {"known": False, "moving": False} | of
+        self.given = given | {"known": False} | of
         whole = Evidence(name="whole", rows=ROWS.copy(), blocks=np.array([0, 0, 1, 1]))
         self.left = Evidence(name="left", rows=ROWS.copy(), blocks=np.array([0, 0, 1, 1]))
         self.account = Evidence(name="account", rows=ROWS.copy(), blocks=whole.blocks)
@@ -101,9 +101,7 @@ class Answers:
         return evidence if "best" in self.asked else self.left
 
     def still(self, evidence: Evidence) -> str:
-        return (
-            "still" if self.given["still"] and not (evidence.name == "whole" and self.given["moving"]) else ""
-        )
+        return "still" if self.given["still"] else ""
 
     def standing(self, evidence: Evidence, model: Any, errors: Any, joints: Any) -> Standing:
         self.asked["standing"] = (evidence.name, model, errors, list(joints))
@@ -113,8 +111,8 @@ class Answers:
     def outcome(self, name: str) -> Any:
         return SimpleNamespace(name=name, found=self.given["found"], added=lambda: [*self.given["found"]])
 
-    def best(self, whole: Evidence, contacts: Any, moving: bool, progress: Any, panel: Any) -> Any:
-        self.asked["best"] = (whole.name, contacts, moving, panel)
+    def best(self, whole: Evidence, contacts: Any, progress: Any, panel: Any) -> Any:
+        self.asked["best"] = (whole.name, contacts, panel)
         return SimpleNamespace(
             contacts=contacts,
             evidence=self.account,
@@ -168,7 +166,7 @@ def test_a_run_that_rests_is_judged_by_its_events_alone(
     assert answers.asked["standing"] == ("left", model, "errors", [1, 2, 3]) and found.model == model
     assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
     assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
-    assert found.outcome.residual == "residual of left" and found.evidence.name == "left"
+    assert found.outcome.before == found.outcome.after and found.evidence.name == "left"
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -199,7 +197,7 @@ def test_a_run_that_moves_is_searched(
     )
     made = judged(jobs=2)
     assert made.verdict == verdict and made.unlisted is law and made.contacts == contacts
-    assert answers.asked["best"] == ("whole", contacts, True, ("whole", 2))
+    assert answers.asked["best"] == ("whole", contacts, ("whole", 2))
     # what is regressed at reversals is not asked of the joint with an unlisted law
     assert answers.asked["kept"].tolist() == [[j + 1 != unlisted for j in range(3)]] * 4
     name = "turned" if turned else "account"
@@ -219,13 +217,6 @@ def test_the_account_with_a_load_takes_the_place_of_that_without(monkeypatch: py
     assert (made.outcome.name, made.evidence.name) == ("with the load", "loaded")
     assert made.verdict == "effects_found" and made.unlisted is None and made.contacts == []
     assert made.model == ("with", "load") and answers.asked["kept"].all()
-
-
-def test_what_moves_only_beside_its_events_is_told_to_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = Answers(monkeypatch)
-    monkeypatch.setattr(module, "too_still", lambda evidence: "still" if evidence.name == "whole" else "")
-    judged()
-    assert answers.asked["best"][2] is False
 
 
 def test_logs_of_other_joints_and_motor_currents_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,13 +32,13 @@ class TestRefits:
             fits.append((evidence, residual))
             error, value = next(made)
             score = SimpleNamespace(error=error)
-            return SimpleNamespace(score=score, effects=(), parameters=({"x": Estimate(value, 1.0, "1")},))
+            parameters = ({"x": Estimate(value, 1.0, "1")},)
+            return SimpleNamespace(score=score, effects=(), parameters=parameters, added=list)
 
         monkeypatch.setattr(trials, "fit", fitted)
         monkeypatch.setattr(trials, "lead", lambda worse, better: worse.error - better.error)
         evidence: Any = SimpleNamespace(residual=lambda added: len(fits))
         evidence.knowing = lambda added: SimpleNamespace(of=len(fits))
-        monkeypatch.setattr(Known, "added", lambda self: [])
         return Known.of(evidence, effects, [None] * len(effects)), len(fits)  # type: ignore[list-item]
 
     def test_effects_are_fitted_anew_with_what_they_change_of_each_other(
@@ -101,9 +101,9 @@ class TestTrials:
         ("of", "made"),
         [
             ({}, True),
-            ({"joint": None}, True),
-            ({"other_joint": 2}, False),  # the second joint rests
-            ({"joint": 2}, False),
+            ({"indices": ()}, True),
+            ({"indices": (0, 1)}, False),  # the second joint rests
+            ({"indices": (1,)}, False),
             ({"shapes": []}, False),
             ({"shapes": [1.0, 2.0]}, True),
             ({"plausible": False}, False),
@@ -114,8 +114,7 @@ class TestTrials:
         self, of: dict[str, Any], made: bool, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         effect: Any = SimpleNamespace(
-            joint=of.get("joint", 1),
-            other_joint=of.get("other_joint"),
+            indices=of.get("indices", (0,)),
             shapes=lambda context: of.get("shapes", [5.0]),
             plausible=lambda arm, parameters: of.get("plausible", True),
             resolved=lambda parameters, shapes: of.get("resolved", True),
@@ -163,13 +162,13 @@ class TestTrials:
         )
         known = Known(evidence, np.zeros((80, 2)), current)
         linear = {"start": lambda beta: beta, "embed": lambda x: (x, np.eye(len(x)))}
-        effect: Any = SimpleNamespace(joint=2, other_joint=None, **linear)
+        effect: Any = SimpleNamespace(indices=(1,), **linear)
         assert trials._best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
-        effect.joint = 1
+        effect.indices = (0,)
         assert trials._best_shape(known, effect, shapes) == Shape(1.0, (1.0, 1.0))
         # what is left without a fold chooses for it
         current.outside[0] = np.concatenate([first, np.sin(t)])
-        effect.joint = 2
+        effect.indices = (1,)
         assert trials._best_shape(known, effect, shapes) == Shape(2.0, (1.0, 2.0))
 
     def test_a_shape_is_chosen_with_the_coefficients_that_are_given(self) -> None:
@@ -191,8 +190,7 @@ class TestTrials:
             fold=fold,
         )
         effect: Any = SimpleNamespace(
-            joint=1,
-            other_joint=None,
+            indices=(0,),
             start=lambda beta: beta[-1:],
             embed=lambda x: (np.array([1.0, x[0]]), np.array([[0.0], [1.0]])),
         )

@@ -176,13 +176,11 @@ class TestIsolability:
             assert (found.predicted, found.inertial, found.period) == (predicted, "kept", 0.02)
 
     def test_effects_share_a_joint_or_are_the_whole_arms(self) -> None:
-        def of(joint: int | None, other: int | None = None) -> Any:
-            return SimpleNamespace(joint=joint, other_joint=other)
+        def of(*joints: int) -> Any:
+            return SimpleNamespace(indices=joints)
 
-        assert (
-            _share_joints(of(1), of(1)) and _share_joints(of(None), of(1)) and _share_joints(of(2), of(1, 2))
-        )
-        assert not _share_joints(of(1), of(2)) and not _share_joints(of(3), of(1, 2))
+        assert _share_joints(of(0), of(0)) and _share_joints(of(), of(0)) and _share_joints(of(1), of(0, 1))
+        assert not _share_joints(of(0), of(1)) and not _share_joints(of(2), of(0, 1))
 
     def test_a_rival_is_tried_at_few_shapes_on_several_motions(self) -> None:
         many = 20
@@ -215,7 +213,9 @@ class TestIsolability:
 
     @staticmethod
     def of(name: str, joint: int | None = 1, shape: float | None = 5.0) -> Any:
-        return SimpleNamespace(place=(name, joint, None), joint=joint, other_joint=None, shape=shape)
+        return SimpleNamespace(
+            place=(name, joint, None), indices=() if joint is None else (joint - 1,), shape=shape
+        )
 
     @staticmethod
     def law(effect: Any) -> Law:
@@ -239,7 +239,7 @@ class TestIsolability:
         )
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
         diagnosis: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
-        listed = confounded.Pair(laws[0], self.law(rivals["listed"][0]), ())
+        listed = confounded.Rivalry(laws[0], self.law(rivals["listed"][0]), ())
         found = confounded.lookalikes(diagnosis, laws, [listed], run)
         names = [(way.law, way.rival.effect.place[0], way.rival.shape, way.others) for way in found]
         assert names == [(laws[0], "like", 5.0, (laws[1],)), (laws[1], "like", 5.0, (laws[0],))]
@@ -267,7 +267,7 @@ class TestIsolability:
         run: Any = SimpleNamespace(best_shape=lambda law, rival: rival.shape)
         (pair,) = confounded.pairs(diagnosis, laws, run)
         assert asked == [(["second", "third", "rival"], [1.0, 1.0, 5.0], "all of it")]
-        assert (pair.found, pair.others) == (laws[0], (laws[1], laws[2]))
+        assert (pair.law, pair.others) == (laws[0], (laws[1], laws[2]))
         assert (pair.rival.effect.place[0], pair.rival.shape) == ("rival", 5.0)
         assert pair.rival.added.parameters == "of the rival"
 
@@ -308,7 +308,7 @@ class TestNextRun:
             made = tuple(SimpleNamespace(left=lambda stage, of=of: of[stage]) for of in both)
             name = next(names)
             side: Any = SimpleNamespace(effect=name)
-            pairs.append(SimpleNamespace(found=side, rival=side, rivalries=lambda made=made: made))
+            pairs.append(SimpleNamespace(law=side, rival=side, both_ways=lambda made=made: made))
         design = SimpleNamespace(reference="made")
         planner = SimpleNamespace(
             possible=lambda ways: [way for way in ways if possible and way.left(1) is not None],

@@ -34,6 +34,10 @@ class Effect:
         return self.name, self.joint, self.other_joint
 
     @property
+    def indices(self) -> tuple[int, ...]:
+        return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
+
+    @property
     def pair_wise(self) -> bool:
         return self.other_joint is not None
 
@@ -227,10 +231,6 @@ class Known:
     def trial(self, effect: Any) -> Any:
         return of((*self.fit.effects, effect))
 
-    @property
-    def residual(self) -> str:
-        return f"residual of {len(self.fit.effects)}"
-
 
 def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     monkeypatch: pytest.MonkeyPatch,
@@ -285,7 +285,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
     assert [one.shape for one in found.found] == ["shape of memory 1", "shape of memory 2"]
     assert found.before.tolist() == [2.0, 3.0] and found.after == pytest.approx([0.6, 1.2])
     whole: Any = found.outcome.every  # type: ignore[attr-defined]
-    assert whole[0][0] == "slide" and len(whole[0]) == 3 and whole[3] == "residual of 0"
+    assert whole[0][0] == "slide" and len(whole[0]) == 3
     assert whole[1].effects == () and [e.joint for e in whole[2].effects] == [1, 2]
     assert found.evidence.rows.all() and len(told) == 2
     # what is not clear of its stated error goes, and if nothing is left there is nothing to say

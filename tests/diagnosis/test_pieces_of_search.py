@@ -225,7 +225,7 @@ class TestOutcomes:
     def outcome(*names: str) -> Any:
         effects = [SimpleNamespace(place=name, other_joint=2 if name in "xyz" else None) for name in names]
         found = [SimpleNamespace(effect=e, shape=name) for e, name in zip(effects, names, strict=True)]
-        return searching.Outcome(found, None, SimpleNamespace(score="all"), None)  # type: ignore[arg-type]
+        return searching.Outcome(found, None, SimpleNamespace(score="all"))  # type: ignore[arg-type]
 
     @pytest.fixture(autouse=True)
     def known(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,7 +319,7 @@ class TestOutcomes:
             found: Any = [
                 SimpleNamespace(effect=SimpleNamespace(name=kinds[name]), shape=name) for name in names
             ]
-            given: Any = SimpleNamespace(found=found, before=None, after=fitted(names), residual=None)
+            given: Any = SimpleNamespace(found=found, before=None, after=fitted(names))
             return "".join(f.shape for f in searching.clear(ANY_ARM, given, settled, alike).found)
 
         assert kept("a") == "a" and kept("c") == "" and kept("b") == ""
@@ -375,7 +375,7 @@ class TestOutcomes:
             for law, name in zip(laws, "abcde", strict=True)
         ]
         nothing: Any = None
-        outcome = searching.Outcome(found, nothing, SimpleNamespace(score="all"), nothing)  # type: ignore[arg-type]
+        outcome = searching.Outcome(found, nothing, SimpleNamespace(score="all"))  # type: ignore[arg-type]
         made = searching.useful(nothing, outcome)
         assert [f.shape for f in made.found] == list("bcde")
         assert [len(f.rivals) for f in made.found] == [1, 0, 0, 0]
@@ -402,7 +402,7 @@ class TestOutcomes:
 
         def outweighed(*left: int, among: str = "ab") -> str | None:
             whole, nothing = self.outcome("a", "b"), None
-            given: Any = SimpleNamespace(found=whole.found, after=fitted("all"))
+            given: Any = SimpleNamespace(found=whole.found, before=None, after=fitted("all"))
             asked = [f for f in whole.found if f.shape in among]
             found = searching.outweighed(nothing, given, asked, left, np.arange(202) < 200)  # type: ignore[arg-type]
             return None if found is None else str(found.shape)

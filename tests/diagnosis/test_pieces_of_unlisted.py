@@ -81,8 +81,8 @@ class TestLawThatIsNotListed:
     ) -> None:
         """Of joint 2 the effects leave ``left`` on 100 rows, the law 55."""
         asked: list[int] = []
-        named = [SimpleNamespace(effect=SimpleNamespace(joint=2, other_joint=None)) for _ in range(2)]
-        arm = SimpleNamespace(effect=SimpleNamespace(joint=None, other_joint=None))
+        named = [SimpleNamespace(effect=SimpleNamespace(indices=(1,))) for _ in range(2)]
+        arm = SimpleNamespace(effect=SimpleNamespace(indices=()))
 
         def verdict(left: float, found: list[Any], kept: list[Any], form: str = "v2^3") -> str:
             joint, block = np.repeat([0, 1], 100), np.arange(200) // 10

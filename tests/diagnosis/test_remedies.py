@@ -2,9 +2,7 @@
 
 import pytest
 
-from armloop.diagnosis.remedies import remedy
 from armloop.laws.effects import EFFECTS, Estimate, Law, Parameter, effect
-from armloop.model import AddedEffect
 
 FAULTS = {
     "torque_gain": (2, "gain", 1.25, "1", ["Divide the torque readings of joint 2 by 1.25", "0.8 times"]),
@@ -24,7 +22,7 @@ FAULTS = {
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_has_its_remedy(name: str) -> None:
     joint, key, value, unit, parts = FAULTS[name]
-    words = remedy(AddedEffect(effect(name, joint), {key: Estimate(value, 0.0, unit)}))
+    words = effect(name, joint).remedy({key: Estimate(value, 0.0, unit)})
     assert all(part in words for part in parts), words
     assert "feedforward" in words and not words.endswith(".")
 
@@ -34,7 +32,7 @@ def test_all_listed_sensors_have_one_and_nothing_else_has() -> None:
     for name, kind in EFFECTS.items():
         if not kind.sensor:
             one = effect(name, 1 if kind.joint_wise else None, 2 if kind.pair_wise else None)
-            assert remedy(AddedEffect(one, {})) == ""
+            assert one.remedy({}) == ""
 
 
 def test_a_sensor_of_the_users_own_gets_general_words() -> None:
@@ -42,6 +40,4 @@ def test_a_sensor_of_the_users_own_gets_general_words() -> None:
         name, role, law, elements = "bent_sensor", "sensor", "b v", ("viscous",)
         parameters = (Parameter("bend", "TAU*s/POS"),)
 
-    assert remedy(AddedEffect(Bent(2), {})).startswith(
-        "Correct the reading of joint 2 before anything uses it"
-    )
+    assert Bent(2).remedy({}).startswith("Correct the reading of joint 2 before anything uses it")

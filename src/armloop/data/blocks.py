@@ -11,6 +11,9 @@ from scipy.ndimage import binary_dilation
 from armloop.data.motion import Motion, Samples
 from armloop.util.arrays import Array, Index, Mask
 
+#: Residuals stay correlated for a good second: blocks of so many, s, tell by themselves.
+BLOCK_SECONDS = 1.5
+
 
 def block_numbers(motion: Motion, seconds: float, spans: Array | None = None) -> Index:
     """(N,) number of the block each sample lies in: runs, cut into pieces of at most ``seconds``.

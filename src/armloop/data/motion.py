@@ -126,6 +126,15 @@ class Motion:
         begins = self.time[self.starts] if self.begins is None else self.begins
         return np.asarray(self.time - np.repeat(begins[first], lengths))
 
+    @property
+    def seconds(self) -> float:
+        """The length of all runs together, s."""
+        return sum(float(np.ptp(self.time[run])) for run in self.runs())
+
+    def run_of(self, sample: int) -> slice:
+        """Return the samples of the run that a sample lies in."""
+        return next(run for run in self.runs() if run.start <= sample < run.stop)
+
     def runs(self) -> list[slice]:
         """Return the samples of each run as a slice, in order."""
         ends = [*self.starts[1:], self.samples]

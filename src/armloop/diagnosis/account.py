@@ -9,17 +9,23 @@ import numpy as np
 from armloop.data.motion import Motion
 from armloop.diagnosis.contacts import Contact, find_contacts, without
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import CHANCE, MOST, MULTIPLE, SIGNIFICANCE, gain, lead
+from armloop.diagnosis.judgement import (
+    CHANCE,
+    MOST,
+    MOSTLY,
+    NEARLY_ALL,
+    SIGNIFICANCE,
+    gain,
+    lead,
+    much_is_left,
+)
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
-from armloop.diagnosis.unlisted import FAR_LESS, Unlisted, find_law
+from armloop.diagnosis.unlisted import Unlisted, find_law
 from armloop.laws.effects.found import RANGE
 from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
-
-#: An account without contacts that explains this part of the bursts, or as much as the contacts do, is the better one.
-EXPLAINS = 0.8
 
 #: What may have been recorded of a rest is left out for so many times the delay found: it may be longer than it looks.
 _AHEAD = 4.0
@@ -72,11 +78,11 @@ class Account:
         Args:
             first: what the search found.
         """
-        evidence, after = self.evidence, self.outcome.after
+        evidence = self.evidence
         j = self._least_explained() if self.unlisted is None else self.unlisted.joint - 1
         elsewhere = without_effects_at(evidence, first, j).found
         there = [f.effect for f in first.found if f not in elsewhere]
-        if not there or (self.unlisted is None and after.score.energy[j] < MULTIPLE**2 * after.score.rows[j]):
+        if not there or (self.unlisted is None and not much_is_left(self.outcome.after.score)[j]):
             return self
         progress(f"joint {j + 1}: whether other listed effects do better than {there[0].label()}")
         again = search(evidence, progress, panel, barred=[there[0].place])
@@ -87,7 +93,7 @@ class Account:
         mine, others = self.score(evidence.rows), other.score(evidence.rows)
         if self.unlisted is not None:
             return other if lead(others, mine) <= CHANCE else self
-        least = FAR_LESS * float((mine.energy - mine.rows).sum())
+        least = MOSTLY * float(mine.excess.sum())
         return other if gain(mine, others) >= least and lead(mine, others) > SIGNIFICANCE else self
 
     def _least_explained(self) -> int:
@@ -180,17 +186,12 @@ def _delay(outcome: Outcome) -> float:
 
 
 def best_account(
-    whole: Evidence,
-    contacts: list[Contact],
-    plain_counts: bool,
-    progress: Progress,
-    panel: Hypotheses | None = None,
+    whole: Evidence, contacts: list[Contact], progress: Progress, panel: Hypotheses | None = None
 ) -> Account:
     """The account with contacts where there are any, unless effects or a law explain those bursts as well.
 
     Args:
         contacts: what looks like contacts before anything else is known.
-        plain_counts: whether the run moves enough to be judged without contacts, too.
         panel: who tries the hypotheses; in this process by default.
     """
     account = plain = Account.of(whole, contacts, progress, panel)
@@ -207,11 +208,12 @@ def best_account(
         if not again and looked.left(residual) < account.left(residual):
             law = looked.unlisted
             return looked if law is None else replace(looked, unlisted=law.over(whole))
-    if not account.contacts or not plain_counts:
+    if not account.contacts:
         return account
     if contacts:
         plain = Account.of(whole, [], progress, panel)
-    enough = min(EXPLAINS, max(contact.share for contact in account.contacts))
+    # nearly all of the bursts, or as much as the contacts explain
+    enough = min(NEARLY_ALL, max(contact.share for contact in account.contacts))
     # A law of which these are the bursts; a residual without a law explains none of them.
     law = plain.unlisted if plain.unlisted is not None and plain.unlisted.parameters else None
     same = law is not None and account.unlisted is not None and account.unlisted.joint == law.joint

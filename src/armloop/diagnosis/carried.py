@@ -18,15 +18,13 @@ from armloop.diagnosis.account import Account, best_account
 from armloop.diagnosis.contacts import find_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Shape
-from armloop.diagnosis.judgement import MULTIPLE, gain, leaves_more, soaked
-from armloop.diagnosis.reasons import too_still
-from armloop.diagnosis.search import Found, Outcome, clear, pruned
+from armloop.diagnosis.judgement import MOSTLY, gain, leaves_more, much_is_left, soaked
+from armloop.diagnosis.search import ROUNDS, Found, Outcome, clear, pruned
 from armloop.diagnosis.trials import Hypotheses, Known
-from armloop.diagnosis.unlisted import FAR_LESS
 from armloop.laws.effects.carried_load import CarriedLoad, Interval
 from armloop.laws.effects.payload import Payload
 from armloop.model import AddedEffect
-from armloop.regression.embedded import solve
+from armloop.regression.embedded import ITERATIONS, solve
 from armloop.regression.moments import Moments
 from armloop.util.arrays import Array, Index, Mask, stretches
 from armloop.util.progress import Progress
@@ -35,9 +33,6 @@ from armloop.util.progress import Progress
 _PRICE = 40.0
 #: A load that is there, or is not there, for less than this part of a run, or of this many seconds at a time, is none.
 _LEAST, _SHORTEST = 0.05, 0.4
-_ROUNDS = 30
-#: Load and what is beside it are found in turn so many times more.
-_TURNS = 2
 #: Seconds over which the residual's size is averaged to begin with.
 _WINDOW = 0.5
 
@@ -57,41 +52,53 @@ def account_with_load(
     if found is None:
         return None
     load, unknown = found
-    plain = without(whole.only(whole.rows & ~unknown), [])
+    plain = _known_part(whole, unknown)
     known = Known.of(plain, [load], [_shape(load)])
     if not load.plausible(whole.model.arm, known.fit.parameters[0]):
         return None
-    left = account.left(account.remaining()) - float(account.whole.rows.sum())
     # beside what was found it must explain most of what that leaves; only then is all else searched anew
-    score = _with(plain, load, account).fit.score
-    if score.error - float(score.rows.sum()) > (1 - FAR_LESS) * left:
+    least = (1 - MOSTLY) * _excess(account)
+    if float(_with(plain, load, account).fit.score.excess.sum()) > least:
         return None
     other = _beside(whole, known, unknown, progress, jobs)
-    for _ in range(_TURNS):
+    for _ in range(ROUNDS):
         # what was found beside the load had a part in it, and in when it seems to be there: both are found anew
         before = {effect.place for effect in other.outcome.after.effects}
-        others = _with(plain.only(other.evidence.rows), load, other).added()[1:]
+        others = _with(plain.only(other.evidence.rows), load, other).fit.added()[1:]
         found = find_carried(without(_by(whole, others), [])) if others else None
         if found is None:
             break
         load, unknown = found
-        plain = without(whole.only(whole.rows & ~unknown), [])
+        plain = _known_part(whole, unknown)
         other = _beside(whole, _with(plain, load, other), unknown, progress, jobs)
         if before == {effect.place for effect in other.outcome.after.effects}:
             break
-    if other.left(other.remaining()) - float(other.whole.rows.sum()) > (1 - FAR_LESS) * left:
+    if _excess(other) > least:
         return None
-    evidence = whole.only(other.evidence.rows)
-    nothing, alone = Known.of(evidence), Known.of(evidence, [load], [_shape(load)])
-    bare = nothing.fit.score
-    share = gain(bare, alone.fit.score) / max(float((bare.energy - bare.rows).sum()), 1e-9)
-    every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
-    together = Outcome(every, nothing.fit, _with(evidence, load, other).fit, nothing.residual)
-    # of the model as it is: the load is among the effects found
-    run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
-    outcome = clear(evidence, pruned(evidence, together))
-    loaded = replace(other, whole=run, evidence=evidence, outcome=outcome)
+    loaded = _loaded(whole, load, other)
     return None if _at_the_cost_of_others(account, loaded) else loaded
+
+
+def _known_part(whole: Evidence, unknown: Mask) -> Evidence:
+    """The run without known events, and without samples (N, n) of which nothing is to be said."""
+    return without(whole.only(whole.rows & ~unknown), [])
+
+
+def _excess(account: Account) -> float:
+    """Squared error, weighted, that an account leaves of its whole run beyond the baseline."""
+    return account.left(account.remaining()) - float(account.whole.rows.sum())
+
+
+def _loaded(whole: Evidence, load: CarriedLoad, other: Account) -> Account:
+    """The account by the model as it is of one by a model that has the load: that is among the effects found."""
+    evidence = whole.only(other.evidence.rows)
+    nothing, alone = (Known.of(evidence, *given).fit for given in ((), ([load], [_shape(load)])))
+    bare = nothing.score
+    share = gain(bare, alone.score) / max(float(bare.excess.sum()), 1e-9)
+    every = [Found(load, _shape(load), min(share, 1.0)), *other.outcome.found]
+    together = Outcome(every, nothing, _with(evidence, load, other).fit)
+    run = replace(whole, rows=other.whole.rows, unknown=other.whole.unknown)
+    return replace(other, whole=run, evidence=evidence, outcome=clear(evidence, pruned(evidence, together)))
 
 
 def _at_the_cost_of_others(account: Account, loaded: Account) -> bool:
@@ -119,19 +126,18 @@ def _by(whole: Evidence, added: list[AddedEffect]) -> Evidence:
 
 def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jobs: int | None) -> Account:
     """The account of a run by a model that has the load, the first of what is known."""
-    again = _by(whole, known.added()[:1])
+    again = _by(whole, known.fit.added()[:1])
     if again.unknown is not None:
         unknown = unknown | again.unknown
     again = replace(again, rows=again.rows & ~unknown, unknown=unknown)
     with Hypotheses(again, jobs) as panel:
         contacts = find_contacts(again, again.residual([]))
-        return best_account(again, contacts, not too_still(again), progress, panel)
+        return best_account(again, contacts, progress, panel)
 
 
 def _much_is_left(account: Account) -> bool:
     """Whether a law was stated, or some joint's error is a multiple of the baseline."""
-    score = account.outcome.after.score
-    return account.unlisted is not None or bool((score.energy >= MULTIPLE**2 * score.rows).any())
+    return account.unlisted is not None or bool(much_is_left(account.outcome.after.score).any())
 
 
 def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
@@ -150,7 +156,7 @@ def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
     theta, most = np.zeros(X.shape[2]), 0.0
     for carried in _starts(y, time, run):
         gains, beta = np.zeros(len(y)), theta
-        for _ in range(_ROUNDS):
+        for _ in range(ITERATIONS):
             if carried.sum() < 2 * X.shape[2]:
                 break
             beta, _, _ = solve(

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import preprocess
 from armloop.identification.scoring import Score, score
 from armloop.model import ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.errors import InputError
 
 #: Instants of a run at which the feedforward is compared: as many as a figure can show.
@@ -32,7 +31,7 @@ class FeedforwardChange:
         rms, largest: (n,) of it, N·m (N).
     """
 
-    rows: NDArray[np.intp]
+    rows: Index
     torque: Array
 
     @property

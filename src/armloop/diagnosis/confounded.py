@@ -38,6 +38,14 @@ class Rivalry:
     rival: Law
     others: tuple[Law, ...]
 
+    def both_ways(self) -> tuple[Rivalry, Rivalry]:
+        """This, and the law as a rival of its rival: whichever of the two is there, the other must be seen not to be.
+
+        Where one can stand for everything that the other does (a spring of no stiffness for an offset), only the other
+        way tells them apart.
+        """
+        return self, replace(self, law=self.rival, rival=self.law)
+
     def left(self, stage: Stage) -> float:
         """Part of the law's torque on a motion that the rival, at whatever parameters, cannot stand for."""
         return self._nearest(stage)[0]
@@ -63,23 +71,6 @@ class Rivalry:
         return [Part(other.effect, (other.shape,)) for other in self.others]
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """What was found and one of its alternatives.
-
-    Whichever of the two is there, the other must be seen not to be: rivalries go both ways. Where one can stand for
-    everything that the other does (a spring of no stiffness for an offset), only the other way tells them apart.
-    """
-
-    found: Law
-    rival: Law
-    others: tuple[Law, ...]
-
-    def rivalries(self) -> tuple[Rivalry, Rivalry]:
-        """Both ways."""
-        return Rivalry(self.found, self.rival, self.others), Rivalry(self.rival, self.found, self.others)
-
-
 def found_laws(diagnosis: Diagnosis) -> list[Law]:
     """The effects that were found, but for what was carried in that run alone."""
     outcome = diagnosis.outcome
@@ -87,7 +78,7 @@ def found_laws(diagnosis: Diagnosis) -> list[Law]:
     return [Law(added, found.shape.final) for found, added in pairs if not added.effect.event]
 
 
-def pairs(diagnosis: Diagnosis, laws: Sequence[Law], run: Stage) -> list[Pair]:
+def pairs(diagnosis: Diagnosis, laws: Sequence[Law], run: Stage) -> list[Rivalry]:
     """Every effect found with each of its alternatives, as each would explain the run."""
     made = []
     for k, found in enumerate(f for f in diagnosis.outcome.found if not f.effect.event):
@@ -95,19 +86,19 @@ def pairs(diagnosis: Diagnosis, laws: Sequence[Law], run: Stage) -> list[Pair]:
         for rival, _ in found.rivals:
             law = _as_fitted(diagnosis, run, laws[k], rival, others)
             if law is not None:
-                made.append(Pair(laws[k], law, others))
+                made.append(Rivalry(laws[k], law, others))
     return made
 
 
 def lookalikes(
-    diagnosis: Diagnosis, laws: Sequence[Law], listed: Sequence[Pair], run: Stage
+    diagnosis: Diagnosis, laws: Sequence[Law], listed: Sequence[Rivalry], run: Stage
 ) -> list[Rivalry]:
     """Effects that are not listed as alternatives, but of whose torque the run would show as little.
 
     A diagnosis does not list an effect whose parameters would be impossible, or which is not worth its parameters; and
     yet it may be what is there, and a run that told only the listed ones apart would not show it.
     """
-    known = {(id(pair.found), pair.rival.effect.place) for pair in listed}
+    known = {(id(pair.law), pair.rival.effect.place) for pair in listed}
     taken = {law.effect.place for law in laws}
     made = []
     for found in laws:
@@ -130,8 +121,7 @@ def lookalikes(
 
 def _share_joints(one: Effect, other: Effect) -> bool:
     """Whether two effects act on a joint in common; those of the whole arm act on all."""
-    joints = [{e.joint, e.other_joint} - {None} for e in (one, other)]
-    return not all(joints) or bool(joints[0] & joints[1])
+    return not (one.indices and other.indices) or not set(one.indices).isdisjoint(other.indices)
 
 
 def _as_fitted(

@@ -10,28 +10,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.motion import Motion
 from armloop.data.reversals import turning
 from armloop.diagnosis.contrast import beside, pulses
 from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
-from armloop.diagnosis.judgement import MULTIPLE
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
-from armloop.diagnosis.outliers import outlying
-from armloop.diagnosis.pushes import PAUSE, Contact, around, push
-from armloop.laws.effects.base import number
-from armloop.laws.effects.events import during
+from armloop.diagnosis.outliers import STANDS_OUT, outlying
+from armloop.diagnosis.pushes import PAUSE, SHORTEST, Contact, around, push
+from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import TINY, Array, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 #: An event's novelty in standard deviations, which must be this many times what half of the run keeps below.
 _RISE = 4.2
-#: At one of its joints it exceeds the most of the rest of the run so many times: a model that errs much errs often.
-_STANDS_OUT = 1.5
-#: It lasts while the novelty is above this part of its peak, and this long at least, s.
-_EDGE, _SHORTEST = 0.25, 0.1
+#: It lasts while the novelty is above this part of its peak.
+_EDGE = 0.25
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
 _SAME = 0.05
 #: Events fill at most this part of a joint's motion: what is there longer is none.
@@ -58,7 +54,7 @@ def known_contacts(evidence: Evidence) -> Mask:
     motion = evidence.samples.motion
     rows = np.zeros(motion.samples, dtype=bool)
     for added in filter(is_event, evidence.model.effects):
-        mine = during(motion, {key: e.value for key, e in added.parameters.items()})
+        mine = during(motion, added.values)
         for run in motion.runs():
             inside = run.start + np.flatnonzero(mine[run])
             if len(inside):
@@ -79,32 +75,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     motion = evidence.samples.motion
     known = known_contacts(evidence)
     if evidence.rows.any():
-        innovation, rest = innovations(evidence, residual, found)
-        held = (
-            np.abs(innovation) * deviations(evidence, residual) / np.maximum(dry_level(evidence, found), TINY)
-        )
-        far = far_outside(motion, evidence.model.history.get("range"))
-        tells = innovation != 0.0
-        rows, new = novelty(evidence, innovation, rest)
-        new = np.where(known[rows][:, None], 0.0, new)
-        level = np.abs(new)
-        bursts = _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
-        bursts = [
-            burst
-            for burst in bursts
-            if not _comes_back(evidence, rows, level, burst)
-            and not _sticks(evidence, burst, held)
-            and not _strays(far, burst)
-        ]
-        bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
-        for pulse in pulses(evidence.samples, innovation, ~far & ~known[:, None]):
-            burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
-            if (
-                not any(_meet(motion, burst, other) for other in bursts)
-                and not _comes_back(evidence, rows, pulse.level[rows], burst)
-                and not _sticks(evidence, burst, held)
-            ):
-                bursts.append(burst)
+        tells, bursts = _unlike(evidence, residual, found, known)
     else:
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
@@ -124,12 +95,49 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
     return _distinct(motion, [contact for contact in contacts if contact and _seen_whole(motion, contact)])
 
 
+def _unlike(
+    evidence: Evidence, residual: Array, found: Sequence[AddedEffect], known: Mask
+) -> tuple[Mask, list[Burst]]:
+    """Stretches unlike what the same joints leave in like motion, then those unlike what is left just before and after.
+
+    Args:
+        known: (N,) samples of events that are known.
+
+    Returns:
+        (N, n) samples that tell of an event, and the stretches.
+    """
+    motion = evidence.samples.motion
+    innovation, rest = innovations(evidence, residual, found)
+    held = np.abs(innovation) * deviations(evidence, residual) / np.maximum(dry_level(evidence, found), TINY)
+    far = far_outside(motion, evidence.model.history.get("range"))
+    rows, new = novelty(evidence, innovation, rest)
+    new = np.where(known[rows][:, None], 0.0, new)
+    level = np.abs(new)
+    bursts = [
+        burst
+        for burst in _together([_bursts(motion, rows, of_joint) for of_joint in new.T])
+        if not _comes_back(evidence, rows, level, burst)
+        and not _sticks(evidence, burst, held)
+        and not _strays(far, burst)
+    ]
+    bursts = _standing_out(motion, rows, np.where(far[rows], 0.0, level), bursts)
+    for pulse in pulses(evidence.samples, innovation, ~far & ~known[:, None]):
+        burst = Burst(pulse.rows, frozenset({pulse.joint}), beside=True)
+        if (
+            not any(_meet(motion, burst, other) for other in bursts)
+            and not _comes_back(evidence, rows, pulse.level[rows], burst)
+            and not _sticks(evidence, burst, held)
+        ):
+            bursts.append(burst)
+    return innovation != 0.0, bursts
+
+
 def _seen_whole(motion: Motion, contact: Contact) -> bool:
     """Whether an event begins after its run does and ends before it: else it may be a past that friction remembers."""
-    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(contact.added.parameters)
     run = next(run for run in motion.runs() if contact.rows[run].any())
     time = motion.time[run]
-    return bool(start - time[0] >= _SHORTEST and time[-1] - end >= _SHORTEST)
+    return bool(start - time[0] >= SHORTEST and time[-1] - end >= SHORTEST)
 
 
 def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
@@ -144,7 +152,7 @@ def _rare(rows: Mask, bursts: list[Burst]) -> list[Burst]:
     return [burst for burst in bursts if rare[sorted(burst.joints)].any()]
 
 
-def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: list[Burst]) -> list[Burst]:
+def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]) -> list[Burst]:
     """Those of the bursts that exceed by far all that the run holds outside of them."""
     outside = np.ones(len(rows), dtype=bool)
     for burst in bursts:
@@ -152,9 +160,8 @@ def _standing_out(motion: Motion, rows: NDArray[np.intp], level: Array, bursts: 
     rest = np.maximum(level[outside].max(axis=0, initial=0.0), 1.0)
     kept = []
     for burst in bursts:
-        inside = (rows >= burst.rows.start) & (rows < burst.rows.stop)
-        peak = level[inside].max(axis=0, initial=0.0)
-        if any(peak[j] >= _STANDS_OUT * rest[j] for j in burst.joints):
+        peak = level[_within(rows, burst.rows)].max(axis=0, initial=0.0)
+        if any(peak[j] >= STANDS_OUT * rest[j] for j in burst.joints):
             kept.append(burst)
     return kept
 
@@ -169,45 +176,49 @@ def _sticks(evidence: Evidence, burst: Burst, held: Array) -> bool:
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
-    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > 0.5
+    slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
     return bool(slides.any() and not slides[j] and held[burst.rows, j].mean() <= 1.0)
 
 
 def _strays(far: Mask, burst: Burst) -> bool:
     """Whether the joints that show a burst are, for most of it, where the model was not trained: nothing is judged there."""
-    return bool(far[burst.rows, sorted(burst.joints)].mean() > 0.5)
+    return bool(far[burst.rows, sorted(burst.joints)].mean() > MOSTLY)
 
 
 def _distinct(motion: Motion, contacts: list[Contact]) -> list[Contact]:
     """Events without those that are, for most of the shorter one, another with a larger share."""
     found: list[tuple[Mask, Contact]] = []
     for contact in sorted(contacts, key=lambda contact: -contact.share):
-        mine = during(motion, {key: e.value for key, e in contact.added.parameters.items()})
+        mine = during(motion, contact.added.values)
         if all(2 * (mine & other).sum() <= min(mine.sum(), other.sum()) for other, _ in found):
             found.append((mine, contact))
     return [contact for mine, contact in sorted(found, key=lambda one: int(np.argmax(one[0])))]
 
 
-def _comes_back(evidence: Evidence, rows: NDArray[np.intp], level: Array, burst: Burst) -> bool:
+def _comes_back(evidence: Evidence, rows: Index, level: Array, burst: Burst) -> bool:
     """Whether a burst is there most times that the arm passes the same posture at the same speed: then it is none."""
     motion = evidence.samples.motion
     q, v = motion.q[rows], motion.v[rows]
-    joints = np.array(sorted(burst.joints), dtype=np.intp)
-    inside = np.flatnonzero((rows >= burst.rows.start) & (rows < burst.rows.stop))
-    if len(inside) == 0:
+    joints = sorted(burst.joints)
+    inside = _within(rows, burst.rows)
+    length = inside.stop - inside.start
+    if length == 0:
         return False
-    peak = inside[int(np.argmax(level[np.ix_(inside, joints)].max(axis=1)))]
+    peak = inside.start + int(np.argmax(level[inside, joints].max(axis=1)))
     size = [np.maximum(np.ptp(x, axis=0) / 2, 1e-9) for x in (q, v)]
     off = np.maximum(np.abs((q - q[peak]) / size[0]).max(axis=1), np.abs((v - v[peak]) / size[1]).max(axis=1))
     same = off < _SAME
-    same[max(inside[0] - len(inside), 0) : inside[-1] + len(inside)] = False
+    same[max(inside.start - length, 0) : inside.stop - 1 + length] = False
     times = np.flatnonzero(same)
-    passages: list[NDArray[np.intp]] = (
-        np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
-    )
-    high = 0.5 * float(level[peak, joints].max())
-    there = [float(level[np.ix_(passage, joints)].max()) > high for passage in passages]
+    passages: list[Index] = np.split(times, np.flatnonzero(np.diff(times) > 1) + 1) if len(times) else []
+    high = MOSTLY * float(level[peak, joints].max())
+    there = [float(level[passage][:, joints].max()) > high for passage in passages]
     return len(there) > 0 and 2 * sum(there) > len(there)
+
+
+def _within(rows: Index, stretch: slice) -> slice:
+    """Which of some samples (M,), in order, lie in a stretch."""
+    return slice(*np.searchsorted(rows, [stretch.start, stretch.stop]).tolist())
 
 
 def _meet(motion: Motion, one: Burst, other: Burst) -> bool:
@@ -223,7 +234,7 @@ def _together(bursts: list[list[slice]]) -> list[Burst]:
         for rows in own:
             for k, other in enumerate(found):
                 common = min(rows.stop, other.rows.stop) - max(rows.start, other.rows.start)
-                if common >= 0.5 * min(rows.stop - rows.start, other.rows.stop - other.rows.start):
+                if common >= MOSTLY * min(rows.stop - rows.start, other.rows.stop - other.rows.start):
                     both = slice(min(rows.start, other.rows.start), max(rows.stop, other.rows.stop))
                     found[k] = Burst(both, other.joints | {j})
                     break
@@ -232,7 +243,7 @@ def _together(bursts: list[list[slice]]) -> list[Burst]:
     return sorted(found, key=lambda burst: burst.rows.start)
 
 
-def _bursts(motion: Motion, rows: NDArray[np.intp], new: Array) -> list[slice]:
+def _bursts(motion: Motion, rows: Index, new: Array) -> list[slice]:
     """Stretches around every peak of the novelty, of one sign, as long as it is above a part of the peak.
 
     An event is seen to begin and to end; what is there from a run's start is a past that friction remembers.
@@ -243,8 +254,8 @@ def _bursts(motion: Motion, rows: NDArray[np.intp], new: Array) -> list[slice]:
     level = np.abs(new)
     threshold = _RISE * max(1.0, float(np.median(level)))
     for run in motion.runs():
-        mine = np.flatnonzero((rows >= run.start) & (rows < run.stop))
-        above = mine[level[mine] > threshold]
+        mine = _within(rows, run)
+        above = mine.start + np.flatnonzero(level[mine] > threshold)
         if len(above) == 0:
             continue
         time = motion.time[rows]
@@ -253,13 +264,13 @@ def _bursts(motion: Motion, rows: NDArray[np.intp], new: Array) -> list[slice]:
             one = new * np.sign(new[group[0]])
             peak = float(one[group[0] : group[-1] + 1].max())
             first, last = int(group[0]), int(group[-1])
-            while first > mine[0] and one[first - 1] > _EDGE * peak:
+            while first > mine.start and one[first - 1] > _EDGE * peak:
                 first -= 1
-            while last < mine[-1] and one[last + 1] > _EDGE * peak:
+            while last < mine.stop - 1 and one[last + 1] > _EDGE * peak:
                 last += 1
-            begins = first > mine[0] and time[first] - time[mine[0]] >= _SHORTEST
-            ends = last < mine[-1] and time[mine[-1]] - time[last] >= _SHORTEST
-            if begins and ends and time[last] - time[first] >= _SHORTEST:
+            begins = first > mine.start and time[first] - time[mine.start] >= SHORTEST
+            ends = last < mine.stop - 1 and time[mine.stop - 1] - time[last] >= SHORTEST
+            if begins and ends and time[last] - time[first] >= SHORTEST:
                 burst = slice(int(rows[first]), int(rows[last]) + 1)
                 if bursts and bursts[-1].stop > burst.start:
                     burst = slice(bursts.pop().start, burst.stop)
@@ -288,7 +299,7 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
     """
     motion, kept, rows = evidence.samples.motion, evidence.independent, evidence.rows
     left = (np.where(rows, evidence.left_by(model), 0.0)[kept] / evidence.scale) ** 2
-    start, end = (number(contact.added.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(contact.added.parameters)
     time = motion.time[kept]
     length = max(int((contact.rows[kept] & (time >= start) & (time <= end)).sum()), 1)
     removed = np.maximum(contact.before**2 - contact.after**2, 0.0) / evidence.scale**2
@@ -297,7 +308,7 @@ def drowned(evidence: Evidence, model: ReconstructedModel, contact: Contact, joi
         if left[:, j].sum() < MULTIPLE**2 * rows[:, j].sum():
             continue
         for run in motion.runs():
-            sums = np.cumsum(np.append(0.0, left[(kept >= run.start) & (kept < run.stop), j]))
+            sums = np.cumsum(np.append(0.0, left[_within(kept, run), j]))
             most = float((sums[length:] - sums[:-length]).max(initial=0.0)) / length
             rest[j] = max(rest[j], most - 1.0)
     return bool(removed @ (removed - rest) < 0)

@@ -13,12 +13,13 @@ from itertools import pairwise
 import numpy as np
 
 from armloop.data.motion import Samples
+from armloop.diagnosis.judgement import MULTIPLE
 from armloop.util.arrays import Array, Mask
 
 #: Lengths of the stretches that are compared, s.
 LENGTHS = (0.2, 0.4, 0.8, 1.6)
-#: The contrast of events is so many times that of all other stretches, and so many standard deviations of the baseline …
-_CLEAR, _LEAST = 3.0, 2.0
+#: The contrast of events is so many times that of all other stretches, and a multiple of the baseline's deviation …
+_CLEAR = 3.0
 #: … in a run of so many of their lengths, of which at most so many are events.
 _OTHERS, _MOST = 16, 5
 
@@ -68,8 +69,7 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
         judged: (N, n) whether anything is said of a sample.
     """
     found: dict[int, tuple[float, list[Pulse]]] = {}
-    seconds = sum(float(np.ptp(samples.motion.time[run])) for run in samples.motion.runs())
-    for length in (length for length in LENGTHS if seconds >= _OTHERS * length):
+    for length in (length for length in LENGTHS if samples.motion.seconds >= _OTHERS * length):
         width, gap = _widths(samples, length)
         every, one_way = contrast(samples, innovation, length)
         every = np.where(judged, every, 0.0)
@@ -85,7 +85,7 @@ def pulses(samples: Samples, innovation: Array, judged: Mask) -> list[Pulse]:
 def beside(samples: Samples, residual: Array, rows: slice) -> Array:
     """(N, n) residual less the line through what is left before and after a stretch."""
     length, gap = rows.stop - rows.start, round(2 * samples.reach / samples.period)
-    run = next(run for run in samples.motion.runs() if run.start <= rows.start < run.stop)
+    run = samples.motion.run_of(rows.start)
     before = slice(max(run.start, rows.start - gap - length), max(run.start + 1, rows.start - gap))
     after = slice(min(rows.stop + gap, run.stop - 1), min(rows.stop + gap + length, run.stop))
     time = samples.motion.time
@@ -118,11 +118,11 @@ def _clear(peaks: list[float], may_be: list[bool]) -> tuple[float, int]:
         may_be: whether a peak may be an event; one that may not is of the others.
     """
     most = next((k for k, one in enumerate(may_be) if not one), len(peaks))
-    ratios = [high / max(low, _LEAST / _CLEAR) for high, low in pairwise([*peaks, 0.0])]
+    ratios = [high / max(low, MULTIPLE / _CLEAR) for high, low in pairwise([*peaks, 0.0])]
     best = [
         (ratio, k + 1)
         for k, ratio in enumerate(ratios[: min(most, _MOST)])
-        if ratio >= _CLEAR and peaks[k] >= _LEAST
+        if ratio >= _CLEAR and peaks[k] >= MULTIPLE
     ]
     return max(best, default=(0.0, 0))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
@@ -15,14 +14,13 @@ from armloop.data.repeats import require_different
 from armloop.data.signals import preprocess
 from armloop.diagnosis import probability
 from armloop.diagnosis.account import Account, best_account
-from armloop.diagnosis.alternatives import why_alike
 from armloop.diagnosis.carried import account_with_load
 from armloop.diagnosis.contacts import Contact, drowned, find_contacts, known_contacts, without
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import fit
 from armloop.diagnosis.reasons import Standing, event_in_doubt, in_doubt, standing, too_still
-from armloop.diagnosis.remedies import remedy
 from armloop.diagnosis.reversals import AtReversals, judge_reversals
+from armloop.diagnosis.score import mean_by_joint, ratio
 from armloop.diagnosis.search import (
     Found,
     Outcome,
@@ -39,7 +37,7 @@ from armloop.diagnosis.zeros import sentences, settled
 from armloop.identification.validation.misrecorded import misrecorded
 from armloop.laws.effects import Effect, hypotheses
 from armloop.laws.effects.base import entry
-from armloop.laws.effects.listed import listed
+from armloop.laws.effects.listed import EFFECTS, listed
 from armloop.model import ReconstructedModel
 from armloop.robot.plausibility import say_beyond_limits
 from armloop.util.arrays import Array, Mask
@@ -121,7 +119,7 @@ class Diagnosis:
         scale, slides = self.evidence.scale, self.sliding[self.evidence.rows]
         joint, n = self.outcome.before.stacked.joint[slides], len(scale)
         tau, before, after = (
-            np.sqrt(_by_joint(joint, n, x[slides] ** 2))
+            np.sqrt(mean_by_joint(joint, n, x[slides] ** 2))
             for x in (
                 self.samples.tau[self.evidence.rows],
                 self.outcome.before.held_out * scale[self.outcome.before.stacked.joint],
@@ -137,7 +135,7 @@ class Diagnosis:
             "before": before.tolist(),
             "after": after.tolist(),
             "noise_floor": scale.tolist(),
-            "nrmse": {"before": _ratio(before, tau).tolist(), "after": _ratio(after, tau).tolist()},
+            "nrmse": {"before": ratio(before, tau).tolist(), "after": ratio(after, tau).tolist()},
             **self._at_reversals(),
         }
 
@@ -167,7 +165,7 @@ class Diagnosis:
                     **({"condition": "reversals"} if self._only_at_reversals(found) else {}),
                     "words": added.effect.sentence(added.parameters),
                     "sensor": added.effect.sensor,
-                    **({"remedy": remedy(added)} if added.effect.sensor else {}),
+                    **({"remedy": added.effect.remedy(added.parameters)} if added.effect.sensor else {}),
                     "alternatives": _alternatives(added.effect, found.rivals),
                 }
             )
@@ -204,19 +202,29 @@ class Diagnosis:
         }
 
 
-def _by_joint(joint: NDArray[np.intp], n: int, values: Array) -> Array:
-    """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
-    return _ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
-
-
-def _ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """x / y, NaN where y is zero."""
-    return np.divide(x, y, out=np.full(len(x), np.nan), where=y != 0)
-
-
 def _alternatives(effect: Effect, confounded: list[tuple[Effect, float]]) -> list[dict[str, Any]]:
     """Entries of what this motion cannot tell from an effect."""
     return [{**entry(*one.place), "share": share, "why": why_alike(effect, one)} for one, share in confounded]
+
+
+def why_alike(found: Effect, rival: Effect) -> str:
+    """Why two effects can look alike on one motion, and which motion would tell them apart: a sentence."""
+    listed = _said(found, rival)
+    if listed and (found.joint is None or rival.joint is None or found.joint == rival.joint):
+        return listed
+    return (
+        f"on this motion {rival.label()} explains held-out data nearly as well as {found.label()}; a run over other "
+        "postures and speeds may tell them apart: armloop diagnose --next-run designs one"
+    )
+
+
+def _said(found: Effect, rival: Effect) -> str | None:
+    """What either says of the other, or else of what that looks like."""
+    own = found.alike.get(rival.name) or rival.alike.get(found.name)
+    if own:
+        return own
+    stand_ins = [EFFECTS.get(effect.looks_like, type(effect)) for effect in (found, rival)]
+    return stand_ins[0].alike.get(stand_ins[1].name) or stand_ins[1].alike.get(stand_ins[0].name)
 
 
 @one_thread
@@ -268,7 +276,7 @@ def diagnose(
         blocks = len(np.unique(evidence.blocks))
         progress(f"searching {len(hypotheses(model.arm))} hypotheses on {blocks} blocks")
         with Hypotheses(whole, jobs) as panel:
-            account = best_account(whole, contacts, not too_still(whole), progress, panel)
+            account = best_account(whole, contacts, progress, panel)
         account = account_with_load(whole, account, progress, jobs) or account
         found = _concluded(whole, account, progress)
     stand = replace(found.standing, reasons=[*found.reasons, *own_zeros])
@@ -277,12 +285,11 @@ def diagnose(
 
 def _by_events_alone(whole: Evidence, evidence: Evidence, contacts: list[Contact]) -> Diagnosis:
     """The verdict on a run in which too little moves to look for anything but events."""
-    left = evidence.residual([])
-    nothing = fit(evidence, left, [], [])
+    nothing = fit(evidence, evidence.residual([]), [], [])
     augmented = whole.model.with_effects([contact.added for contact in contacts])
     found = Diagnosis(
         "effects_found" if contacts else "no_effect" if known_contacts(whole).any() else "cannot_tell",
-        Outcome([], nothing, nothing, left),
+        Outcome([], nothing, nothing),
         augmented,
         None,
         evidence,

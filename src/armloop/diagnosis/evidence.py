@@ -7,30 +7,31 @@ judged on folds that were not fitted.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.data.blocks import block_numbers, halves, widened
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
 from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import friction_spread, torque_errors
 from armloop.laws.effects import Context, Effect
+from armloop.laws.effects.base import Place
 from armloop.laws.effects.found import FAR
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.regression.moments import Moments
-from armloop.util.arrays import Array, stretches
+from armloop.util.arrays import Array, Index, Mask, stretches
 
-#: Longest and shortest block, s, and number of folds: residuals stay correlated for a good second.
-BLOCK_SECONDS, SHORTEST_BLOCK = 1.5, 1.0
-FOLDS = 2
+#: Shortest block, s, and number of folds.
+SHORTEST_BLOCK, FOLDS = 1.0, 2
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
+#: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
+STILL = 0.01
 #: Fewest blocks that a run can be judged on; in a short run they become shorter for it.
 FEWEST_BLOCKS = 8
 #: Places of a joint (low, middle, high), and speeds (back, slow, forth), that make the cells of its motion.
@@ -40,16 +41,20 @@ CELLS = 3
 _KEPT = 1 << 28
 
 
-class _Columns(dict[tuple[tuple[str, int | None, int | None], float], Array]):
+class _Columns(dict[tuple[Place, float], Array]):
     """Columns by the effect's place and shape, as many as there is room for."""
 
     size = 0
 
-    def keep(self, key: tuple[tuple[str, int | None, int | None], float], columns: Array) -> None:
-        """Keep columns while there is room."""
+    def of(self, place: Place, shape: float, make: Callable[[], Array]) -> Array:
+        """Columns as they were made before, if they were; else they are made, and kept while there is room."""
+        if (place, shape) in self:
+            return self[place, shape]
+        columns = make()
         if self.size < _KEPT:
-            self[key] = columns
+            self[place, shape] = columns
             self.size += columns.nbytes
+        return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +77,11 @@ class Evidence:
     samples: Samples
     scale: Array
     variation: Array
-    rows: NDArray[np.bool_]
-    blocks: NDArray[np.intp]
+    rows: Mask
+    blocks: Index
     context: Context
     asked: tuple[Effect, ...] = ()
-    unknown: NDArray[np.bool_] | None = None
+    unknown: Mask | None = None
     _of_motion: _Columns = field(default_factory=_Columns, repr=False)
     _of_model: _Columns = field(default_factory=_Columns, repr=False)
 
@@ -111,7 +116,7 @@ class Evidence:
         return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
 
     @property
-    def fold(self) -> NDArray[np.intp]:
+    def fold(self) -> Index:
         """(N,) fold of each sample."""
         return halves(self.blocks)
 
@@ -132,7 +137,7 @@ class Evidence:
         return residual(model, self.samples)
 
     @cached_property
-    def _cells(self) -> NDArray[np.intp]:
+    def _cells(self) -> Index:
         """(N, n) cell of a joint's motion that each sample lies in: like places and speeds, as many samples in each.
 
         What lies so near a standstill that the filter still brings in some of its torque, which no motion determines, is a
@@ -151,27 +156,26 @@ class Evidence:
     @cached_property
     def _model_errors(self) -> Array:
         """(R, r) torque of the model's own errors at the rows that count, weighted."""
-        key = (("the model's own errors", None, None), 0.0)
-        if key not in self._of_motion:
-            errors = torque_errors(self.model, self.samples)[self.independent]
-            self._of_motion.keep(key, errors)
-        else:
-            errors = self._of_motion[key]
+        errors = self._of_motion.of(
+            ("the model's own errors", None, None),
+            0.0,
+            lambda: torque_errors(self.model, self.samples)[self.independent],
+        )
         places, joints = np.nonzero(self.rows[self.kept])
         return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
-    def kept(self) -> NDArray[np.intp]:
+    def kept(self) -> Index:
         """(K,) samples that count for some joint."""
         return np.flatnonzero(self.rows.any(axis=1))
 
     @cached_property
-    def row_samples(self) -> NDArray[np.intp]:
+    def row_samples(self) -> Index:
         """(R,) sample of every stacked row."""
         return np.nonzero(self.rows)[0]
 
     @cached_property
-    def independent(self) -> NDArray[np.intp]:
+    def independent(self) -> Index:
         """(M,) samples of which the filter has left each something of its own to say."""
         return np.flatnonzero(independent_rows(self.samples))
 
@@ -179,25 +183,24 @@ class Evidence:
         """(M, p) columns of an effect on its joint, or (M, n, p) on all, through the run's filter, at
         :attr:`independent` samples; computed once.
         """
-        key = (effect.place, shape)
-        cache = self._of_model if effect.needs_model else self._of_motion
-        if key in cache:
-            return cache[key]
-        columns = smooth(self.samples, effect.columns(self.context, shape))[self.independent]
-        cache.keep(key, columns)
-        return columns
+        kept = self._of_model if effect.needs_model else self._of_motion
+        return kept.of(
+            effect.place,
+            shape,
+            lambda: smooth(self.samples, effect.columns(self.context, shape))[self.independent],
+        )
 
     def columns(self, effect: Effect, shape: float) -> Array:
         """(K, n, p) columns of an effect through the run's filter, at the samples kept."""
         return effect.on_all_joints(self.smoothed(effect, shape)[self._places], self.rows.shape[1])
 
     @cached_property
-    def _places(self) -> NDArray[np.intp]:
+    def _places(self) -> Index:
         places = np.searchsorted(self.independent, self.kept)
         assert (self.independent.take(places, mode="clip") == self.kept).all()
         return places
 
-    def only(self, rows: NDArray[np.bool_]) -> Evidence:
+    def only(self, rows: Mask) -> Evidence:
         """The same run where only rows (N, n) count."""
         return replace(self, rows=rows)
 
@@ -222,10 +225,10 @@ class Evidence:
 def creep(model: ReconstructedModel) -> Array:
     """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
     ranges = model.history.get("range")
-    return 0.01 * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
+    return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
 
 
-def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
+def far_outside(motion: Motion, ranges: Any) -> Mask:
     """(N, n) samples in which a joint's q, v or vdot lies so far beyond the trained range that nothing is judged there."""
     if not ranges:
         return np.zeros(motion.q.shape, dtype=bool)
@@ -234,22 +237,22 @@ def far_outside(motion: Motion, ranges: Any) -> NDArray[np.bool_]:
     return np.asarray(np.any([np.abs(x) > FAR * np.maximum(size, 1e-9) for x, size in parts], axis=0))
 
 
-def too_slow(model: ReconstructedModel, motion: Motion) -> NDArray[np.bool_]:
+def too_slow(model: ReconstructedModel, motion: Motion) -> Mask:
     """(N, n) samples in which a joint is slower than it slid in training: what friction is there, the model cannot know."""
     return np.asarray(np.abs(motion.v) < np.asarray(model.history.get("slowest") or 0.0))
 
 
-def near_standstill(samples: Samples) -> NDArray[np.bool_]:
+def near_standstill(samples: Samples) -> Mask:
     """(N, n) samples within the filter's reach of one in which a joint does not count as moving."""
     return widened(~samples.moving, samples.motion, round(samples.reach / samples.period))
 
 
-def sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+def sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     """(N, n) samples in which a joint slides, no closer than the filter can tell apart."""
     return np.asarray(_sliding(samples, model) & independent_rows(samples)[:, None])
 
 
-def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
+def _sliding(samples: Samples, model: ReconstructedModel) -> Mask:
     """(N, n) moving samples of stretches in which a joint gets anywhere.
 
     Other joints shake a joint at rest: it moves, but within its friction, and its torque is not determined by that.
@@ -267,8 +270,7 @@ def _sliding(samples: Samples, model: ReconstructedModel) -> NDArray[np.bool_]:
 
 def _block_seconds(motion: Motion) -> float:
     """Length of a block that leaves enough of them in all runs together, within the bounds."""
-    seconds = sum(float(np.ptp(motion.time[run])) for run in motion.runs())
-    return float(np.clip(seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
+    return float(np.clip(motion.seconds / FEWEST_BLOCKS, SHORTEST_BLOCK, BLOCK_SECONDS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,18 +282,14 @@ class Stacked:
 
     X: Array
     y: Array
-    block: NDArray[np.intp]
-    fold: NDArray[np.intp]
-    joint: NDArray[np.intp]
+    block: Index
+    fold: Index
+    joint: Index
     joints: int
-    cell: NDArray[np.intp]
+    cell: Index
     model_errors: Array
 
-    def only(self, rows: NDArray[np.bool_]) -> Stacked:
+    def only(self, rows: Mask) -> Stacked:
         """Some of the rows (R,)."""
         arrays = ("X", "y", "block", "fold", "joint", "cell", "model_errors")
         return replace(self, **{name: getattr(self, name)[rows] for name in arrays})
-
-    def moments(self) -> list[Moments]:
-        """Moments of each fold."""
-        return [Moments.of(self.X[self.fold == k], self.y[self.fold == k]) for k in range(FOLDS)]

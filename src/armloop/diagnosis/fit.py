@@ -8,21 +8,19 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, Estimate
+from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
-from armloop.regression.embedded import solve, unit_scale
+from armloop.regression.embedded import RIDGE, solve, unit_scale
 from armloop.regression.moments import Moments
-from armloop.util.arrays import TINY
+from armloop.util.arrays import TINY, Array
 
-Array = NDArray[np.float64]
-
-_REFINEMENTS = 3
-_RIDGE = 1e-8
+#: Coefficients and a nonlinear parameter are found in turn so many times more.
+REFINEMENTS = 3
 
 
 class Shape(NamedTuple):
@@ -62,6 +60,11 @@ class Fit:
     wald: tuple[tuple[float, int], ...]
     outside: Array
     stacked: Stacked
+
+    def added(self) -> list[AddedEffect]:
+        """The effects with their parameters, ready to be composed with the model."""
+        pairs = zip(self.effects, self.parameters, strict=True)
+        return [AddedEffect(effect, parameters) for effect, parameters in pairs]
 
     @cached_property
     def held_out(self) -> Array:
@@ -105,7 +108,7 @@ def _wald(x: Array, spread: Array) -> tuple[float, int]:
     known = np.flatnonzero(np.isfinite(np.diag(spread)) & (np.diag(spread) > 0))
     size = np.sqrt(np.diag(spread)[known])
     R, z = spread[np.ix_(known, known)] / np.outer(size, size), x[known] / size
-    return float(z @ np.linalg.solve(R + _RIDGE * np.eye(len(known)), z)), len(known)
+    return float(z @ np.linalg.solve(R + RIDGE * np.eye(len(known)), z)), len(known)
 
 
 def deviate(chi_square: float, freedom: int) -> float:
@@ -145,7 +148,7 @@ def _solved(
         The rows, coefficients, free parameters per effect, derivative, and the refined nonlinear parameters.
     """
     values, effects, evidence = list(values), problem.effects, problem.evidence
-    for attempt in range(_REFINEMENTS + 1):
+    for attempt in range(REFINEMENTS + 1):
         stacked, sizes = problem.rows(values)
         rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
         beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
@@ -153,7 +156,7 @@ def _solved(
             _bounded(e, evidence, e.refined(free, value))
             for e, free, value in zip(effects, x, values, strict=True)
         ]
-        if attempt == _REFINEMENTS or np.allclose(better, values, rtol=1e-3):
+        if attempt == REFINEMENTS or np.allclose(better, values, rtol=1e-3):
             break
         values = better
     return stacked, beta, x, J, values
@@ -193,7 +196,7 @@ def covariance(X: Array, left: Array, rows: Stacked) -> Array:
     scale = unit_scale(G)
     values, vectors = np.linalg.eigh(again / np.outer(scale, scale).clip(min=TINY))
     spread = in_time + (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
-    unit = G * np.outer(scale, scale) + _RIDGE * np.eye(len(G))
+    unit = G * np.outer(scale, scale) + RIDGE * np.eye(len(G))
     own = scale[:, None] * np.linalg.solve(unit, scale[:, None] * (X.T @ rows.model_errors))
     spread += own @ own.T
     spread[scale == 0, scale == 0] = np.inf

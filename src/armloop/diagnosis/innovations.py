@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from armloop.data.blocks import widened
@@ -19,28 +18,24 @@ from armloop.data.creep import CREEPING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import NEARLY
+from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics
 from armloop.model import AddedEffect, ReconstructedModel
-from armloop.util.arrays import Array
+from armloop.util.arrays import PER_MEDIAN, Array, Mask
 from armloop.util.errors import ModelError
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2
 #: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
 CREEP = 0.01
-#: Dry friction of a joint that creeps is known but for so many times what the model leaves there on its training logs, at
-#: most, and where nobody knows that, but for this part …
-_MARGIN, _UNSURE = 3.0, 0.8
+#: Dry friction of a joint that creeps is known but for what may, by chance, be left there as on the model's training
+#: logs, at most, and where nobody knows that, but for this part …
+_UNSURE = 0.8
 #: … and at rest it can hold this many times its sliding level.
 _STICTION = 1.2
-#: Torque and motion of one sample may be apart by this part of a sample period.
-_APART = 0.5
 
 
-def innovations(
-    evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()
-) -> tuple[Array, NDArray[np.bool_]]:
+def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect] = ()) -> tuple[Array, Mask]:
     """(N, n) signed innovations in standard deviations, and (N, n) whether a joint rests.
 
     Args:
@@ -62,7 +57,7 @@ def innovations(
     ranges = model.history.get("range")
     slow = CREEPING * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
-    creeping = np.minimum(_MARGIN * np.array(left) + more, _UNSURE * dry)
+    creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)
@@ -79,7 +74,7 @@ def innovations(
     return sign * size / deviations(evidence, residual), rest
 
 
-def at_rest(samples: Samples) -> NDArray[np.bool_]:
+def at_rest(samples: Samples) -> Mask:
     """(N, n) whether a joint stands still; around a standstill the filter has smeared only its torque."""
     rest = ~samples.moving
     reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
@@ -106,7 +101,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     own = np.broadcast_to(evidence.scale, motion.q.shape)
     rough = np.abs(residual - averaged(evidence.samples, residual))
     noise = [
-        1.4826 * float(np.median(rough[rows, j])) if (rows := evidence.rows[:, j]).any() else 0.0
+        PER_MEDIAN * float(np.median(rough[rows, j])) if (rows := evidence.rows[:, j]).any() else 0.0
         for j in range(motion.joints)
     ]
     if evidence.samples.cutoff_hz > 0:
@@ -117,7 +112,7 @@ def deviations(evidence: Evidence, residual: Array) -> Array:
     for run in motion.runs():
         if run.stop - run.start > 2:
             rate[run] = np.gradient(tau[run], motion.time[run], axis=0)
-    late = _APART * evidence.samples.period * rate
+    late = 0.5 * evidence.samples.period * rate  # torque and motion of a sample may be half a period apart
     supplied = NEARLY * (evidence.residual([]) - residual) ** 2
     return np.asarray(
         np.sqrt(np.maximum(own, 1e-12) ** 2 + late**2 + contradiction(model, motion) ** 2 + supplied)

@@ -6,21 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import widened
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import STILL, Evidence
 from armloop.experiment.excitation import Reference
 from armloop.laws.effects import Context, Effect
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Mask
 
 #: Least singular value, relative to the largest, of columns of unit size that is more than round-off.
 _ROUND_OFF = 1e-6
-#: Part of its fastest below which a joint may be at rest.
-_SLOW = 0.01
 #: Steps in which a nonlinear parameter is refined between and beyond the values tried.
 _REFINEMENTS = 6
 
@@ -45,7 +42,7 @@ class Stage:
     """
 
     samples: Samples
-    rows: NDArray[np.bool_]
+    rows: Mask
     scale: Array
     context: Context
 
@@ -64,7 +61,7 @@ class Stage:
         t = np.arange(0.0, reference.duration, period)
         q, v, vdot = reference.evaluate(t)
         motion = Motion(t, q, v, vdot, np.array([0]))
-        still = np.abs(v) <= _SLOW * np.abs(v).max(axis=0)
+        still = np.abs(v) <= STILL * np.abs(v).max(axis=0)
         reach = int(np.ceil(samples.reach / period))
         moving = ~widened(still, motion, reach)
         made = Samples(motion, np.zeros_like(q), moving, period, samples.cutoff_hz)

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.score import Score
+from armloop.util.arrays import Array, Mask
 
-Array = NDArray[np.float64]
-
-#: An effect must lower the held-out error by this many standard errors (over blocks) …
+#: What is no chance: so many standard errors. An effect must lower the held-out error by as many (over blocks), and,
+#: over its joints together, by the energy that the model leaves on the worst tenth of its own baseline: a run may be all
+#: of such motion, and a law that fits a model's shortcomings is easily found.
 SIGNIFICANCE = 3.0
-#: … and, over its joints together, by this part of the energy the model leaves on the worst tenth of its own baseline: a
-#: run may be all of such motion, and a law that fits a model's shortcomings is easily found.
-BASELINE_SHARE = 1.0
 #: A simpler effect is as good as the best if it is behind by no more than this many standard errors …
 CHANCE = 2.0
 #: … or on every joint by no more than this part of the baseline's energy, or of what the best removes there: no law is
@@ -26,6 +23,10 @@ ALIKE, NEARLY = 0.4, 0.003
 MOST = 0.75
 #: So many times the baseline is no baseline any more.
 MULTIPLE = 2.0
+#: More than this part of anything is most of it, and this part is nearly all.
+MOSTLY, NEARLY_ALL = 0.5, 0.8
+#: Less than this part of a torque, or of a force, is not noticed beside the rest of it.
+NOTICEABLE = 0.03
 
 
 def gain(current: Score, trial: Score) -> float:
@@ -53,7 +54,7 @@ def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:
 
 def enough(evidence: Evidence, score: Score) -> Array:
     """(n,) squared error, weighted, of each joint that is more than the model's own shortcomings."""
-    return np.asarray(BASELINE_SHARE * evidence.variation * np.maximum(score.rows, 1))
+    return np.asarray(evidence.variation * np.maximum(score.rows, 1))
 
 
 def simplest_of_equals(current: Score, trials: Sequence[Score]) -> int:
@@ -77,6 +78,11 @@ def is_behind(current: Score, trial: Score, best: Score) -> bool:
         lead(trial.of_joint(j), best.of_joint(j)) <= SIGNIFICANCE for j in worse
     )
     return not (chance or not worse) or gain(current, trial) < MOST * gain(current, best)
+
+
+def much_is_left(score: Score) -> Mask:
+    """(n,) joints of which a multiple of the baseline is left."""
+    return np.asarray(score.energy >= MULTIPLE**2 * score.rows)
 
 
 def soaked(current: Score, best: Score) -> Array:

@@ -91,7 +91,7 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
         return None
     planner, run = Planner.of(diagnosis, wish, progress), Stage.of_run(diagnosis.evidence)
     rivals = pairs(diagnosis, laws, run)
-    ways = {id(pair): planner.possible(pair.rivalries()) for pair in rivals}
+    ways = {id(pair): planner.possible(pair.both_ways()) for pair in rivals}
     joint = None
     if any(ways.values()):
         alike = planner.possible(lookalikes(diagnosis, laws, rivals, run))
@@ -106,9 +106,9 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
     then = Stage.of_reference(diagnosis.evidence, reference)
     told = [
         Told(
-            pair.found.effect,
+            pair.law.effect,
             pair.rival.effect,
-            min(way.left(run) for way in ways[id(pair)] or pair.rivalries()),
+            min(way.left(run) for way in ways[id(pair)] or pair.both_ways()),
             min((way.left(then) for way in ways[id(pair)]), default=None),
         )
         for pair in rivals

@@ -8,19 +8,18 @@ and is no news; a push does not.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import averaged
-from armloop.util.arrays import Array
+from armloop.util.arrays import PER_MEDIAN, Array, Index, Mask
 
 #: Innovations are looked at that often, s.
 _STEP = 0.04
 #: Like motion is sought so many seconds away at least, and counts once within so many …
 _APART, _VISIT = 1.0, 0.5
 #: … at so many occasions at most, within a spread of the motion, among so many of the nearest samples.
-_OCCASIONS, _NEAREST, _LIKE = 15, 300, 1.0
+_OCCASIONS, _NEAREST = 15, 300
 #: The baseline, on which a model errs by nothing on average, counts for so many occasions more: of a short run the few
 #: that there are may be other events.
 _BASELINE = 5
@@ -28,7 +27,7 @@ _BASELINE = 5
 _AT_REST = 3.0
 
 
-def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array]:
+def novelty(evidence: Evidence, innovation: Array, rest: Mask) -> tuple[Index, Array]:
     """Instants (M,) looked at, and (M, n) signed distance of each joint from its like, in standard deviations.
 
     The deviation is that of the noise and of like motion together: where like motion differs, little is new. Where there
@@ -56,7 +55,7 @@ def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> t
         far, near = cKDTree(features).query(features, k=list(range(1, min(len(rows), _NEAREST) + 1)))
         away = np.abs(seconds[near] - seconds[:, None]) > _APART
         first = _first_of_each(np.where(away, visit[near], -1)) & away
-        first &= far <= _LIKE
+        first &= far <= 1.0
         chosen = first & (np.cumsum(first, axis=1) <= _OCCASIONS)
         value, baseline = mean[rows, j], np.zeros((len(rows), _BASELINE))
         middle, spread = _middle(np.column_stack([baseline, np.where(chosen, value[near], np.nan)]))
@@ -64,7 +63,7 @@ def novelty(evidence: Evidence, innovation: Array, rest: NDArray[np.bool_]) -> t
     return rows, new
 
 
-def _first_of_each(x: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _first_of_each(x: Index) -> Mask:
     """(M, K) whether a number stands there for the first time in its row."""
     order = np.argsort(x, axis=1, kind="stable")
     ordered = np.take_along_axis(x, order, axis=1)
@@ -77,7 +76,7 @@ def _middle(x: Array) -> tuple[Array, Array]:
     """(M,) median and spread (scaled median absolute deviation) of each row's numbers."""
     few = np.sort(x, axis=1)[:, : _OCCASIONS + _BASELINE]
     middle = np.nanmedian(few, axis=1)
-    return middle, 1.4826 * np.nanmedian(np.abs(few - middle[:, None]), axis=1)
+    return middle, PER_MEDIAN * np.nanmedian(np.abs(few - middle[:, None]), axis=1)
 
 
 def _spread(x: Array) -> Array:

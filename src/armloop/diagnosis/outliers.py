@@ -16,11 +16,13 @@ from armloop.diagnosis.pushes import PAUSE, around
 from armloop.util.arrays import Array
 
 #: Over this many seconds the residual is averaged; shorter bursts are none, as those closer than PAUSE are one.
-_WINDOW, _SHORTEST = 0.15, 0.15
+_WINDOW = 0.15
 #: The residual must reach this many baselines …
 _RISE = 4.0
-#: … and this many times the most it reaches in the rest of the run; a burst lasts while it is above a part of its peak.
-_STANDS_OUT, _EDGE = 1.5, 0.4
+#: … and this many times the most it reaches in the rest of the run: a model that errs much errs often.
+STANDS_OUT = 1.5
+#: A burst lasts while it is above this part of its peak.
+_EDGE = 0.4
 #: Thresholds that are tried.
 _STEPS = 60
 
@@ -45,7 +47,7 @@ def outlying(evidence: Evidence, residual: Array) -> list[slice]:
         outside = np.ones(motion.samples, dtype=bool)
         for burst in [*bursts, *cut_off]:
             outside &= ~around(motion, burst)
-        if bursts and outside.any() and _STANDS_OUT * float(level[outside].max()) <= threshold:
+        if bursts and outside.any() and STANDS_OUT * float(level[outside].max()) <= threshold:
             return bursts
     return []
 
@@ -76,6 +78,6 @@ def _bursts(motion: Motion, level: Array, threshold: float) -> tuple[list[slice]
             burst = slice(int(inside[0]), int(inside[-1]) + 1)
             start, end = motion.time[burst.start], motion.time[burst.stop - 1]
             first, last = motion.time[run.start], motion.time[run.stop - 1]
-            event = start - first >= PAUSE and last - end >= _SHORTEST and end - start >= _SHORTEST
+            event = start - first >= PAUSE and last - end >= _WINDOW and end - start >= _WINDOW
             (bursts if event else others).append(burst)
     return bursts, others

@@ -7,11 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armloop.data.blocks import BLOCK_SECONDS
 from armloop.data.motion import Motion
 from armloop.diagnosis.confounded import Law, Rivalry
 from armloop.diagnosis.diagnose import Diagnosis
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import FEWEST_BLOCKS, Evidence
 from armloop.diagnosis.isolability import Stage, context_of
+from armloop.diagnosis.judgement import NOTICEABLE
+from armloop.diagnosis.search import ROUNDS
 from armloop.experiment.design import (
     CRITERIA,
     Columns,
@@ -35,16 +38,13 @@ from armloop.util.progress import Progress
 
 #: s of a period, repeated, and its harmonics: up to 0.4 Hz.
 PERIOD, _HARMONICS = 20.0, 8
-#: s that a diagnosis needs at least, and that an arm is asked to move at most.
-_SHORTEST, _LONGEST = 12.0, 3600.0
+#: s that a diagnosis needs at least, in blocks of their full length, and that an arm is asked to move at most.
+_SHORTEST = FEWEST_BLOCKS * BLOCK_SECONDS
+_LONGEST = 3600.0
 #: Random motions that show what is possible within the limits, and s between their samples.
 _TYPICAL, _STEP = 8, 0.05
 #: Of those, motions on which it is judged whether two effects can be told apart at all.
 _STAGES = 2
-#: How often a motion is designed anew, with what its rivals turned out to be able to.
-_ROUNDS = 2
-#: A law of whose torque all those motions together leave less than this part cannot be told from its rival.
-_NEVER = 0.03
 #: An effect of this many baselines, root mean square, is beyond doubt; what counts from there on is its shape.
 _ENOUGH = 5.0
 #: Part of the optimiser's usual iterations.
@@ -158,8 +158,8 @@ class Planner:
         return PERIOD / (40 * _HARMONICS)
 
     def possible(self, ways: Sequence[Rivalry]) -> list[Rivalry]:
-        """Those of which some motion within the limits shows that the rival is not the law."""
-        return [way for way in ways if way.left_on_all(self.stages) > _NEVER]
+        """Those of which motions within the limits leave a noticeable part of the law's torque to its rival."""
+        return [way for way in ways if way.left_on_all(self.stages) > NOTICEABLE]
 
     def whole(self, design: Design) -> FourierReference:
         """The motion in its full length."""
@@ -174,7 +174,7 @@ class Planner:
         found = len({id(way.law) for way in ways})
         self.progress(f"designing a motion that tells {found} laws from their rivals")
         rivals, best, made = list(ways), -np.inf, None
-        for _ in range(_ROUNDS):
+        for _ in range(ROUNDS):
             regression, rivalries = self._regression(rivals)
             design = self._optimised(regression, unexplained(rivalries, _ENOUGH**2))
             stage = Stage.of_reference(self.evidence, self.whole(design))

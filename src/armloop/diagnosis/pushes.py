@@ -5,30 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_numbers
 from armloop.data.motion import Motion
 from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.judgement import enough, leaves_more
+from armloop.diagnosis.fit import REFINEMENTS
+from armloop.diagnosis.judgement import MOSTLY, NOTICEABLE, enough, leaves_more
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 #: Events this close together are one, and so long around one its samples are kept out of everything else, s.
 PAUSE = 0.3
-#: Interval and size are found in turn so many times.
-_REFINEMENTS = 3
-#: What was there must explain this part of the event's energy …
-_EXPLAINED = 0.5
-#: … and a torque on one joint, or a force on the tool, is it if nothing with more freedom explains so much more.
+#: An event lasts this long at least, s; pieces of it that are as long tell by themselves.
+SHORTEST = 0.1
+#: What was there must explain most of the event's energy, and a torque on one joint, or a force on the tool, is it if
+#: nothing with more freedom explains so much more.
 _MORE = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 _FEW = 3
-#: Directions in which the arm feels a force less than this part of what it feels of another tell nothing of it.
-_FELT = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +69,7 @@ class _Kind:
 
 def around(motion: Motion, burst: slice) -> Mask:
     """(N,) samples of a stretch of one run, with a margin."""
-    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    run = motion.run_of(burst.start)
     start, end = motion.time[burst.start] - PAUSE, motion.time[burst.stop - 1] + PAUSE
     rows = np.zeros(motion.samples, dtype=bool)
     rows[run] = (motion.time[run] >= start) & (motion.time[run] <= end)
@@ -102,7 +99,7 @@ def push(
     ]
     # What explains the joints that show an event is none of it if others would have had to show it, and do not.
     agreed = [(trial, kind) for trial, kind in tried if not trial.contradicted]
-    tried = agreed if any(trial.own >= _EXPLAINED for trial, _ in agreed) else tried
+    tried = agreed if any(trial.own >= MOSTLY for trial, _ in agreed) else tried
     if not tried:
         return None
     most = max(trial.share for trial, _ in tried)
@@ -116,7 +113,7 @@ def push(
         return unlikely, kind.effect.complexity, bool(kind.link), -trial.share
 
     best, chosen = min(equals, key=order)
-    if best.own < _EXPLAINED:
+    if best.own < MOSTLY:
         return None
     rivals = {kind.effect.place: (kind.effect, trial.share) for trial, kind in equals if kind is not chosen}
     rivals.pop(chosen.effect.place, None)
@@ -141,11 +138,11 @@ def _trial(
     evidence: Evidence, residual: Array, weight: Array, burst: slice, kind: _Kind, shown: list[int]
 ) -> Contact | None:
     motion = evidence.samples.motion
-    for _ in range(_REFINEMENTS):
+    for _ in range(REFINEMENTS):
         burst = _interval(evidence, residual, weight, burst, kind)
     part, columns, y = _burst(evidence, residual, weight, burst, kind)
-    # Every other piece of a tenth of a second, of those that tell of it, is held out in turn.
-    pieces = block_numbers(part, 0.1)
+    # Every other piece, of those that tell of it, is held out in turn.
+    pieces = block_numbers(part, SHORTEST)
     telling = np.unique(pieces[columns.any(axis=(1, 2))])
     pieces = np.searchsorted(telling, pieces)
     left = np.array(y)
@@ -186,7 +183,7 @@ def _trial(
     )
 
 
-def _elsewhere(left: Array, weight: Array, pieces: NDArray[np.intp], shown: list[int]) -> Score:
+def _elsewhere(left: Array, weight: Array, pieces: Index, shown: list[int]) -> Score:
     """The score of what is left (N, n), weighted, of joints that an event was not noticed at, where it counts."""
     counted = weight > 0
     counted[:, shown] = False
@@ -209,7 +206,7 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     A burst's edges are where the novelty falls, and how the arm moves can make it fall within a push.
     """
     motion = evidence.samples.motion
-    run = next(run for run in motion.runs() if run.start <= burst.start < run.stop)
+    run = motion.run_of(burst.start)
     period = evidence.samples.period
     # The filter has smeared an event's edges.
     inner = round(min(evidence.samples.reach / period, 0.2 * (burst.stop - burst.start)))
@@ -232,18 +229,19 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
 
 
 def _size(columns: Array, y: Array) -> Array:
+    """(p,) mean force or torque; along directions in which the arm hardly feels a force, none."""
     X = columns.reshape(-1, columns.shape[2])
-    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=_FELT)[0])
+    return np.asarray(np.linalg.lstsq(X, y.ravel(), rcond=NOTICEABLE)[0])
 
 
-def _size_error(columns: Array, size: Array, left: Array, pieces: NDArray[np.intp]) -> Array:
+def _size_error(columns: Array, size: Array, left: Array, pieces: Index) -> Array:
     """(p,) standard error of the mean force or torque, pieces being the independent units.
 
     Along directions in which the arm does not feel a force, it may be as large as the one that is felt.
     """
     X = columns.reshape(-1, columns.shape[2])
     G = X.T @ X
-    bread = np.linalg.pinv(G, rcond=_FELT**2)
+    bread = np.linalg.pinv(G, rcond=NOTICEABLE**2)
     scores = np.einsum("njf,nj->nf", columns, left)
     sums = np.array([scores[pieces == piece].sum(axis=0) for piece in np.unique(pieces)])
     hidden = np.clip(np.diag(np.eye(len(G)) - bread @ G), 0.0, 1.0) * float(size @ size)

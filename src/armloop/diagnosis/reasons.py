@@ -9,18 +9,14 @@ from typing import Any
 import numpy as np
 
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
-from armloop.diagnosis.judgement import MULTIPLE
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
 from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
-from armloop.laws.effects.base import number
+from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Mask
 
-#: A model that leaves this part of a joint's torque, RMS, most of it predictable, judges nothing there.
-TOO_POOR = 0.5
-#: Part of the samples outside the trained range that is worth a word, and the part that leaves too little.
-_WORTH_A_WORD, _MOSTLY = 0.02, 0.8
-#: Standard errors by which a part of what is left must be predictable, and how large a part, to be no noise.
-_SURE, _PART = 3.0, 0.2
+#: Part of the samples outside the trained range that is worth a word.
+_WORTH_A_WORD = 0.02
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
 
@@ -63,7 +59,7 @@ def standing(
     unknown, unexplained = False, []
     for j, part in enumerate(parts):
         reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
-        unknown |= bool(far[j] > _MOSTLY)
+        unknown |= bool(far[j] > NEARLY_ALL)
         if evidence.rows[:, j].sum() < _FEWEST:
             reasons.append(_uncounted(j, slides[:, j], strays[:, j], creeps[:, j]))
             continue
@@ -106,7 +102,7 @@ def in_doubt(label: str, share: float) -> str:
 
 def event_in_doubt(event: AddedEffect) -> str:
     """A sentence on an event that removes no more than what nothing accounts for at other times."""
-    start, end = (number(event.parameters[key].value) for key in ("start", "end"))
+    start, end = ends(event.parameters)
     return (
         f"from {start:.1f} to {end:.1f} s {event.effect.label()} would explain what is left, but as much is left there "
         "at other times that nothing accounts for: it may be of the same origin, and is not stated"
@@ -147,9 +143,10 @@ def _slow(model: ReconstructedModel, j: int, part: float) -> list[str]:
 
 
 def _too_poor(model: ReconstructedModel, j: int) -> str:
+    """A sentence on a model that leaves most of a joint's torque, RMS: it judges nothing there; else empty."""
     own = model.baseline.get("nrmse") or []
     share = own[j] if j < len(own) and own[j] is not None else 0.0
-    if share < TOO_POOR:
+    if share < MOSTLY:
         return ""
     joints = model.baseline.get("joints") or []
     said = Parts(**joints[j]) if j < len(joints) else Parts(j + 1)
@@ -168,13 +165,14 @@ def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
             "show it",
             True,
         )
-    if left > max(_SURE * error, _PART * (left + noise)):
+    much = (1 - NEARLY_ALL) * (left + noise)
+    if left > max(SIGNIFICANCE * error, much):
         return (
             f"{size}, and {left / (left + noise):.0%} of its energy can be predicted from the motion, but no listed effect "
             "nor a law that was found accounts for it",
             True,
         )
-    if part.separated and left + error <= _PART * (left + noise):
+    if part.separated and left + error <= much:
         return (
             f"{size}, but nothing in it can be predicted from the motion: noise, or what happened once",
             False,

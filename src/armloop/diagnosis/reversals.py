@@ -19,36 +19,32 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.stats import norm, t
 
 from armloop.data.blocks import block_sums
 from armloop.data.reversals import at_reversals, turning
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
-from armloop.diagnosis.search import Found, Outcome, clear
+from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NOTICEABLE, SIGNIFICANCE
+from armloop.diagnosis.score import mean_by_joint
+from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
-from armloop.util.arrays import TINY, Array, Mask
+from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.progress import Progress
 
-#: An effect must remove this part of a joint's squared error at reversals, so that the error is halved; where it was
-#: found at another joint, this part …
-PLAIN, LIKELY = 0.75, 0.5
-#: … which must be at least this part of the joint's torque, both root mean square …
-NOTICEABLE = 0.03
-#: … and the log ratio of the errors in the blocks must be positive with this chance of error (three standard errors): in
-#: ratios, so that no fast reversal outweighs the others, of errors beside the least noticeable one, so that none does
-#: at which there is nothing to remove; by Student's t, for they may be few.
-_CHANCE = 0.00135
+#: An effect must remove this part of a joint's squared error at reversals, so that it was a multiple of what remains;
+#: where the effect was found at another joint, most of it.
+PLAIN = 1 - 1 / MULTIPLE**2
+#: That must be a noticeable part of the joint's torque, both root mean square, and the log ratio of the errors in the
+#: blocks must be positive with the chance of error of a normal variable: in ratios, so that no fast reversal outweighs the
+#: others, of errors beside the least noticeable one, so that none does at which there is nothing to remove; by Student's
+#: t, for they may be few.
+_CHANCE = float(norm.sf(SIGNIFICANCE))
 #: A simpler effect that leaves no more of the squared error than this part of it is as good.
 ALIKE = 0.1
-#: Effects that explain this much of what the chosen one explains are its alternatives.
-RIVAL_SHARE = 0.94
-#: It was there all along if the training logs show this part of it: from run to run reversals differ.
-MOSTLY = 0.5
 #: Fewest blocks with a reversal of a joint that tell anything of it.
 _FEWEST = 4
 
@@ -103,13 +99,13 @@ def judge_reversals(
         assert trial is not None
         found.append(replace(best, shape=trial.shapes[-1]))
         progress(f"found {best.effect.label()}: removes {best.share:.0%} of the error at its reversals")
-        changed = _joints(best.effect) or set(view.suspects(known.fit))
+        changed = set(best.effect.indices or view.suspects(known.fit))
         known = replace(known, fit=trial)
         gains.forget(best.effect, changed)
     if not found:
         return None
-    after, nothing = Known.of(own, known.fit.effects, known.fit.shapes), Known.of(own)
-    every = Outcome([*outcome.found, *found], nothing.fit, after.fit, nothing.residual)
+    after = Known.of(own, known.fit.effects, known.fit.shapes).fit
+    every = Outcome([*outcome.found, *found], Known.of(own).fit, after)
     whole = clear(own, every, settled=len(outcome.found), alike=True)
     found = whole.found[len(outcome.found) :]
     if not found:
@@ -118,13 +114,13 @@ def judge_reversals(
     return AtReversals(found, whole, own, before, left)
 
 
-def _never_seen(evidence: Evidence) -> NDArray[np.bool_]:
+def _never_seen(evidence: Evidence) -> Mask:
     """(n,) joints that turned round nowhere in the training logs: how the model errs there, nobody knows."""
     left = evidence.model.baseline.get("reversals")
     return np.array([x is None for x in left]) if left else np.zeros(evidence.rows.shape[1], dtype=bool)
 
 
-def _remembering(evidence: Evidence, outcome: Outcome) -> NDArray[np.bool_]:
+def _remembering(evidence: Evidence, outcome: Outcome) -> Mask:
     """(n,) joints in which dry friction was found, and whose friction has memory in the model: so has what was added."""
     remembering, friction = np.zeros(evidence.rows.shape[1], dtype=bool), evidence.model.friction
     for one in outcome.added():
@@ -134,18 +130,17 @@ def _remembering(evidence: Evidence, outcome: Outcome) -> NDArray[np.bool_]:
     return remembering
 
 
-def _joints(effect: Effect) -> set[int]:
-    """Joints (0-based) that an effect sits in; none if it concerns all."""
-    return {j - 1 for j in (effect.joint, effect.other_joint) if j is not None}
-
-
 def _concerned(arm: Arm, joints: set[int], current: Fit) -> list[Effect]:
     """Effects in some joints that were not found yet.
 
     A sensor's fault, a load or a tilt is there while a joint slides, too, where the search has asked for it.
     """
     taken = {effect.place for effect in current.effects}
-    return [e for e in hypotheses(arm) if e.place not in taken and not e.sensor and _joints(e) & joints]
+    return [
+        e
+        for e in hypotheses(arm)
+        if e.place not in taken and not e.sensor and not joints.isdisjoint(e.indices)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +150,8 @@ class _View:
     """
 
     rows: Mask
-    joint: NDArray[np.intp]
-    block: NDArray[np.intp]
+    joint: Index
+    block: Index
     noticeable: Array
     usual: Array
 
@@ -170,11 +165,7 @@ class _View:
 
     def mean_squares(self, fit: Fit) -> Array:
         """(n,) mean held-out squared error at reversals, weighted; NaN where there is none."""
-        n = fit.stacked.joints
-        joint = self.joint[self.rows]
-        counts = np.bincount(joint, minlength=n)
-        sums = np.bincount(joint, weights=fit.held_out[self.rows] ** 2, minlength=n)
-        return np.divide(sums, counts, out=np.full(n, np.nan), where=counts > 0)
+        return mean_by_joint(self.joint[self.rows], fit.stacked.joints, fit.held_out[self.rows] ** 2)
 
     def suspects(self, current: Fit) -> list[int]:
         """Joints (0-based) with enough reversals and an error there that an effect could noticeably lower."""
@@ -234,7 +225,8 @@ class _Gains:
         """Drop the effect that was found, and what depends on joints (0-based) where something was found."""
         self.found.add(found.name)
         for effect in list(self.by_effect):
-            if effect.place == found.place or not _joints(effect) or _joints(effect) & joints:
+            own = effect.indices
+            if effect.place == found.place or not own or not joints.isdisjoint(own):
                 del self.by_effect[effect]
 
     def _sure(self, effect: Effect, j: int) -> bool:
@@ -247,7 +239,7 @@ class _Gains:
         return _positive(alone) or (len(alike) > 1 and _positive(np.concatenate(alike)))
 
     def _least(self, effect: Effect) -> float:
-        return LIKELY if effect.name in self.found else PLAIN
+        return MOSTLY if effect.name in self.found else PLAIN
 
     def best(self) -> Found | None:
         """The effect that removes most at some joint, the simplest of equals; None if none is worth naming."""

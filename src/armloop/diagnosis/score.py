@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import Array, Index, Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,12 +23,10 @@ class Score:
 
     complexity: int
     errors: Array
-    counts: NDArray[np.intp]
+    counts: Index
 
     @staticmethod
-    def of(
-        complexity: int, held_out: Array, joint: NDArray[np.intp], block: NDArray[np.intp], n: int
-    ) -> Score:
+    def of(complexity: int, held_out: Array, joint: Index, block: Index, n: int) -> Score:
         """Sums of what is left (R,) of rows of ``n`` joints."""
         blocks, index = np.unique(block, return_inverse=True)
         cell, cells = joint * len(blocks) + index, n * len(blocks)
@@ -50,12 +49,17 @@ class Score:
         return np.asarray(self.errors.sum(axis=1))
 
     @property
-    def rows(self) -> NDArray[np.intp]:
+    def rows(self) -> Index:
         """(n,) rows of each joint."""
         return np.asarray(self.counts.sum(axis=1))
 
     @property
-    def seen(self) -> NDArray[np.intp]:
+    def excess(self) -> Array:
+        """(n,) what is left of each joint beyond the baseline."""
+        return self.energy - self.rows
+
+    @property
+    def seen(self) -> Index:
         """(n,) blocks in which a joint has rows."""
         return np.asarray((self.counts > 0).sum(axis=1))
 
@@ -63,3 +67,13 @@ class Score:
     def error(self) -> float:
         """Held-out squared error, weighted."""
         return float(self.errors.sum())
+
+
+def mean_by_joint(joint: Index, n: int, values: Array) -> Array:
+    """(n,) mean of row values (R,) over each joint; NaN where a joint has no rows."""
+    return ratio(np.bincount(joint, weights=values, minlength=n), np.bincount(joint, minlength=n))
+
+
+def ratio(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """x / y, NaN where y is zero."""
+    return np.divide(x, y, out=np.full(len(x), np.nan), where=y != 0)

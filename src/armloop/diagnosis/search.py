@@ -16,33 +16,34 @@ from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     CHANCE,
     MOST,
-    MULTIPLE,
     SIGNIFICANCE,
     enough,
     gain,
     is_behind,
     is_worth,
     lead,
+    much_is_left,
     simplest_of_equals,
     times_enough,
 )
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
+from armloop.laws.effects.base import Place
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced
 
-#: Name and joints of an effect.
-Place = tuple[str, int | None, int | None]
 #: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
 #: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for
 #: small ones. But what is left of that is of many kinds, and one law explains not this part of it.
 LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
 #: Effects that explain this much of what the chosen one explains are listed as its alternatives.
 RIVAL_SHARE = 0.94
-_MOST_EFFECTS = 4
-_ROUNDS = 2
+#: A run tells so many effects apart, or terms of a law, at most.
+MOST_EFFECTS = 4
+#: What depends on one another is found, or designed, in turn so many times.
+ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +87,10 @@ class Outcome:
     found: list[Found]
     before: Fit
     after: Fit
-    residual: Array
 
     def added(self) -> list[AddedEffect]:
         """The effects with their parameters, ready to be composed with the model."""
-        return [
-            AddedEffect(effect, parameters)
-            for effect, parameters in zip(self.after.effects, self.after.parameters, strict=True)
-        ]
+        return self.after.added()
 
 
 def search(
@@ -119,8 +116,7 @@ class _Search:
     ) -> None:
         self.evidence, self.progress, self.panel, self.barred = evidence, progress, panel, barred
         self.nothing = Known.of(evidence)
-        bare = self.nothing.fit.score
-        self.explainable: Array = np.maximum(bare.energy - bare.rows, 1e-9)
+        self.explainable: Array = np.maximum(self.nothing.fit.score.excess, 1e-9)
         self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
@@ -128,7 +124,7 @@ class _Search:
         found: list[Found] = []
         known = self.nothing
         seen: set[frozenset[Place]] = {frozenset()}
-        while len(found) < _MOST_EFFECTS:
+        while len(found) < MOST_EFFECTS:
             best = self._best(found)
             more = self._pair(found) if best is None else [best]
             if not more:
@@ -144,7 +140,7 @@ class _Search:
             if places in seen:
                 break
             seen.add(places)
-        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, known.fit, self.nothing.residual))
+        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, known.fit))
         unclear = [f.effect for f in found if f not in outcome.found]
         if not unclear:
             return outcome
@@ -171,7 +167,7 @@ class _Search:
         beside the other.
         """
         current, trials = self._asked(beside)
-        if (current.energy < MULTIPLE**2 * current.rows).all() or len(beside) + 2 > _MOST_EFFECTS:
+        if not much_is_left(current).any() or len(beside) + 2 > MOST_EFFECTS:
             return []
         doubtful = [
             trial
@@ -221,16 +217,16 @@ class _Search:
 
     def _is_much(self, current: Score, trial: Score) -> bool:
         """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""
-        removed, left = current.energy - trial.energy, current.energy - current.rows
-        of_the_rest = (removed >= MOST_OF_REST * left) & (removed > enough(self.evidence, current))
+        removed = current.energy - trial.energy
+        of_the_rest = (removed >= MOST_OF_REST * current.excess) & (removed > enough(self.evidence, current))
         return bool(((removed >= LEAST_SHARE * self.explainable) | of_the_rest).any())
 
     def _exchanged(self, found: list[Found]) -> list[Found]:
         """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
-        for _ in range(_ROUNDS if len(found) > 1 else 0):
+        for _ in range(ROUNDS if len(found) > 1 else 0):
             changed = False
             for k in range(len(found) - 1, -1, -1):
-                others = [f for i, f in enumerate(found) if i != k]
+                others = _others(found, k)
                 best, label = self._best(others), found[k].effect.label()
                 if best is None:
                     self.progress(f"beside the others {label} explains nothing")
@@ -264,11 +260,20 @@ def _known(evidence: Evidence, found: Sequence[Found]) -> Known:
     return Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
 
 
+def _others(found: Sequence[Found], k: int) -> list[Found]:
+    return [*found[:k], *found[k + 1 :]]
+
+
+def _with_only(evidence: Evidence, outcome: Outcome, found: list[Found]) -> Outcome:
+    """The outcome with these of its effects, fitted again."""
+    return Outcome(found, outcome.before, _known(evidence, found).fit)
+
+
 def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
     """How each effect found stands out beside the others."""
     found = []
     for k in range(len(outcome.found)):
-        others = _known(evidence, [f for i, f in enumerate(outcome.found) if i != k]).fit.score
+        others = _known(evidence, _others(outcome.found, k)).fit.score
         after = outcome.after.score
         found.append(Strength(times_enough(evidence, others, after), lead(others, after)))
     return found
@@ -317,10 +322,10 @@ def outweighed(
 
     after = score(outcome.after)
     rest = np.zeros(len(after.energy))
-    rest[list(left)] = np.maximum(after.energy - after.rows, 0.0)[list(left)]
+    rest[list(left)] = np.maximum(after.excess, 0.0)[list(left)]
     margins = []
     for effect in among:
-        others = score(_known(evidence, [f for f in outcome.found if f is not effect]).fit)
+        others = score(without_effect(evidence, outcome, effect).after)
         removed = np.maximum(others.energy - after.energy, 0.0)
         margins.append(float(removed @ (removed - rest)))
     return among[int(np.argmin(margins))] if min(margins, default=0.0) < 0 else None
@@ -328,25 +333,21 @@ def outweighed(
 
 def without_effect(evidence: Evidence, outcome: Outcome, effect: Found) -> Outcome:
     """The outcome without one of its effects; the others are fitted again."""
-    others = [f for f in outcome.found if f is not effect]
-    return Outcome(others, outcome.before, _known(evidence, others).fit, outcome.residual)
+    return _with_only(evidence, outcome, [f for f in outcome.found if f is not effect])
 
 
 def without_effects_at(evidence: Evidence, outcome: Outcome, joint: int) -> Outcome:
     """The outcome without the effects that act on a joint (0-based) above all; the others are fitted again."""
     kept = [f for f in outcome.found if not _acts_mainly_on(evidence, f.effect, f.shape, joint)]
-    if len(kept) == len(outcome.found):
-        return outcome
-    return Outcome(kept, outcome.before, _known(evidence, kept).fit, outcome.residual)
+    return outcome if len(kept) == len(outcome.found) else _with_only(evidence, outcome, kept)
 
 
 def pruned(evidence: Evidence, outcome: Outcome) -> Outcome:
     """The outcome without effects that are worth nothing beside the others."""
     for k in range(len(outcome.found)):
-        others = [f for i, f in enumerate(outcome.found) if i != k]
-        known = _known(evidence, others)
-        if not is_worth(evidence, known.fit.score, outcome.after.score, _tied(outcome.found[k].effect)):
-            return pruned(evidence, Outcome(others, outcome.before, known.fit, outcome.residual))
+        fewer = _with_only(evidence, outcome, _others(outcome.found, k))
+        if not is_worth(evidence, fewer.after.score, outcome.after.score, _tied(outcome.found[k].effect)):
+            return pruned(evidence, fewer)
     return outcome
 
 
@@ -360,11 +361,11 @@ def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = 
         settled: so many, the first, are not asked again.
         alike: an effect stays, too, if all its coefficients together are significant, or those of all of its kind.
     """
-    found, fitted = outcome.found, outcome.after
-    while len(found) > settled:
+    while len(outcome.found) > settled:
+        fitted = outcome.after
         errors = list(fitted.clear[settled:])
         if alike:
-            errors = [max(pair) for pair in zip(errors, _together(found, fitted, settled), strict=True)]
+            errors = [max(pair) for pair in zip(errors, _together(outcome, settled), strict=True)]
         possible = [
             effect.plausible(evidence.model.arm, own)
             for effect, own in zip(fitted.effects, fitted.parameters, strict=True)
@@ -372,16 +373,14 @@ def clear(evidence: Evidence, outcome: Outcome, settled: int = 0, alike: bool = 
         errors = [own * fits for own, fits in zip(errors, possible[settled:], strict=True)]
         if min(errors) >= SIGNIFICANCE and all(possible):
             break
-        least = settled + int(np.argmin(errors))
-        found = [f for k, f in enumerate(found) if k != least]
-        fitted = _known(evidence, found).fit
-    return Outcome(found, outcome.before, fitted, outcome.residual)
+        outcome = _with_only(evidence, outcome, _others(outcome.found, settled + int(np.argmin(errors))))
+    return outcome
 
 
-def _together(found: Sequence[Found], fitted: Fit, settled: int) -> list[float]:
+def _together(outcome: Outcome, settled: int) -> list[float]:
     """How many standard errors the coefficients of each effect are from zero together, or those of all of its kind."""
-    kinds = [f.effect.name for f in found[settled:]]
-    wald = fitted.wald[settled:]
+    kinds = [f.effect.name for f in outcome.found[settled:]]
+    wald = outcome.after.wald[settled:]
     each = []
     for name, own in zip(kinds, wald, strict=True):
         same = [pair for other, pair in zip(kinds, wald, strict=True) if other == name]
@@ -398,6 +397,6 @@ def _tied(effect: Effect) -> int:
 def _acts_mainly_on(evidence: Evidence, effect: Effect, shape: Shape, joint: int) -> bool:
     """Whether an effect's columns, weighted, are largest on a joint."""
     if effect.joint is not None:
-        return joint + 1 in (effect.joint, effect.other_joint)
+        return joint in effect.indices
     columns = evidence.columns(effect, shape.final) / evidence.scale[:, None]
     return int(np.argmax((columns**2).sum(axis=(0, 2)))) == joint

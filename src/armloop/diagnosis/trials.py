@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, Shape, fit
 from armloop.diagnosis.judgement import CHANCE, lead
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Effect, hypotheses
-from armloop.model import AddedEffect
-from armloop.util.arrays import Array
+from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
 from armloop.util.workers import Team
 
@@ -44,7 +42,7 @@ class Known:
         residual = evidence.residual([])
         known = Known(evidence, residual, fit(evidence, residual, effects, shapes))
         for _ in range(_REFITS if effects else 0):
-            added = known.added()
+            added = known.fit.added()
             knowing, residual = evidence.knowing(added), evidence.residual(added)
             again = Known(knowing, residual, fit(knowing, residual, effects, shapes))
             # What spans the same leaves as much, and yet its parameters are others: those of the effects together.
@@ -61,21 +59,10 @@ class Known:
         errors = np.hstack([e.std_error for p in other.fit.parameters for e in p.values()])
         return bool((np.abs(mine - others) <= _SAME * errors)[np.isfinite(errors)].all())
 
-    def added(self) -> list[AddedEffect]:
-        """The effects with their parameters, ready to be composed with the model."""
-        pairs = zip(self.fit.effects, self.fit.parameters, strict=True)
-        return [AddedEffect(effect, parameters) for effect, parameters in pairs]
-
-    def without(self, place: tuple[str, int | None, int | None], whole: Evidence) -> Known:
-        """What is known if one effect is taken back."""
-        kept = [k for k, effect in enumerate(self.fit.effects) if effect.place != place]
-        return Known.of(whole, [self.fit.effects[k] for k in kept], [self.fit.shapes[k] for k in kept])
-
     def trial(self, effect: Effect) -> Fit | None:
         """All effects fitted with one more; None where it cannot be there or shows nothing on this run."""
         evidence, current = self.evidence, self.fit
-        joints = [j - 1 for j in (effect.joint, effect.other_joint) if j is not None]
-        if not all(evidence.rows[:, j].any() for j in joints):
+        if not all(evidence.rows[:, j].any() for j in effect.indices):
             return None  # a joint at rest shows nothing
         shapes = list(effect.shapes(evidence.context))
         if not shapes:
@@ -169,7 +156,7 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     blocks, and on what the known effects leave there when they, too, are fitted without that fold.
     """
     n = known.residual.shape[1]
-    joints = range(n) if effect.other_joint or effect.joint is None else [effect.joint - 1]
+    joints = effect.indices if len(effect.indices) == 1 else range(n)
     columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
     every = list(range(FOLDS))
     # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
@@ -193,7 +180,7 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
 
 def _shape_problem(
     known: Known, effect: Effect, shapes: list[float], joints: Iterable[int]
-) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+) -> tuple[Array, Array, Array, Index]:
     """Of the effect's joints: columns (R, S, p) of every shape, what is left on held-out rows (R,) and after a fit
     outside each fold (FOLDS, R), and the fold of each row.
     """

@@ -12,14 +12,13 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
-from armloop.diagnosis.judgement import CHANCE, SIGNIFICANCE, enough, gain, lead
+from armloop.diagnosis.judgement import CHANCE, MOSTLY, MULTIPLE, SIGNIFICANCE, enough, gain, lead
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import Outcome, pruned, without_effects_at
+from armloop.diagnosis.search import MOST_EFFECTS, Outcome, pruned, without_effects_at
 from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law
@@ -27,24 +26,22 @@ from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import TINY
+from armloop.util.arrays import TINY, Array, Index
 from armloop.util.progress import Progress
 
-Array = NDArray[np.float64]
-
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
-#: it is this many times what the model leaves on the worst tenth of its baseline, even without the blocks that show most
-#: of it: one or two are an event of the run, no law.
-EXCESS, EVENTS = 2.0, 2
+#: it is a multiple of what the model leaves on the worst tenth of its baseline, even without so many blocks that show
+#: most of it: one or two are an event of the run, no law.
+EVENTS = 2
 #: Less than this part of the energy that effects removed from a joint is what they leave because a law is never met
 #: exactly, and no further effect.
 REMAINDER = 0.03
-#: Effects that leave more than this part of a joint's energy as a real residual are not what is there.
+#: Effects that leave more than this part of a joint's energy as a real residual are not what is there; nor are those of
+#: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
-#: Nor are those of whose remainder, beyond the baseline's, a law of no more parameters in their place removes this part.
-FAR_LESS = 0.5
+#: Fewest rows of a joint that tell of a law.
 _FEWEST = 50
-_MOST_TERMS = 4
+#: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be.
 _MOST_CANDIDATES = 1500
 _RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
 
@@ -126,7 +123,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
 def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[Unlisted | None, Outcome]:
     """One law in place of what was named at a joint, where it is simpler and leaves far less of it."""
     for j in range(evidence.samples.motion.joints):
-        there = [f for f in outcome.found if f.effect.joint == j + 1 and f.effect.other_joint is None]
+        there = [f for f in outcome.found if f.effect.indices == (j,)]
         bare = without_effects_at(evidence, outcome, j)
         rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:
@@ -162,7 +159,7 @@ def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     named = outcome.after.score.of_joint(j)
     # what the model leaves on its baseline is left by either
     own = float(named.rows.sum())
-    far_less = gain(named, law.score) >= max(FAR_LESS * (named.error - own), own)
+    far_less = gain(named, law.score) >= max(MOSTLY * (named.error - own), own)
     return lead(named, law.score) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
 
 
@@ -193,7 +190,7 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
             continue
         # Noise has energy, too, but no memory: only what lasts can be a law.
         error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
-        sums = block_sums(error - EXCESS**2 * evidence.variation[j], after.stacked.block[mine])
+        sums = block_sums(error - MULTIPLE**2 * evidence.variation[j], after.stacked.block[mine])
         if np.sort(sums)[:-EVENTS].sum() > 0 or _follows_a_law(evidence, after, j):
             ratios[j] = np.sqrt((after.held_out[mine] ** 2).mean())
     return int(np.argmax(ratios)) if ratios.any() else None
@@ -233,7 +230,7 @@ class _Law:
 
     terms: list[tuple[float, str]]
     left: Array
-    block: NDArray[np.intp]
+    block: Index
     errors: Array = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
@@ -273,17 +270,16 @@ def _names(library: AngleSums, j: int) -> list[str]:
 
 def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     mine = after.stacked.joint == j
-    y = after.held_out[mine]
+    y, block, fold = after.held_out[mine], after.stacked.block[mine], after.stacked.fold[mine]
     rows = np.flatnonzero(evidence.rows[:, j])
     moving = evidence.samples.motion.take(rows)
     library = _library(tuple(bool(r) for r in evidence.model.arm.revolute))
     X, own = library.columns(moving), moving.v[:, [j]]
     X = np.hstack([X, X[:, library.order() <= 1] * np.sign(own), own**3])
     names = _names(library, j)
-    fold = after.stacked.fold[mine]
     parts = [Moments.of(X[fold == k], y[fold == k]) for k in range(FOLDS)]
     whole, none = total(parts), np.zeros(0, dtype=np.intp)
-    sparse = Sparse(max_terms=_MOST_TERMS, correlation=20.0)
+    sparse = Sparse(max_terms=MOST_EFFECTS, correlation=20.0)
     supports = [sparse.support(whole - part, none) for part in parts]
     error = np.array(y)
     for k, (part, support) in enumerate(zip(parts, supports, strict=True)):
@@ -291,12 +287,12 @@ def _law(evidence: Evidence, after: Fit, j: int) -> _Law:
     stable = np.array(
         sorted(set.intersection(*(set(support.tolist()) for support in supports))), dtype=np.intp
     )
-    if not len(stable) or (error**2).sum() > 0.5 * (y**2).sum():
-        return _Law([], y, after.stacked.block[mine])
+    if not len(stable) or (error**2).sum() > (1 - MOSTLY) * (y**2).sum():
+        return _Law([], y, block)
     beta = whole.solve(stable)
     spread = covariance(X[:, stable], y - X[:, stable] @ beta, after.stacked.only(mine))
     errors = np.sqrt(np.diag(spread))
     if (np.abs(beta) < SIGNIFICANCE * errors).all():
-        return _Law([], y, after.stacked.block[mine])  # as an effect of which no coefficient is clear
+        return _Law([], y, block)  # as an effect of which no coefficient is clear
     terms = [(float(b), names[t]) for b, t in zip(beta, stable, strict=True)]
-    return _Law(terms, error, after.stacked.block[mine], errors)
+    return _Law(terms, error, block, errors)

@@ -6,16 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit
-from armloop.util.arrays import TINY, Array
-
-#: A stretch of time or a half of the motion is named where it holds this part of the energy above the baseline …
-_MOST = 0.8
-#: … and, of time, is no longer than this part of what was judged.
-_SHORT = 0.5
+from armloop.diagnosis.judgement import MOSTLY, NEARLY_ALL
+from armloop.util.arrays import TINY, Array, Index, Mask
 
 
 @dataclass(frozen=True)
@@ -46,14 +41,18 @@ class Whereabouts:
 
 
 def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
-    """Localise what a fit leaves on held-out rows of a joint (0-based)."""
+    """Localise what a fit leaves on held-out rows of a joint (0-based).
+
+    A stretch of time or a half of the motion is named where it holds nearly all of the energy above the baseline, and a
+    stretch only if it is not itself most of what was judged.
+    """
     mine = fit.stacked.joint == joint
     energy = np.maximum(fit.held_out[mine] ** 2 - 1.0, 0.0)
     rows = np.flatnonzero(evidence.rows[:, joint])
     halves = _halves(evidence, rows, joint)
     shares = [float(energy[chosen].sum() / max(energy.sum(), TINY)) for _, chosen in halves]
     best = int(np.argmax(shares))
-    named = shares[best] >= _MOST
+    named = shares[best] >= NEARLY_ALL
     return Whereabouts(
         _stretch(evidence.samples.motion.time[rows], fit.stacked.block[mine], energy),
         halves[best][0] if named else "",
@@ -61,7 +60,7 @@ def whereabouts(evidence: Evidence, fit: Fit, joint: int) -> Whereabouts:
     )
 
 
-def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tuple[str, NDArray[np.bool_]]]:
+def _halves(evidence: Evidence, rows: Index, joint: int) -> list[tuple[str, Mask]]:
     """Conditions in words, each met by half of a joint's samples (or by one direction of its motion)."""
     motion, joints = evidence.samples.motion, evidence.model.arm.joints
     load, of = evidence.context.load, joints[joint]
@@ -90,15 +89,15 @@ def _halves(evidence: Evidence, rows: NDArray[np.intp], joint: int) -> list[tupl
     return found
 
 
-def _stretch(time: Array, block: NDArray[np.intp], energy: Array) -> tuple[float, float] | None:
+def _stretch(time: Array, block: Index, energy: Array) -> tuple[float, float] | None:
     """The shortest stretch of whole blocks that holds most of the energy, if it is short."""
     names, index = np.unique(block, return_inverse=True)
     sums = np.concatenate([[0.0], np.cumsum(np.bincount(index, weights=energy))])
-    needed = _MOST * sums[-1]
+    needed = NEARLY_ALL * sums[-1]
     ends = np.searchsorted(sums, sums[:-1] + needed)
     lengths = np.where(ends < len(sums), ends - np.arange(len(names)), len(names))
     first = int(np.argmin(lengths))
-    if lengths[first] > _SHORT * len(names):
+    if lengths[first] > MOSTLY * len(names):
         return None
     inside = (index >= first) & (index < first + lengths[first])
     start, end = float(time[inside][0]), float(time[inside][-1])

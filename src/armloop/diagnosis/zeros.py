@@ -16,14 +16,14 @@ from armloop.data.filters import INDEPENDENT
 from armloop.data.log import MotionLog
 from armloop.data.signals import ShortRunError, preprocess
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.judgement import SIGNIFICANCE
 from armloop.laws.effects import effect
 from armloop.model import ReconstructedModel
+from armloop.regression.embedded import ITERATIONS
 from armloop.util.arrays import Array
 
-#: A zero more than so many spreads away has been changed.
-_BEYOND = 3.0
-#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less; rounds of it.
-_FREEDOM, _ROUNDS = 4.0, 30
+#: Degrees of freedom of Student's t, by which samples that an event or an effect moves weigh less.
+_FREEDOM = 4.0
 
 
 def spread(model: ReconstructedModel) -> Array:
@@ -75,7 +75,7 @@ def _zeros(model: ReconstructedModel, log: MotionLog, usual: Array) -> Array:
     own, zeros = usual > 0, np.zeros(model.arm.n)
     # one that was changed is regressed beside the others, so that they do not stand in for it
     zeros[own] = _robust(slopes[:, own], left, usual[own])
-    return np.where(np.abs(zeros) > _BEYOND * usual, 0.0, zeros)
+    return np.where(np.abs(zeros) > SIGNIFICANCE * usual, 0.0, zeros)
 
 
 def _robust(X: Array, y: Array, spreads: Array) -> Array:
@@ -85,7 +85,7 @@ def _robust(X: Array, y: Array, spreads: Array) -> Array:
     """
     weight: Array = np.ones(len(y))
     x: Array = np.zeros(X.shape[1])
-    for _ in range(_ROUNDS):
+    for _ in range(ITERATIONS):
         G = (X.T * weight) @ X / INDEPENDENT + np.diag(1 / spreads**2)
         x = np.asarray(np.linalg.solve(G, (X.T * weight) @ y / INDEPENDENT))
         weight = np.asarray((_FREEDOM + 1) / (_FREEDOM + (y - X @ x) ** 2))

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.laws.effects import Effect, effect, hypotheses
+from armloop.laws.effects.base import Place
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array
-
-#: An effect's name and joints.
-Place = tuple[str, int | None, int | None]
 
 #: An effect with more values of its nonlinear parameter than this is a spectrum (a ripple's order), of which no few
 #: columns say anything; the energy of the residual shows it, and the diagnosis of the logs themselves names it.

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armloop.laws.effects import Effect, Estimate
-from armloop.laws.effects.base import entry
-from armloop.monitoring.catalogue import Column, Place, groups, stays_nonlinear
+from armloop.laws.effects.base import Place, entry
+from armloop.monitoring.catalogue import Column, groups, stays_nonlinear
 from armloop.regression.embedded import Linear, ridge, solve
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from armloop.monitoring.catalogue import Column, Place
+from armloop.laws.effects.base import Place
+from armloop.monitoring.catalogue import Column
 from armloop.monitoring.ranks import HORIZON
 from armloop.monitoring.sums import FEWEST_ROWS
 from armloop.util.arrays import Array

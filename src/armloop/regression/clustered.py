@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from armloop.regression.embedded import unit_scale
+from armloop.regression.embedded import RIDGE, unit_scale
 from armloop.util.arrays import Array, Index
-
-_RIDGE = 1e-8
 
 
 def clustered_covariance(X: Array, left: Array, cluster: Index) -> Array:
@@ -39,7 +37,7 @@ def clustered_covariance(X: Array, left: Array, cluster: Index) -> Array:
         score[:, a] = sums(Z[:, a] * left)
         for b in range(a + 1):
             gram[:, a, b] = gram[:, b, a] = sums(Z[:, a] * Z[:, b])
-    return delete_one(gram, score, count[:, None] / len(cluster), _RIDGE) * np.outer(scale, scale)
+    return delete_one(gram, score, count[:, None] / len(cluster), RIDGE) * np.outer(scale, scale)
 
 
 def delete_one(jacobian: Array, score: Array, share: Array, ridge: float) -> Array:

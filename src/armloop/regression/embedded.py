@@ -11,8 +11,11 @@ from scipy.linalg import block_diag
 from armloop.regression.moments import Moments, unit_length
 from armloop.util.arrays import Array
 
-_ITERATIONS = 30
-_RIDGE, _STRONG_RIDGE = 1e-8, 1e-3
+#: Ridge beside columns of unit length: what they do not determine is next to nothing.
+RIDGE = 1e-8
+#: Rounds of what is solved in turn, at most: it has settled by then.
+ITERATIONS = 30
+_STRONG_RIDGE = 1e-3
 _NOTHING = 1e-20
 
 
@@ -50,7 +53,7 @@ def solve(
         return np.zeros(0), [], np.zeros((0, 0))
     edges, found = np.cumsum(sizes)[:-1], []
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
-    for part in (_RIDGE, _STRONG_RIDGE):
+    for part in (RIDGE, _STRONG_RIDGE):
         free = np.split(ridge(moments.G, moments.b, part), edges)
         x = [effect.start(own) for effect, own in zip(effects, free, strict=True)]
         found.append(_gauss_newton(moments, effects, x))
@@ -65,7 +68,7 @@ def _gauss_newton(
     """Squared error, coefficients, free parameters and derivative at the minimum reached from x."""
     beta, J = _embed(effects, x)
     error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         step = ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
         for damping in (1.0, 0.3, 0.1, 0.03):
             trial = list(np.split(np.concatenate(x) + damping * step, edges))
@@ -87,7 +90,7 @@ def _embed(effects: Sequence[Embedding], x: Sequence[Array]) -> tuple[Array, Arr
     return np.concatenate(betas), np.asarray(block_diag(*slopes))
 
 
-def ridge(G: Array, b: Array, part: float = _RIDGE) -> Array:
+def ridge(G: Array, b: Array, part: float = RIDGE) -> Array:
     """(p,) ridge regression on normal equations, the ridge a part of each column's own length."""
     scale = unit_scale(G)
     scaled = G * np.outer(scale, scale) + part * np.eye(len(G))

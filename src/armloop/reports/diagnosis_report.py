@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from armloop.diagnosis import Closing, Diagnosis
+from armloop.laws.effects.events import ends
 from armloop.model import ReconstructedModel
 from armloop.reports.diagnosis_tables import compensation_tables, found_tables
 from armloop.reports.findings import (
@@ -44,7 +45,7 @@ def strongest_joint(diagnosis: Diagnosis) -> int:
 def diagnosis_sections(diagnosis: Diagnosis, log_names: Sequence[str]) -> list[Section]:
     """Verdict and evidence, residuals, and what cannot be told apart."""
     samples = diagnosis.samples
-    seconds = sum(float(np.ptp(samples.motion.time[run])) for run in samples.motion.runs())
+    seconds = samples.motion.seconds
     logs, blocks = list(log_names), len(np.unique(diagnosis.evidence.blocks))
     floor, *levels = (
         np.asarray(diagnosis.errors()[key], dtype=float) for key in ("noise_floor", "before", "after")
@@ -180,7 +181,7 @@ def diagnosis_cards(diagnosis: Diagnosis) -> list[Card]:
 
 def _contact_card(diagnosis: Diagnosis, k: int) -> Card:
     added = diagnosis.contacts[k].added
-    start, end = (number(float(np.asarray(added.parameters[key].value))) for key in ("start", "end"))
+    start, end = (number(second) for second in ends(added.parameters))
     what = added.parameters["force" if added.effect.joint is None else "torque"]
     size = float(np.linalg.norm(np.asarray(what.value)))
     where = (

@@ -60,13 +60,11 @@ def told_in_stages(result: LoopResult, samples: Samples) -> tuple[list[Stage], s
     instants = diagnosis.samples.motion.time[left.rows[shown]]
     clock = diagnosis.samples.motion.time[again]
     measured = diagnosis.samples.tau[again, j]
-    expected = measured - diagnosis.outcome.residual[again, j]
+    expected = measured - diagnosis.evidence.residual([])[again, j]
     floor, u = errors["noise_floor"][j], unit(errors["unit"][j])
     limit = 1.05 * max(float(np.nanmax(np.abs(before))), 3 * floor)
     count = sum(log.samples for log in result.logs.values())
-    duration = sum(
-        float(np.ptp(diagnosis.samples.motion.time[run])) for run in diagnosis.samples.motion.runs()
-    )
+    duration = diagnosis.samples.motion.seconds
     colors = controller_colors(list(tracking))
     etas = {name: mean_eta(run) for name, run in tracking.items()}
     by_eta = sorted(etas, key=lambda name: etas[name])

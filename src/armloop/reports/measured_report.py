@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from armloop.laws.effects.events import ends
 from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, reasons
 from armloop.reports.html import Picture, Section
@@ -49,7 +50,7 @@ def _pushes_table(result: MeasuredResult) -> Table:
     rows: list[list[object]] = []
     for k, contact in enumerate(result.diagnosis.contacts):
         p = contact.added.parameters
-        start, end = (float(np.asarray(p[key].value)) for key in ("start", "end"))
+        start, end = ends(p)
         if contact.added.effect.joint is None:
             force = number(float(np.linalg.norm(np.asarray(p["force"].value))), 2)
             rows.append([f"push {k + 1}", f"{end - start:.2f}", force])

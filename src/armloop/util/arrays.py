@@ -9,6 +9,8 @@ Mask = NDArray[np.bool_]
 
 #: What is divided by, or taken the logarithm of, is at least this, so that nothing by nothing is nothing.
 TINY = 1e-300
+#: Times the median absolute deviation of normal numbers is their standard deviation.
+PER_MEDIAN = 1.4826
 
 
 def stretches(mask: Mask) -> Index:

@@ -13,9 +13,10 @@ import numpy as np
 
 from armloop.data.log import MotionLog
 from armloop.diagnosis import diagnose
+from armloop.laws.effects.base import Place
 from armloop.model import ReconstructedModel
 from armloop.monitoring.alarms import Alarm, Watched, find_alarms
-from armloop.monitoring.catalogue import Column, Place
+from armloop.monitoring.catalogue import Column
 from armloop.monitoring.naming import Named, Normal, later_part, name_change
 from armloop.monitoring.ranks import HORIZON, threshold
 from armloop.monitoring.trend import course

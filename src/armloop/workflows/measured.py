@@ -13,6 +13,7 @@ from armloop.data.signals import preprocess
 from armloop.diagnosis import Diagnosis, close, diagnose
 from armloop.identification.reconstruction import reconstruct
 from armloop.identification.scoring import residual, score
+from armloop.laws.effects.events import ends
 from armloop.model import ReconstructedModel
 from armloop.reports.loop_result import MeasuredResult
 from armloop.robot.arm import load_arm
@@ -74,8 +75,7 @@ def _during(model: ReconstructedModel, diagnosis: Diagnosis) -> dict[str, list[f
     samples: Samples = diagnosis.samples
     rows = np.zeros(samples.motion.samples, dtype=bool)
     for contact in diagnosis.contacts:
-        p = contact.added.parameters
-        start, end = (float(np.asarray(p[key].value)) for key in ("start", "end"))
+        start, end = ends(contact.added.parameters)
         rows |= (samples.motion.time >= start) & (samples.motion.time <= end)
     if not rows.any():
         return {"before": [np.nan] * model.arm.n, "after": [np.nan] * model.arm.n}

@@ -113,7 +113,7 @@ def test_of_streamed_logs_one_piece_lies_in_memory_at_a_time(
 
     monkeypatch.setattr(conditioned, "chunk", counted)
     for user in ("fitted", "training"):
-        monkeypatch.setattr(f"{room}.{user}._WINDOW", 600)
+        monkeypatch.setattr(f"{room}.{user}.WINDOW", 600)
     # Not by its name alone, which is its function's, too.
     monkeypatch.setattr(sys.modules[f"{room}.reconstruct"], "_RIPPLE", 600)
     half = logs[0].samples // 2

@@ -88,7 +88,7 @@ def test_the_chance_is_student_s_of_what_blocks_gain(
         gains.append((a - b) / (a + b))
     chance = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue)
     assert chance < 0.5
-    monkeypatch.setattr(ripple, "_CHANCE", factor * chance * 200 * 3)
+    monkeypatch.setattr(ripple, "CHANCE", factor * chance * 200 * 3)
     monkeypatch.setattr(lines, "_STANDS_OUT", 5.0)
     assert (ripple._line(left, ORDERS, 3) is not None) == found
 

@@ -24,6 +24,7 @@ from armloop.data.signals import Conditioning, ShortRunError, as_torque, preproc
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
+from armloop.identification.reconstruction.projected import RIDGE
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.errors import LogError
@@ -43,8 +44,8 @@ _SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
 _MISSED = 0.05
 #: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
 _SLIDES, _FADES = 0.05, 0.01
-#: Ridge beside columns of unit length, and the least that a joint weighs by.
-_RIDGE, LEAST = 1e-7, 1e-12
+#: The least that a joint weighs by.
+LEAST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,7 @@ def determined_solution(X: Array, y: Array) -> Array:
     """Least squares with a ridge, of columns of unit length, that is felt by what nothing determines alone."""
     lengths = np.maximum(np.linalg.norm(X, axis=0), TINY)
     X = X / lengths
-    return np.asarray(np.linalg.solve(X.T @ X + _RIDGE * np.eye(X.shape[1]), X.T @ y) / lengths)
+    return np.asarray(np.linalg.solve(X.T @ X + RIDGE * np.eye(X.shape[1]), X.T @ y) / lengths)
 
 
 def root_mean_square(x: Array) -> float:

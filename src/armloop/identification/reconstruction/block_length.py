@@ -17,17 +17,16 @@ from armloop.data.motion import Samples
 from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, ShortRunError, preprocess, smooth
 from armloop.features.rigid_body import BaseParameters
-from armloop.identification.reconstruction.shared import PLAIN_FRICTION
+from armloop.identification.reconstruction.inner_folds import SHORTEST
+from armloop.identification.reconstruction.shared import PLAIN_FRICTION, SLIDING
 from armloop.identification.uncertainty.blocking import correlation_time
 from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
 
-#: Samples of the plain regression, from so many logs at most, and the speed from which on a joint counts as moving.
-_SAMPLES, _LOGS, _SLOW = 8000, 16, 0.01
+#: Samples of the plain regression, from so many logs at most.
+_SAMPLES, _LOGS = 8000, 16
 #: A block's length in distances at which samples do not judge, and the fewest blocks held out.
 _LENGTH, FEWEST_BLOCKS = 4.0, 4
-#: Shortest block, periods of the filter.
-_SHORTEST = 5.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def independent_blocks(
     covered *= len(logs) / len(some)
     correlation = _correlation(arm, parts)
     margin = max(how.reach, correlation)
-    longest = max(covered / (folds * FEWEST_BLOCKS), _SHORTEST / how.cutoff_hz)
+    longest = max(covered / (folds * FEWEST_BLOCKS), SHORTEST / how.cutoff_hz)
     length = min(max(seconds, _LENGTH * margin), longest)
     return Blocks(length, min(margin, length / _LENGTH), correlation)
 
@@ -94,7 +93,7 @@ def _correlation(arm: Arm, parts: Sequence[Samples]) -> float:
         for part, shared in zip(parts, columns, strict=True):
             own = [term.column(part.motion, j) for term in PLAIN_FRICTION]
             X = np.hstack([shared[:, j], smooth(part, np.column_stack(own))])
-            problems.append((part, X, np.abs(part.motion.v[:, j]) > _SLOW))
+            problems.append((part, X, np.abs(part.motion.v[:, j]) > SLIDING))
         fit = total(Moments.of(X[rows], part.tau[rows, j]) for part, X, rows in problems)
         if fit.count < 10 * len(fit.b):
             continue

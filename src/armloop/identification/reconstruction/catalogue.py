@@ -26,17 +26,15 @@ from scipy.stats import t as student
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.identification.reconstruction.lines import lines
-from armloop.identification.reconstruction.projected import Projected, Trial
+from armloop.identification.reconstruction.projected import CHANCE, Projected, Trial
 from armloop.laws.effects import Context, Effect, hypotheses
 from armloop.model import AddedEffect
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array
 from armloop.util.progress import Progress
 
-#: Part of the squared error of the joint it shows on most that a law must remove …
+#: Part of the squared error of the joint it shows on most that a law must remove.
 WORTH = 0.05
-#: … and the probability by which chance alone may name any law at all.
-_CHANCE = 1e-3
 #: A simpler law that removes so much of what the best one removes is as good.
 _AS_GOOD = 0.9
 #: Part of a law's column beside all that the model can say, below which it says nothing new.
@@ -220,7 +218,7 @@ def pruned(laws: Laws, bench: Callable[[Sequence[Law]], Projected], arm: Arm, sa
 def is_worth(trial: Trial, tried: int) -> bool:
     """Whether a law removes enough, and more than chance would for the best of so many, by blocks and in every fold."""
     # of a single block it is no number, which nothing exceeds
-    enough = float(student.isf(_CHANCE / tried, trial.blocks - 1))
+    enough = float(student.isf(CHANCE / tried, trial.blocks - 1))
     return trial.share > WORTH and trial.score > enough and trial.everywhere
 
 

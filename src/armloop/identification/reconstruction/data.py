@@ -34,8 +34,9 @@ Answer = TypeVar("Answer")
 REFERENCE = 50_000
 #: Seconds between two lines that tell how far a pass is.
 _PACE = 10.0
-#: Stretches of consecutive samples that stand for all.
-_STRETCHES = 64
+#: Consecutive samples that stand for all, where these are not in memory: to tell laws apart, and for their errors; and
+#: the stretches that they are in.
+WINDOW, _STRETCHES = 150_000, 64
 #: Fold that chooses the library where the held-out blocks are too few to be halved; 0 judges, 1 chooses orders.
 _CHOOSING = 2
 

@@ -21,6 +21,8 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.bandwidth import LEAST, Table, table_at
+from armloop.identification.reconstruction.projected import RIDGE
+from armloop.regression.embedded import ITERATIONS
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 
@@ -30,13 +32,12 @@ FEWEST_LOGS = 3
 _LESS = 0.9
 #: … by so many standard errors of the difference over blocks.
 _SURE = 3.0
-#: Rounds of expectation maximisation, and the spread that they begin with, rad (m).
-_ROUNDS, _BEGIN = 30, 0.05
+#: The spread that expectation maximisation begins with, rad (m).
+_BEGIN = 0.05
 #: A joint's zeros are known where the data leave less than this part of their variance open.
 _KNOWN = 0.5
 #: Half the step of the derivative by q, rad (m).
 _STEP = 0.01
-_RIDGE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +192,7 @@ class _Mixed:
         X, y, joint = self.table.weighed(self.table.tau, rows, self.scale)
         instant = np.nonzero(rows.T)[1]
         A, b = X.T @ X, X.T @ y
-        ridge = np.diag(_RIDGE * np.maximum(np.diag(A), 1e-12))
+        ridge = np.diag(RIDGE * np.maximum(np.diag(A), 1e-12))
         theta: Any = np.linalg.solve(A + ridge, b)
         found, spread = np.zeros((self.logs, n)), np.full(n, _BEGIN)
         variances = np.zeros(n)
@@ -201,7 +202,7 @@ class _Mixed:
         order = np.argsort(log, kind="stable")
         edges = np.searchsorted(log[order], np.arange(self.logs + 1))
         parts = [order[first:end] for first, end in pairwise(edges)]
-        for _ in range(_ROUNDS):
+        for _ in range(ITERATIONS):
             Z = self._per_log(kind, theta)[instant, joint] / self.scale[joint, None]
             G, g = np.zeros((P, P)), np.zeros(P)
             solved = []

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from armloop.data.signals import smooth
-from armloop.identification.reconstruction.data import Chunk, Data
+from armloop.identification.reconstruction.data import WINDOW, Chunk, Data
 from armloop.identification.reconstruction.found import Found
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.reconstruction.shared import sliding_rows
@@ -14,9 +14,6 @@ from armloop.identification.scoring import residual
 from armloop.identification.uncertainty import Fitted, between_logs, standard_errors
 from armloop.identification.uncertainty.blocking import independent_blocks
 from armloop.model import ReconstructedModel
-
-#: Consecutive samples whose errors stand for those of all, where these are not in memory.
-_WINDOW = 150_000
 
 
 def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: bool) -> dict[str, Any]:
@@ -32,7 +29,7 @@ def uncertainty(model: ReconstructedModel, data: Data, found: Found, shared: boo
     """
     chunk = data.reference
     if shared and not data.in_memory:
-        chunk = data.window(_WINDOW)
+        chunk = data.window(WINDOW)
     samples = chunk.samples
     if not (shared or data.in_memory):
         # an even selection cannot be filtered; its columns are taken as they are

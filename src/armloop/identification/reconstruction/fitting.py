@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from armloop.data.blocks import block_numbers
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.motion import Samples
 from armloop.features.lagrangian import constant_weights
 from armloop.identification.reconstruction.catalogue import Law, Laws, pruned, search
@@ -25,8 +25,6 @@ from armloop.util.progress import Progress
 
 #: So many rows tell laws apart as well as more do.
 _ROWS = 15_000
-#: Residuals stay correlated for a good second.
-_BLOCK_SECONDS = 1.5
 #: What a law's coefficients are drawn to nothing with, beside a prior of the others: next to nothing.
 _FREE = 1e-9
 
@@ -105,7 +103,7 @@ class Fitting:
         samples, usable, r = chunk.samples, fitted_rows(chunk), self._own.count
         used = np.asarray(usable.any(axis=1))
         fold, inside = inner_folds(samples, used, self._options)
-        numbers = block_numbers(samples.motion, _BLOCK_SECONDS)
+        numbers = block_numbers(samples.motion, BLOCK_SECONDS)
         block = np.unique(np.column_stack([fold, numbers]), axis=0, return_inverse=True)[1].ravel()
         sample, joint = (x.astype(np.intp) for x in np.nonzero(chunk.independent[:, None] & usable))
         every = max(1, len(sample) // _ROWS)

@@ -19,7 +19,7 @@ from armloop.util.arrays import Index, Mask
 
 #: Folds: so many where there is plenty of data, s of them; else twice as many, of blocks that may become as short as so
 #: many periods of the filter, so that what is left can still determine the rest.
-_FOLDS, PLENTY, _SHORTEST = 5, 60.0, 5.0
+FOLDS, PLENTY, SHORTEST = 5, 60.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,11 @@ class InnerFolds:
         used = np.array(lengths)
         seconds = float(used.sum()) * samples.period
         plenty = seconds > PLENTY
-        if np.count_nonzero(used) >= _FOLDS and used.max() <= 0.4 * used.sum() and plenty:
-            return InnerFolds(_FOLDS, None)
-        shortest = _SHORTEST / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
-        block = max(min(options.block_seconds, seconds / (4 * _FOLDS)), shortest)
-        return InnerFolds(_FOLDS if plenty else 2 * _FOLDS, block)
+        if np.count_nonzero(used) >= FOLDS and used.max() <= 0.4 * used.sum() and plenty:
+            return InnerFolds(FOLDS, None)
+        shortest = SHORTEST / samples.cutoff_hz if samples.cutoff_hz > 0 else 0.0
+        block = max(min(options.block_seconds, seconds / (4 * FOLDS)), shortest)
+        return InnerFolds(FOLDS if plenty else 2 * FOLDS, block)
 
     def among(self, blocks: int) -> InnerFolds:
         """The same with no more folds than there are used blocks."""

@@ -10,16 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY, Array, Index
 
 #: A line must be so many times as strong as the median of the orders beside it …
 _STANDS_OUT = 20.0
 #: … from a quarter below to a quarter above, and of six at least, and pass so many times within the travel.
 _BESIDE, _FEWEST, _PERIODS = 0.25, 6, 1.5
 #: Lines that are handed out, and peaks that are looked at for each.
-_MOST, _TRIED = 3, 6
+MOST, _TRIED = 3, 6
 
 
 def spectrum(q: Array, x: Array, orders: Array) -> Array:
@@ -53,7 +52,7 @@ def lines(q: Array, x: Array, orders: Sequence[float], worth: float) -> Iterator
     every = np.arange(1.0, orders[-1] + 1)
     may = np.isin(every, np.asarray(orders)) & (every >= _PERIODS * resolved)
     least = worth * float(left @ left)
-    for _ in range(_MOST):
+    for _ in range(MOST):
         power = spectrum(q, left, every)
         strong = np.flatnonzero(may & (power >= max(least, TINY)))
         strongest = strong[np.argsort(-power[strong], kind="stable")]
@@ -74,7 +73,7 @@ def lines(q: Array, x: Array, orders: Sequence[float], worth: float) -> Iterator
             return
 
 
-def _beside(orders: Array, order: float, resolved: float) -> NDArray[np.intp]:
+def _beside(orders: Array, order: float, resolved: float) -> Index:
     """Places of the orders beside one that are not the same line: within a quarter of it, or the nearest six."""
     away = np.abs(orders - order)
     apart = np.flatnonzero(away > max(resolved, 0.5))

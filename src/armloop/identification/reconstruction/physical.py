@@ -32,7 +32,7 @@ _ALIKE = 0.05
 #: Part of the joints' mean inertias by which M(q) stays clear of a singular matrix; how negative counts as violated.
 _CLEAR, _SLACK = 1e-3, 1e-9
 #: Costs of a constraint that occur by chance in so many of all cases say nothing against it.
-_CHANCE = 0.999
+CHANCE = 0.999
 #: Where M(q) was kept positive definite: at every posture, for its links are bodies; over the joint limits; at the
 #: postures of the motion alone; nowhere, for the data contradict it; nowhere, for no such coefficients were found.
 EVERYWHERE, LIMITS, TRAINED, FREE, UNKNOWN = "everywhere", "limits", "trained", "free", "unknown"
@@ -118,7 +118,7 @@ def physical_solution(
     repeats = max(solution.repeats, memory)
     # no more conditions can bind than there are shared coefficients, and bounds of them
     conditions = len(body.positive) + int(body.positive.sum())
-    most = np.inf if insist else float(chi2.ppf(_CHANCE, conditions)) * repeats
+    most = np.inf if insist else float(chi2.ppf(CHANCE, conditions)) * repeats
     for where, q in tried:
         try:
             theta, binding, left = _kept_positive(
@@ -130,7 +130,7 @@ def physical_solution(
             failed = error
             continue
         cost = (_cost(solution, theta) - _cost(solution, solution.theta)) / repeats
-        if insist or cost <= chi2.ppf(_CHANCE, max(binding, 1)):
+        if insist or cost <= chi2.ppf(CHANCE, max(binding, 1)):
             return PhysicalSolution(theta, binding, where, left)
     if failed is not None:
         raise ExcitationError(

@@ -21,6 +21,7 @@ from armloop.identification.reconstruction.bandwidth import (
     root_mean_square,
     table_at,
 )
+from armloop.identification.reconstruction.physical import POSTURES
 from armloop.identification.reconstruction.rigid_body import mass_columns
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Index, Mask
@@ -33,8 +34,8 @@ _FEWEST = 200
 _EVERY = 3
 #: A relative error is at least this: what is met exactly is met to round-off.
 _EXACT = 1e-9
-#: Postures at which inertia is looked at.
-_POSTURES = 60
+#: What explains a joint, in its place or unit, leaves a relative error below this; a gain is far off from this factor on.
+GOOD, FAR = 0.6, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +85,7 @@ class PlainFits:
         if table is None or (table.moving.sum(axis=0) < _FEWEST).any():
             return None
         q = np.concatenate([log.q for log in logs])
-        q = q[:: max(1, len(q) // _POSTURES)]
+        q = q[:: max(1, len(q) // POSTURES)]
         return cls(table.every(_EVERY), mass_columns(arm, base, q), base.count)
 
     def fit(self, signs: Array, order: Index, half: int | None = None) -> Fit:

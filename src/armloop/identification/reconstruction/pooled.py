@@ -17,6 +17,7 @@ from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from armloop.identification.reconstruction.joint_sums import JointSums
+from armloop.identification.reconstruction.projected import RIDGE
 from armloop.laws.friction import FrictionTerm, Sliding
 from armloop.regression.moments import Moments, total, unit_length
 from armloop.util.arrays import TINY, Array
@@ -26,8 +27,6 @@ from armloop.util.functions import NUMPY
 Choice = list[list[int]]
 
 _REWEIGHTINGS = 3
-#: Relative to a column's squares: keeps what the motion cannot tell apart from blowing up.
-_RIDGE = 1e-7
 #: Added to a scaled diagonal: columns that are never excited, differences of nearly equal sums.
 _ROUND_OFF = 1e-10
 
@@ -197,7 +196,7 @@ class Pooled:
             b[:r] += weight * part.b[:r]
             b[mine] = weight * part.b[own]
             start = end
-        G[np.diag_indices(size)] *= 1 + _RIDGE
+        G[np.diag_indices(size)] *= 1 + RIDGE
         if prior is not None:
             precision = self.repeats * prior.precision
             G[:r, :r] += precision

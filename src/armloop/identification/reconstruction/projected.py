@@ -17,9 +17,12 @@ from scipy.linalg import cho_factor, cho_solve
 from armloop.data.blocks import block_sums
 from armloop.util.arrays import TINY, Array, Index, Mask
 
-_RIDGE = 1e-7
+#: Relative to a column's squares: keeps what the motion cannot tell apart from blowing up.
+RIDGE = 1e-7
 #: Directions of the model's columns that are weaker than this part of the strongest span nothing.
 _DISTINCT = 1e-10
+#: Probability by which chance alone may name any law, or line, at all.
+CHANCE = 1e-3
 #: Part of the folds that must gain.
 _NEARLY_ALL = 0.8
 
@@ -147,7 +150,7 @@ class Projected:
             rest = 1 - np.einsum("sk,sk->k", said, said) / np.diag(owns)
             if not (rest > new**2).any():
                 return None
-        ridge = _RIDGE * np.diag(np.diag(owns))
+        ridge = RIDGE * np.diag(np.diag(owns))
         give = self._solve(self._factor_all, crosses)
         S, s = owns - crosses.T @ give + ridge, towards - give.T @ self._total
         beta = np.linalg.solve(S, s)
@@ -201,7 +204,7 @@ class Projected:
 
     def _factor(self, G: Array) -> tuple[Array, bool]:
         A = (G + self._prior[0]) * np.outer(self._scale, self._scale)
-        A[np.diag_indices(len(A))] += _RIDGE
+        A[np.diag_indices(len(A))] += RIDGE
         return cho_factor(A)
 
     def _solve(self, factor: tuple[Array, bool], b: Array) -> Array:

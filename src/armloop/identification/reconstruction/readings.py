@@ -15,16 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from armloop.data.log import MotionLog, unchecked_log
-from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
+from armloop.identification.reconstruction.plain_fits import GOOD, Fit, PlainFits
 from armloop.robot.arm import Arm
 from armloop.util.arrays import Array, Index
 
 #: Mean relative error below which a record is taken as it stands.
 _GOOD_ENOUGH = 0.02
 #: Another order must lower the relative error by this factor (geometric mean of all joints), another unit by this one,
-#: every joint's to below this: orders are many, and springs as strong as all the rest on all joints made one of them twice
+#: every joint's to a good one: orders are many, and springs as strong as all the rest on all joints made one of them twice
 #: as good; units are two, and no law made one better than by a fifth.
-_ORDER, _UNIT, _GOOD = 3.0, 1.5, 0.6
+_ORDER, _UNIT = 3.0, 1.5
 #: Arms of so many joints are tried in every order; larger ones with any two in exchange, turned round and moved on by one.
 _EVERY_ORDER = 4
 #: Units of an angle that are not the radian, in rad.
@@ -100,7 +100,7 @@ def meant(logs: Sequence[MotionLog], arm: Arm, cutoff_hz: float, plain: Fit) -> 
         other = problem.fit(np.ones(arm.n), np.arange(arm.n))
         better = plain.over(other)
         far = better > (_UNIT if reading.unit else _ORDER)
-        if far and other.faults.sum() <= plain.faults.sum() and other.relative.max() < _GOOD:
+        if far and other.faults.sum() <= plain.faults.sum() and other.relative.max() < GOOD:
             found.append((better, -number, reading))
     if not found:
         return None

@@ -17,6 +17,7 @@ from scipy.stats import chi2
 
 from armloop.dynamics.consistent import barrier_factor, nearest_bodies, scales
 from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.physical import CHANCE
 from armloop.identification.reconstruction.pooled import Solution
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Mask
@@ -24,8 +25,6 @@ from armloop.util.arrays import TINY, Array, Mask
 #: What the prior weighs beside the cost in units of chi-square: in the end less than a standard error of anything, and
 #: the links keep clear of those that only just exist.
 _WEIGHTS = np.logspace(2, -2, 5)
-#: Costs that occur by chance in so many of all cases say nothing against the bodies.
-_CHANCE = 0.999
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,7 @@ def realizable_solution(
         found,
         (x * units)[: 11 * n],
         chi_square,
-        float(chi2.ppf(_CHANCE, max(1.0, binding))),
+        float(chi2.ppf(CHANCE, max(1.0, binding))),
         int(np.argmax(off)),
         float(off.max()),
     )

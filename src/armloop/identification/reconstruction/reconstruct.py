@@ -211,7 +211,7 @@ def reconstruct(
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
     part: Part = "all" if few or len(left) == 1 else "test"
-    return _finished(tried, part, arm, method, logs, settings, progress, recorded, blocks)
+    return _finished(tried, part, method, logs, settings, progress, recorded, blocks)
 
 
 def _too_short(logs: Sequence[MotionLog], how: Conditioning) -> list[str]:
@@ -265,7 +265,6 @@ def filter_and_blocks(
 def _finished(
     libraries: list[Contender],
     part: Part,
-    arm: Arm,
     method: str,
     logs: Sequence[LogSource],
     options: Options,

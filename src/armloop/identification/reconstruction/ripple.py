@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from armloop.data.blocks import block_numbers
+from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.signals import Conditioning, ShortRunError, preprocess
-from armloop.identification.reconstruction.lines import lines, waves
-from armloop.identification.reconstruction.projected import block_covariance, block_score
+from armloop.identification.reconstruction.inner_folds import FOLDS
+from armloop.identification.reconstruction.lines import MOST, lines, waves
+from armloop.identification.reconstruction.projected import CHANCE, block_covariance, block_score
 from armloop.laws.effects import Context
 from armloop.laws.effects.torque_ripple import TorqueRipple
 from armloop.model import AddedEffect, ReconstructedModel
@@ -30,9 +31,7 @@ from armloop.util.arrays import Array, Index, Mask
 _BAND = 0.4
 #: Part of the residual that a line must hold.
 _WORTH = 0.005
-#: Probability that noise alone shows any line.
-_CHANCE = 1e-3
-_MOST, _FOLDS, _BLOCK_SECONDS, _FEWEST = 3, 5, 1.5, 500
+_FEWEST = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ def find_ripple(
         left = residuals[j]
         effect = TorqueRipple(j + 1)
         orders = np.array(effect.shapes(Context(model.arm, samples.motion, period=period)))
-        for _ in range(_MOST):
+        for _ in range(MOST):
             line = _line(left, orders, model.arm.n)
             if line is None:
                 break
@@ -82,12 +81,12 @@ def _line(left: Residual, orders: Array, joints: int) -> tuple[float, Array, Arr
     """Order, coefficients of sine and cosine, and their covariance, of the line that stands out most; or None."""
     for order in lines(left.q, left.left, orders.tolist(), _WORTH):
         X, y = waves(left.q, order), left.left
-        after, fold = np.array(y), left.block % _FOLDS
-        for f in range(_FOLDS):
+        after, fold = np.array(y), left.block % FOLDS
+        for f in range(FOLDS):
             mine = fold == f
             after[mine] -= X[mine] @ np.linalg.lstsq(X[~mine], y[~mine], rcond=None)[0]
         score, blocks = block_score(y**2, after**2, left.block)
-        if score > student.isf(_CHANCE / (len(orders) * joints), blocks - 1):
+        if score > student.isf(CHANCE / (len(orders) * joints), blocks - 1):
             bread = np.asarray(np.linalg.inv(X.T @ X), dtype=float)
             x = bread @ (X.T @ y)
             return order, x, block_covariance(bread, X * np.asarray(y - X @ x)[:, None], left.block)
@@ -117,7 +116,7 @@ def _residuals(
             number += 1
             tau = np.column_stack([np.interp(time, full.motion.time, x) for x in full.tau.T])
             left = tau - model.predict(low.motion)
-            block = following + block_numbers(low.motion, _BLOCK_SECONDS)
+            block = following + block_numbers(low.motion, BLOCK_SECONDS)
             following = int(block[-1]) + 1
             fitted = ~held_out[nearest]
             for j in range(model.arm.n):

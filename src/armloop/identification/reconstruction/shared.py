@@ -36,7 +36,7 @@ FRICTION = (
 PLAIN_FRICTION = tuple(term for term in FRICTION if term.kind != "hysteresis")
 #: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion, unless it creeps steadily: so much
 #: of the largest speed must the smallest one be, over a period of the filter to both sides.
-_SLIDING, _STEADY = 0.01, 0.5
+SLIDING, _STEADY = 0.01, 0.5
 #: Part of the samples that a model knows the arm's range by leaves out at each end.
 _TAIL = 0.005
 #: What a constraint has pressed to zero, N·m.
@@ -50,7 +50,7 @@ def sliding_rows(samples: Samples) -> Mask:
 
 def fast_rows(samples: Samples) -> Mask:
     """(N, n) samples so fast that a direction which fades in late (:data:`FRICTION`) is right all the same."""
-    return samples.moving & (np.abs(samples.motion.v) > _SLIDING)
+    return samples.moving & (np.abs(samples.motion.v) > SLIDING)
 
 
 def _steady(samples: Samples) -> Mask:

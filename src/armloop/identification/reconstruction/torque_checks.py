@@ -19,17 +19,17 @@ import numpy as np
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
 from armloop.identification.reconstruction.bandwidth import determined_solution, even_selection
-from armloop.identification.reconstruction.plain_fits import Fit, PlainFits
+from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 
 #: Share of friction's power that must be of one sign.
 _DRIVES = 0.5
-#: An exchange must lower the relative error of the two joints by this factor (geometric mean), to below this.
-_BETTER, _GOOD = 2.0, 0.6
-#: A gain is far off from this factor on; in two halves of the data it must be the same but for this one.
-_FAR, _ALIKE = 3.0, 1.5
+#: An exchange must lower the relative error of the two joints by this factor (geometric mean), to a good one.
+_BETTER = 2.0
+#: In two halves of the data a gain that is far off must be the same but for this factor.
+_ALIKE = 1.5
 
 
 def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None:
@@ -84,7 +84,7 @@ class Problem(PlainFits):
             if not other.physical(range(n)) or gain < 0.99:
                 continue
             plainly = (
-                len(group) == 1 and plain.over(other, group) > _BETTER and other.relative[group].max() < _GOOD
+                len(group) == 1 and plain.over(other, group) > _BETTER and other.relative[group].max() < GOOD
             )
             halves = (self.fit(np.ones(n), order, half) for half in (0, 1))
             if other.power[group].max() > _DRIVES and (plainly or all(one.driven(group) for one in halves)):
@@ -99,7 +99,7 @@ class Problem(PlainFits):
             order[[i, j]] = order[[j, i]]
             other = self.fit(np.ones(len(order)), order)
             gain = plain.over(other, [i, j])
-            if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < _GOOD:
+            if gain > _BETTER and other.physical([i, j]) and other.relative[[i, j]].max() < GOOD:
                 found.append((gain, (i, j)))
         return [max(found)[1]] if found else []
 
@@ -111,12 +111,12 @@ class Problem(PlainFits):
             if min(first, second) <= 0 or abs(np.log(first / second)) > np.log(_ALIKE):
                 continue
             factor = float(np.sqrt(first * second))
-            if abs(np.log(factor)) < np.log(_FAR):
+            if abs(np.log(factor)) < np.log(FAR):
                 continue
             factors = np.ones(n)
             factors[j] = factor
             other = self.fit(factors, np.arange(n))
-            if plain.over(other, [j]) > _BETTER and other.physical(range(n)) and other.relative[j] < _GOOD:
+            if plain.over(other, [j]) > _BETTER and other.physical(range(n)) and other.relative[j] < GOOD:
                 found.append((plain.over(other), (j, factor)))
         return [max(found)[1]] if found and max(found)[0] > 1 else []
 

@@ -13,7 +13,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from armloop.data.motion import Samples
-from armloop.identification.reconstruction.data import Chunk, Data
+from armloop.identification.reconstruction.data import WINDOW, Chunk, Data
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.inner_folds import PLENTY, InnerFolds
 from armloop.identification.reconstruction.joint_sums import Dealt, JointSums
@@ -23,9 +23,6 @@ from armloop.identification.reconstruction.shared import PLAIN_FRICTION, fast_ro
 from armloop.laws.friction import FrictionTerm
 from armloop.regression.moments import Sums
 from armloop.util.arrays import Array, Mask
-
-#: Consecutive samples that tell laws of the catalogue apart as well as more do.
-_WINDOW = 150_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +87,7 @@ class Training:
     @cached_property
     def window(self) -> Chunk:
         """All samples, or stretches of consecutive ones."""
-        return self.data.window(_WINDOW)
+        return self.data.window(WINDOW)
 
     @property
     def plenty(self) -> bool:

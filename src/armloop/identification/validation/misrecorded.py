@@ -14,6 +14,7 @@ import numpy as np
 
 from armloop.data.motion import Samples
 from armloop.data.signals import smooth
+from armloop.identification.reconstruction.plain_fits import FAR
 from armloop.identification.reconstruction.readings import Reading, readings
 from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
@@ -22,8 +23,8 @@ from armloop.util.arrays import Array
 
 #: Mean relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must leave.
 _POOR, _BETTER = 0.5, 0.3
-#: A factor of all torques is so far from one, or negative; one of minus one, to this ratio, is a sign.
-_FAR, _SIGN = 3.0, 1.3
+#: A factor of all torques is far from one, or negative; one of minus one, to this ratio, is a sign.
+_SIGN = 1.3
 #: What a factor of torques in N·m would be, if it is as near as this ratio.
 _UNITS = {
     1e3: "mN·m",
@@ -71,7 +72,7 @@ def _common_gain(samples: Samples, predicted: Array) -> float:
     slid = [(tau[moving], own[moving]) for tau, own, moving in pairs if own[moving].any()]
     gains = np.array([tau @ own / (own @ own) for tau, own in slid])
     gain = float(np.median(gains)) if len(gains) > 1 else 0.0
-    return 0.0 if 1 / _FAR <= gain <= _FAR else gain
+    return 0.0 if 1 / FAR <= gain <= FAR else gain
 
 
 def _factor(gain: float, unit: str) -> str:

@@ -24,6 +24,8 @@ from armloop.util.functions import Functions
 
 Value = float | list[float]
 Pointwise = Callable[[Array, Array, Array], Sequence[float] | Array]
+#: Name and joints of an effect: what makes two the same.
+Place = tuple[str, int | None, int | None]
 #: Torques (n) of positions and speeds (n) of any kind of number, by the functions for it.
 StateLaw = Callable[[Functions, Sequence[Any], Sequence[Any]], list[Any]]
 
@@ -210,8 +212,13 @@ class Effect(ABC):
         return self.joint - 1
 
     @property
-    def place(self) -> tuple[str, int | None, int | None]:
-        """Name and joints: what makes two effects the same."""
+    def indices(self) -> tuple[int, ...]:
+        """The joints that it sits in, counted from 0; none if it concerns the whole arm."""
+        return tuple(joint - 1 for joint in (self.joint, self.other_joint) if joint is not None)
+
+    @property
+    def place(self) -> Place:
+        """Name and joints."""
         return self.name, self.joint, self.other_joint
 
     def shapes(self, context: Context) -> Sequence[float]:

@@ -36,6 +36,11 @@ def during(motion: Motion, parameters: dict[str, Value]) -> Mask:
     return rows
 
 
+def ends(parameters: Mapping[str, Estimate]) -> tuple[float, float]:
+    """Start and end, s, of an event that was found."""
+    return number(parameters["start"].value), number(parameters["end"].value)
+
+
 def ends_before_it_starts(parameters: Mapping[str, Any]) -> str:
     """The fault of an event's interval; empty if it has none."""
     late = number(parameters["end"]) <= number(parameters["start"])

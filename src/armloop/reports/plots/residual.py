@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from armloop.diagnosis import Diagnosis
+from armloop.laws.effects.events import ends
 from armloop.reports.plots.style import (
     AFTER,
     BASELINE,
@@ -52,7 +53,7 @@ def residual_time_figure(diagnosis: Diagnosis) -> Figure:
             label = "all samples, at rest too"
             trace(axes, time, whole[:, j], color=GREY, linewidth=0.9, label=label, rasterized=True)
         for contact in diagnosis.contacts:
-            start, end = (float(np.asarray(contact.added.parameters[key].value)) for key in ("start", "end"))
+            start, end = ends(contact.added.parameters)
             inside = time[contact.rows & (samples.motion.time >= start) & (samples.motion.time <= end)]
             axes.axvspan(inside[0], inside[-1], color=BLUE, alpha=0.15, linewidth=0, label="event")
         for values, color, label in series:
