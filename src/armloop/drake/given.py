@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex, PrismaticJoint, RevoluteJoint
 
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
+from armloop.util.doubts import warn
 from armloop.util.errors import ArmError, InputError, ModelError
 
 
@@ -42,15 +45,6 @@ def require_step(step: Any, more: str = "") -> None:
     """Raise `InputError` for a step that no model has."""
     if isinstance(step, bool) or step not in (1, 2, 3):
         raise InputError(f"step is {step!r:.60}; it must be 1, 2 or 3{more}")
-
-
-def require_reference(reference: Any) -> None:
-    """Raise `InputError` for what is no motion to follow."""
-    if not (callable(getattr(reference, "evaluate", None)) and hasattr(reference, "duration")):
-        raise InputError(
-            "the reference must have evaluate(t) and a duration, such as one of armloop.experiment.excitation; it is of "
-            f"type {type(reference).__name__}"
-        )
 
 
 def require_of(kind: type, **given: Any) -> None:
@@ -122,6 +116,22 @@ def require_order(joints: Sequence[Any], arm: Arm) -> None:
                 f"the plant's joint {joint.name()!r} is {'prismatic' if slides else 'revolute'}; {own.name!r}, which has "
                 f"its place in {arm.name}, is {own.kind}"
             )
+
+
+def warn_of_damping(joints: Sequence[Any], damping: Array | None) -> None:
+    """Say where a plant's joints have not the damping (n,) that a system leaves to them."""
+    found = [joint.default_damping_vector()[0] for joint in joints]
+    wanted = found if damping is None else damping
+    wrong = [
+        f"{joint.name()} has {has:.3g}, not {c:.3g}"
+        for joint, has, c in zip(joints, found, wanted, strict=True)
+        if not np.isclose(has, c, rtol=0.01)
+    ]
+    if wrong:
+        warn(
+            f"damping of the plant's joints is not the model's viscous friction: {', '.join(wrong)} N*m*s/rad (N*s/m); "
+            "before Finalize, give them armloop.dynamics.viscous_coefficients(model) by set_default_damping"
+        )
 
 
 def moving(plant: MultibodyPlant, still: bool = False) -> list[Any]:

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
+from pydrake.trajectories import PiecewisePolynomial
 
 from armloop.drake import PidGains, add_arm_with_controller
 from armloop.experiment.excitation import FourierReference, paper_reference
@@ -13,6 +15,7 @@ from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 MOTIONS = {
     3: paper_reference(),
@@ -92,6 +95,26 @@ def test_several_arms_in_one_diagram_move_as_each_alone(arms):
         alone = moved([arm])[1][0]
         assert np.abs(alone).max() > 1e-3
         np.testing.assert_allclose(state, alone, atol=1e-9)
+
+
+def test_a_drake_trajectory_is_a_reference():
+    knots = np.array([[0.0, 0.3, 0.1], [-0.2, 0.1, 0.0], [0.5, 0.2, 0.4]])
+    wanted = PiecewisePolynomial.CubicWithContinuousSecondDerivatives([2.0, 3.0, 4.0], knots)
+    builder = DiagramBuilder()
+    loop = add_arm_with_controller(builder, "three_axis", PidGains.paper(3), wanted)
+    assert loop.followed.duration == 2.0
+    for k, table in enumerate(loop.reference.tables):
+        assert_allclose(table[500], wanted.EvalDerivative(2.5, k).ravel(), atol=1e-12)
+    q, v, vdot = loop.followed.evaluate([2.0, 9.0])
+    assert_allclose(q, np.tile(knots[:, 2], (2, 1)), atol=1e-12)
+    assert v[0].any() and not v[1].any() and not vdot[1].any()
+    simulator = Simulator(builder.Build())
+    loop.start_on_reference(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.05)
+    table = PiecewisePolynomial(np.eye(3))
+    for other in (table, PiecewisePolynomial.FirstOrderHold([0.0, 1.0], [[0.0, 1.0]])):
+        with pytest.raises(InputError, match=r"3 rows and 3 columns|the reference for 1"):
+            add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), other)
 
 
 def test_reference_and_gains_must_fit_the_arm():

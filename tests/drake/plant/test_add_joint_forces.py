@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +14,12 @@ from pydrake.multibody.tree import ModelInstanceIndex, PrismaticJoint, SpatialIn
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 
-from armloop.drake import EffectTorque, JointFriction, JointFrictionSystem, add_joint_forces
+from armloop.drake import BeyondBodies, EffectTorque, JointFriction, JointFrictionSystem, add_joint_forces
+from armloop.drake.plant.exact import exact_model
 from armloop.drake.plant.plant import add_links
 from armloop.laws.effects import REGISTRY, Law, Parameter, register
 from armloop.robot.arm import load_arm
-from armloop.util.errors import InputError
+from armloop.util.errors import InputError, InputWarning
 
 ARM = load_arm("three_axis")
 
@@ -137,6 +139,20 @@ def test_forces_act_on_the_arms_own_joints_of_a_plant_where_more_moves() -> None
         assert_allclose(found, expected, atol=1e-12)
         assert np.abs(force).sum() == pytest.approx(np.abs(expected).sum())
         diagram.ToAutoDiffXd()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_damping_that_is_not_the_models_is_warned_of() -> None:
+    model = exact_model(ARM, [JointFriction(0.5, 0.5, 0.1, c) for c in (1.0, 2.0, 0.0)])
+    for damping, warned in (([1.0, 2.0, 0.0], None), ([1.0, 0.5, 0.0], "joint_2 has 0.5, not 2 N")):
+        builder = DiagramBuilder()
+        plant = builder.AddSystem(MultibodyPlant(1e-3))
+        add_links(plant, ARM)
+        for name, value in zip(ARM.joint_names, damping, strict=True):
+            plant.GetJointByName(name).set_default_damping(value)
+        plant.Finalize()
+        with nullcontext() if warned is None else pytest.warns(InputWarning, match=warned):
+            add_joint_forces(builder, plant, [BeyondBodies(model), friction(0.1)])
 
 
 def test_joints_that_cannot_be_told_are_told() -> None:

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem_, System
 from pydrake.systems.primitives import Adder, MatrixGain
 
-from armloop.drake.given import joints_for, require_of, require_plant
+from armloop.drake.given import joints_for, require_of, require_plant, warn_of_damping
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
@@ -131,6 +131,8 @@ def add_joint_forces(
     systems : such as `JointFrictionSystem`, `PreslidingFriction`, `EffectTorque`, not yet in the builder; of several arms,
         or one whose joints have other names, by its model instance
 
+    A plant whose joints have another damping than the viscous friction that `BeyondBodies` leaves to them is warned of.
+
     Returns the systems added. Raises `InputError` for a plant that is not finalized or whose arm floats, whose joints are
     others than those of a system's arm or stand in another order, and for a system without these ports.
     """
@@ -162,6 +164,7 @@ def add_joint_forces(
         n, arm = system.GetInputPort("state").size() // 2, getattr(system, "arm", None)
         arm = arm if isinstance(arm, Arm) else None
         joints.append(joints_for(plant, system.get_name() or name, n, arm, instance))
+        warn_of_damping(joints[-1], getattr(system, "damping", None))
     total = builder.AddSystem(Adder(len(placed), plant.num_velocities()))
     for index, (system, _) in enumerate(placed):
         builder.AddSystem(system)
