@@ -1,5 +1,7 @@
 """Diagrams of a user's own, from the exported parts."""
 
+import runpy
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -121,3 +123,18 @@ def test_reference_and_gains_must_fit_the_arm():
     still = FourierReference(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1)), np.ones((2, 1)), 1.0)
     with pytest.raises(ValueError, match="three_axis has 3 joints; the gains are for 3, the reference for 2"):
         add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), still)
+
+
+def test_the_script_to_copy_runs_and_tells_what_is_wrong(repository, tmp_path, capsys):
+    script = runpy.run_path(str(repository / "scenarios" / "closed_loop.py"))["main"]
+    script(["--seconds", "0.2"])
+    alone, fed = (line.split()[-3:] for line in capsys.readouterr().out.splitlines())
+    assert float(fed[1].rstrip("°")) < 0.01 < float(alone[1].rstrip("°"))
+    for words, told in (
+        (["nowhere.json"], "nowhere.json: no such file"),
+        (["--seconds", "41"], "--seconds 41: give 0.004 to 40"),
+        (["--seconds", "nan"], "--seconds nan: give"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            script(words)
+        assert told in capsys.readouterr().err
