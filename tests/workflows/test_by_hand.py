@@ -64,6 +64,14 @@ def test_a_log_of_somebody_else_stays(tmp_path, monkeypatch, capsys):
     assert main(["track", "pid.yaml", "--out", "t"]) == 2
     assert "logs/pid.csv: exists, and `armloop track` has not written it" in capsys.readouterr().err
     assert mine.read_text() == "mine" and not (tmp_path / "t" / "tracking.json").exists()
+    mine.unlink()
+    mine.parent.rmdir()
+    mine.parent.write_text("a file")
+    assert main(["track", "pid.yaml", "--out", "t"]) == 2
+    assert "t/logs: is a file; --out must lie in a folder" in capsys.readouterr().err
+    assert main(["loop", "--out", "t"]) == 2
+    assert "t/logs: is a file; --out must name a folder" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "t").iterdir()] == ["logs"]
 
 
 def test_what_is_wrong_with_the_effects_of_a_plant_is_told(tmp_path):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from armloop.commands.arguments import Chain, Json
 from armloop.commands.options import Check, argument, flag, option, several
 from armloop.util.errors import InputError
-from armloop.util.outputs import take_folder, target
+from armloop.util.outputs import take_file, take_folder
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.scenarios import TrackingScenario
@@ -91,7 +91,7 @@ def run(options: Track) -> None:
     logs = log_files(scenario, models)
     if folder is not None:
         for name in logs:
-            target(folder / name)
+            take_file(folder / name, "--out")
     view = _view(options, scenario) if options.meshcat else None
     if scenario.pickup is not None:
         answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options), view)
