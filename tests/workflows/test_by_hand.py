@@ -4,11 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from pydrake.trajectories import PiecewisePolynomial
 
 import armloop as al
 from armloop.cli import main
 from armloop.drake.experiments.scenarios import load_plant, load_tracking
 from armloop.drake.plant.exact import exact_model
+from armloop.experiment.excitation import paper_reference
 from armloop.util.errors import InputError, ScenarioError
 
 SCENARIO = """
@@ -112,10 +114,25 @@ def test_what_is_wrong_with_a_motion_is_told(tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             load_tracking(tmp_path / "s.yaml", motion=tmp_path / name)
+    wide = PiecewisePolynomial.FirstOrderHold([0.0, 1.0], [[0.0, 9.0]] * 3)
+    for motion, message in (
+        (np.zeros((9, 3)), "the reference must have evaluate.* it is of type ndarray"),
+        (
+            PiecewisePolynomial.FirstOrderHold([0.0, 1.0], [[0.0, 1.0]]),
+            "the reference has 1 joints; three_axis has 3",
+        ),
+        (wide, "the reference: joint 1 would go from 0 to 8.9.; its limits are"),
+    ):
+        with pytest.raises(InputError, match=message):
+            al.track(tmp_path / "s.yaml", reference=motion)
 
 
 def test_the_log_of_a_tracking_from_python(tmp_path):
     (tmp_path / "s.yaml").write_text(SCENARIO.replace("pid_step3", "pid").replace("20", "5"))
-    tracking = al.track(tmp_path / "s.yaml", reference=None)
-    log = tracking.results["pid"].log
-    assert log.joints == 3 and log.name == "pid" and log.period == pytest.approx(0.002)
+    log = al.track(tmp_path / "s.yaml", reference=paper_reference(periods=1)).results["pid"].log
+    assert (
+        log.joints == 3
+        and log.name == "pid"
+        and log.time[-1] == pytest.approx(20, abs=0.02)
+        and log.period == pytest.approx(0.002)
+    )

@@ -18,8 +18,10 @@ from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pydrake.trajectories import Trajectory
 
     from armloop.drake.experiments.tracking import TrackingResult
+    from armloop.experiment.excitation import Reference as Motion
 
 
 class Tracking:
@@ -76,7 +78,7 @@ def track(
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
     arm: str | Path | Arm | None = None,
-    reference: str | Path | None = None,
+    reference: str | Path | Motion | Trajectory | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:
@@ -87,7 +89,8 @@ def track(
         model: serves all controllers of the scenario; or several by name, as ``--model NAME=…``. Without any, one is
             reconstructed first from data collected on the scenario's arm, if a controller needs one.
         arm: the URDF of a scenario that leaves its arm open, or an arm of ``load_arm``, such as with ``tip``.
-        reference: the file of a motion in place of the scenario's, as ``excite`` writes it; all of it is scored.
+        reference: a motion in place of the scenario's, all of it scored: of :func:`excite`, or its file; a Drake
+            trajectory.
         out: folder for tracking.json, tracking.png, replay.html and logs/NAME.csv of each controller.
 
     Raises:

@@ -62,12 +62,12 @@ def run_scenario(
 
         progress("drawing and recording the replay")
         write_json(folder / "tracking.json", answer)
-        write_figure(folder / "tracking.png", tracking_figure(results))
-        labels = {name: controller(name) for name in results}
-        write_replay(folder / "replay.html", scenario.plant.arm, results, labels=labels)
         for result in results.values():
             if result.log is not None:
                 write_log(folder / log_file(result.controller), result.log)
+        write_figure(folder / "tracking.png", tracking_figure(results))
+        labels = {name: controller(name) for name in results}
+        write_replay(folder / "replay.html", scenario.plant.arm, results, labels=labels)
         save_made(folder, chosen, models)
     return answer, results
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from pydrake.trajectories import Trajectory
 
+from armloop.drake.control.reference import as_reference
 from armloop.drake.experiments.scenario_files import beside
 from armloop.experiment.excitation import (
     MotionRanges,
@@ -47,9 +49,15 @@ def reference_of(
     return _possible(reference, arm, f"{where}: reference{given}")
 
 
-def reference_from(file: str | Path, arm: Arm) -> Reference:
-    """Return the reference of a table, checked against the arm's limits."""
-    return _possible(read_reference(file, arm.n), arm, f"{file}: the reference")
+def reference_from(given: str | Path | Reference | Trajectory, arm: Arm) -> Reference:
+    """Return the reference of a table, or one that is given as it is, checked against the arm and its limits."""
+    if isinstance(given, str | Path):
+        return _possible(read_reference(given, arm.n), arm, f"{given}: the reference")
+    reference = as_reference(given)
+    joints = reference.evaluate([0.0])[0].shape[1]
+    if joints != arm.n:
+        raise ScenarioError(f"the reference has {joints} joints; {arm.name} has {arm.n}")
+    return _possible(reference, arm, "the reference")
 
 
 def _possible(reference: Reference, arm: Arm, what: str) -> Reference:

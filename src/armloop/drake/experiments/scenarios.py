@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from msgspec.structs import asdict, replace
+from pydrake.trajectories import Trajectory
 
 from armloop.drake.control.controllers import LISTED, REGISTRY
 from armloop.drake.control.pid import PidGains
@@ -122,14 +123,17 @@ def load_plan(name: str) -> CollectionPlan:
 
 
 def load_tracking(
-    spec: str | Path, arm: str | Path | Arm | None = None, motion: str | Path | None = None
+    spec: str | Path,
+    arm: str | Path | Arm | None = None,
+    motion: str | Path | Reference | Trajectory | None = None,
 ) -> TrackingScenario:
     """Return a tracking scenario by its built-in name or the path of its YAML file.
 
     spec : of a file with several scenarios, FILE:NAME, or FILE for the first or the one named as the file
     arm : in place of the arm of the scenario's own plant: a built-in name or the path of a URDF, with the scenario's
         `lock` and `tip`; or an arm that is loaded, as it is
-    motion : in place of the scenario's reference: the path of one that `write_reference` wrote; all of it is scored
+    motion : in place of the scenario's reference, all of it is scored: one, the path of one that `write_reference` wrote,
+        or a Drake trajectory
 
     Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
     """
