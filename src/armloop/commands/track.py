@@ -88,7 +88,7 @@ def run(options: Track) -> None:
     scenario = load_tracking(options.scenario, simulated_arm(options), options.reference)
     for name, model in models.items():
         model.arm.require_same(scenario.plant.arm, paths[name])
-    logs = log_files(scenario, models)
+    logs = [] if scenario.pickup or scenario.wear else log_files(scenario, models)
     if folder is not None:
         for name in logs:
             take_file(folder / name, "--out")
