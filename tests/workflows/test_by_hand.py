@@ -94,6 +94,12 @@ def test_what_is_wrong_with_the_effects_of_a_plant_is_told(tmp_path):
         ),
         ("{effect: payload, parameters: {mass: heavy}}", "effects.*mass"),
         ("{joint: 1}", "effects.*effect"),
+        (
+            "{effect: unlisted, joint: 1, parameters: {"
+            + ", ".join(f"cos({k}*q1): 1" for k in range(101))
+            + "}}",
+            "parameters is .* a length of at most 100",
+        ),
     ):
         path.write_text(f"{SCENARIO}effects: [{fields}]\n")
         with pytest.raises(ScenarioError, match=f"mine.yaml: .*{message}"):

@@ -108,7 +108,9 @@ class PlantEffectData(Struct, forbid_unknown_fields=True):
         None  # from 1; none for what is of the whole arm
     )
     other_joint: Annotated[int, Meta(ge=1, le=MOST_JOINTS)] | None = None  # of a pair
-    parameters: dict[str, Finite | Vector3] = {}  # in SI units, those of docs/effects.md
+    parameters: Annotated[
+        dict[str, Finite | Vector3], Meta(max_length=100)
+    ] = {}  # in SI units, as in docs/effects.md
 
 
 class PickupData(Struct, forbid_unknown_fields=True):
