@@ -147,6 +147,11 @@ def add_joint_forces(
         raise InputError(
             "the plant's port applied_generalized_force is taken; give all systems in one call of add_joint_forces"
         )
+    # what knows no arm, as friction alone, is of the same one as those beside it
+    arms = {
+        instance: next((arm for x in each if isinstance(arm := getattr(x, "arm", None), Arm)), None)
+        for instance, each in given.items()
+    }
     placed = [(system, instance) for instance, each in given.items() for system in each]
     joints = []
     if not placed:
@@ -162,7 +167,8 @@ def add_joint_forces(
                 f"{system.get_name() or name}: is in the builder already; add_joint_forces adds it"
             )
         n, arm = system.GetInputPort("state").size() // 2, getattr(system, "arm", None)
-        arm = arm if isinstance(arm, Arm) else None
+        arm = arm if isinstance(arm, Arm) else arms[instance]
+        arm = arm if arm is None or arm.n == n else None
         joints.append(joints_for(plant, system.get_name() or name, n, arm, instance))
         warn_of_damping(joints[-1], getattr(system, "damping", None))
     total = builder.AddSystem(Adder(len(placed), plant.num_velocities()))
