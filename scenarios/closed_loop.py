@@ -17,6 +17,7 @@ from armloop.drake import FeedforwardModel, add_arm_with_controller
 from armloop.drake.experiments.scenarios import load_tracking
 from armloop.drake.plant.exact import exact_model
 from armloop.model import load_model
+from armloop.util.errors import InputError
 
 SCENARIO = load_tracking("three_axis_tracking")
 PERIOD = 0.004  # s, of the log
@@ -43,8 +44,17 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("model", nargs="?", metavar="MODEL.json")
     parser.add_argument("--seconds", type=float, default=4.0, help="of the reference (%(default)s)")
     options = parser.parse_args(words)
-    plant = SCENARIO.plant
-    model = load_model(options.model) if options.model else exact_model(plant.arm, plant.config.friction)
+    plant, longest = SCENARIO.plant, SCENARIO.reference.duration
+    if not PERIOD <= options.seconds <= longest:
+        parser.error(f"--seconds {options.seconds:g}: give {PERIOD:g} to {longest:g}, what the reference has")
+    try:
+        model = (
+            load_model(options.model, plant.arm)
+            if options.model
+            else exact_model(plant.arm, plant.config.friction)
+        )
+    except InputError as error:
+        parser.error(str(error))
     for name, used in (("PID", None), ("PID with the model", model)):
         error = np.rad2deg(tracking_error(used, options.seconds))
         print(f"{name:20s}", *(f"{joint:8.4f}°" for joint in error))

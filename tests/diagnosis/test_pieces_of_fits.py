@@ -197,6 +197,26 @@ class TestTrials:
         known = Known(evidence, np.zeros((80, 1)), current)
         assert trials._best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
 
+    def test_columns_that_are_large_and_alike_are_one(self) -> None:
+        """As of presliding on the log of another arm, whose torques are many times the model's noise."""
+        t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+        y, fold = np.sin(t), np.repeat([0, 1], 40)
+        current: Any = SimpleNamespace(
+            stacked=SimpleNamespace(joint=np.zeros(80, dtype=int)), held_out=y, outside=np.tile(y, (2, 1))
+        )
+        evidence: Any = SimpleNamespace(
+            smoothed=lambda effect, shape: np.repeat(4096.0 * np.sin(shape * t)[:, None], 2, axis=1),
+            rows=np.ones((80, 1), dtype=bool),
+            independent=slice(None),
+            scale=np.ones(1),
+            fold=fold,
+        )
+        effect: Any = SimpleNamespace(
+            joint=1, other_joint=None, start=lambda beta: beta, embed=lambda x: (x, np.eye(len(x)))
+        )
+        known = Known(evidence, np.zeros((80, 1)), current)
+        assert trials._best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
+
 
 def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:
     effect: Any = SimpleNamespace(shapes=lambda context: [1.0, 3.0, 2.0])

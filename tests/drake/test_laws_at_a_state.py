@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from armloop.drake import (
     Stop,
 )
 from armloop.drake.control.reference import held_rows
-from armloop.drake.experiments import collection, metrics, pickup
+from armloop.drake.experiments import metrics, recording, tracking
 from armloop.drake.plant.config import Instruments
 from armloop.drake.tuning.gain_design import _at_crossover
 from armloop.drake.tuning.loop_analysis import SampledArm, cut_loop
@@ -227,48 +227,65 @@ def test_settling_after_reversals() -> None:
 
 
 def test_recordings_are_joined_into_a_log_of_runs() -> None:
-    def recording(start: float) -> Any:
+    def part(start: float) -> Any:
         time = start + 0.1 * np.arange(3)
         return SimpleNamespace(
             time=time, q=time[:, None] / 3, v=time[:, None] / 7, tau=np.array([[3.0], [4.0], [5.0]])
         )
 
     instruments = Instruments(torque_noise=0.0)
-    log = collection._as_log("both", [recording(0.0), recording(0.5)], instruments, np.random.default_rng(1))
+    log = recording.as_log("both", [part(0.0), part(0.5)], instruments, np.random.default_rng(1))
     assert_allclose(log.time, [0, 0.1, 0.2, 2.7, 2.8, 2.9])
     assert len(log.runs()) == 2 and log.name == "both"
     assert log.q[1, 0] == round(0.1 / 3, 9) and log.v[1, 0] == round(0.1 / 7, 7)
     assert log.tau.ravel().tolist() == [3, 4, 5] * 2
-    noisy = collection._as_log(
-        "run", [recording(0.0)], Instruments(torque_noise=0.5), np.random.default_rng(1)
-    )
+    noisy = recording.as_log("run", [part(0.0)], Instruments(torque_noise=0.5), np.random.default_rng(1))
     noise = 0.5 * np.sqrt(50 / 3) * np.random.default_rng(1).standard_normal((3, 1))
     assert noisy.tau.tolist() == np.round(np.array([[3], [4], [5]]) + noise, 6).tolist()
-    third = collection._as_log("run", [recording(1 / 3)], instruments, np.random.default_rng(1))
+    third = recording.as_log("run", [part(1 / 3)], instruments, np.random.default_rng(1))
     assert third.time.tolist() == [0.333333, 0.433333, 0.533333]
 
 
-def test_the_log_since_a_grasp() -> None:
+def test_the_log_of_a_tracked_arm() -> None:
     config = SimpleNamespace(
-        instruments=Instruments(encoder_counts=0, torque_noise=0.0, velocity_half_window=0.02), time_step=0.01
+        instruments=Instruments(encoder_counts=0, torque_noise=0.0, velocity_half_window=0.002),
+        time_step=0.001,
     )
-    scenario: Any = SimpleNamespace(
-        seed=1, plant=SimpleNamespace(arm=SimpleNamespace(n=1, revolute=np.array([True])), config=config)
-    )
-    time = np.arange(60) * 0.01
+    plant: Any = SimpleNamespace(arm=SimpleNamespace(n=1, revolute=np.array([True])), config=config)
+    time = np.arange(60) * 0.001
     state, tau = np.column_stack([time**2, 2 * time]), 7 * time[:, None]
-    log = pickup._log(scenario, time, state, tau)
+    simulated = SimpleNamespace(arm=plant.arm, effects=SimpleNamespace(faults=[]))
+    run: Any = SimpleNamespace(
+        _scenario=SimpleNamespace(seed=1, plant=plant),
+        _controller="pid",
+        recorded=lambda context: (time, state, tau, tau),
+        systems=SimpleNamespace(plant=simulated),
+    )
+
+    def log(settle: float) -> Any:
+        return tracking.RecordedArm.log(run, cast(Any, None), settle)
+
     rows = [50, 52, 54, 56]
-    assert_allclose(log.time, time[rows])
-    assert_allclose(log.q[:, 0], time[rows] ** 2)
-    assert_allclose(log.v[:, 0], 2 * time[rows])
-    assert_allclose(log.tau[:, 0], 7 * (time[rows] - 0.005))
+    assert log(0.05).name == "pid" and log(0.056) is None  # one sample has no period
+    assert_allclose(log(0.05).time, time[rows])
+    assert_allclose(log(0.05).q[:, 0], time[rows] ** 2)
+    assert_allclose(log(0.05).v[:, 0], 2 * time[rows], atol=1e-7)
+    assert_allclose(log(0.05).tau[:, 0], 7 * (time[rows] - 0.0005), atol=1e-6)
+    shift = SimpleNamespace(falsified=lambda time, q, tau, p: (q + p, tau - 2 * p))
+    simulated.effects.faults.append((shift, 0.25))
+    assert_allclose(log(0.05).q[:, 0], time[rows] ** 2 + 0.25)
+    assert_allclose(log(0.05).tau[:, 0], 7 * (time[rows] - 0.0005) - 0.5, atol=1e-6)
+    simulated.effects.faults.clear()
     config.instruments = Instruments(encoder_counts=0, torque_noise=0.5, velocity_half_window=0.0)
-    noisy = pickup._log(scenario, time, state, tau)
+    noisy = log(0.05)
     assert len(noisy.time) == 5  # half a window is at least a step
-    plain = 7 * (noisy.time - 0.005)
-    drawn = np.random.default_rng(1).standard_normal((5, 1))[:, 0]
-    assert_allclose(noisy.tau[:, 0], plain + 0.5 * np.sqrt(np.mean(plain**2)) * drawn)
+    plain = 7 * (noisy.time - 0.0005)
+    drawn = np.random.default_rng([1, *b"pid"]).standard_normal((5, 1))[:, 0]
+    assert_allclose(noisy.tau[:, 0], plain + 0.5 * np.sqrt(np.mean(plain**2)) * drawn, atol=1e-6)
+    config.time_step = 0.005
+    assert_allclose(
+        np.diff(log(0.05).time), 0.001
+    )  # every step of a plant that has no more than 500 a second
 
 
 def test_encoders_read_counts() -> None:

@@ -358,6 +358,7 @@ def test_a_plant_of_ones_own_that_is_not_the_models(
         add_joint_forces(builder, plant, friction_systems(model, 0.02, 1e-3))
 
 
+@pytest.mark.filterwarnings("ignore:damping of the plant")
 def test_forces_that_cannot_be_added(right: Path, model: ReconstructedModel) -> None:
     builder = DiagramBuilder()
     plant = of_urdf(right, builder)
@@ -376,6 +377,7 @@ def test_forces_that_cannot_be_added(right: Path, model: ReconstructedModel) -> 
         add_joint_forces(builder, of_urdf(right, builder), [force])
 
 
+@pytest.mark.filterwarnings("ignore:damping of the plant")
 def test_other_names_of_the_same_joints_are_taken(model: ReconstructedModel) -> None:
     builder = DiagramBuilder()
     add_joint_forces(builder, chain(builder, ("a", TURNS), ("b", TURNS), ("c", TURNS)), [BeyondBodies(model)])

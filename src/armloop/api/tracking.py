@@ -18,15 +18,18 @@ from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pydrake.trajectories import Trajectory
 
     from armloop.drake.experiments.tracking import TrackingResult
+    from armloop.experiment.excitation import Reference as Motion
 
 
 class Tracking:
     """How the controllers of a scenario tracked.
 
     Attributes:
-        results: by controller: ``time``, ``q_ref``, ``q``, ``tau`` arrays, ``eta`` (n,) in ``unit`` (deg, mm).
+        results: by controller: ``time``, ``q_ref``, ``q``, ``tau`` arrays, ``eta`` (n,) in ``unit`` (deg, mm), and
+            ``log``, what the arm's own sensors said, for :func:`diagnose`.
     """
 
     def __init__(self, answer: dict[str, Any], results: Mapping[str, TrackingResult], paper: bool) -> None:
@@ -75,6 +78,7 @@ def track(
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
     arm: str | Path | Arm | None = None,
+    reference: str | Path | Motion | Trajectory | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:
@@ -85,7 +89,9 @@ def track(
         model: serves all controllers of the scenario; or several by name, as ``--model NAME=…``. Without any, one is
             reconstructed first from data collected on the scenario's arm, if a controller needs one.
         arm: the URDF of a scenario that leaves its arm open, or an arm of ``load_arm``, such as with ``tip``.
-        out: folder for tracking.json, tracking.png and replay.html.
+        reference: a motion in place of the scenario's, all of it scored: of :func:`excite`, or its file; a Drake
+            trajectory.
+        out: folder for tracking.json, tracking.png, replay.html and logs/NAME.csv of each controller.
 
     Raises:
         InputError: the scenario is wrong or of another kind (payload_pickup, friction_wear: use the command), or the
@@ -95,14 +101,15 @@ def track(
     from armloop.workflows import run_scenario
 
     require("a function", progress=progress)
-    plan = load_tracking(scenario, arm)
+    plan = load_tracking(scenario, arm, reference)
     if plan.pickup is not None or plan.wear is not None:
         raise InputError(f"{scenario}: is of a kind of its own; run `armloop track {scenario}`")
     models = _by_name(model)
     for name, each in models.items():
         each.arm.require_same(plan.plant.arm, f"model {name}")
     answer, results = run_scenario(plan, models, None if out is None else path_of(out, "out"), progress)
-    return Tracking(answer, results, plan.name.startswith("three_axis_tracking"))
+    paper = reference is None and plan.name.startswith("three_axis_tracking")
+    return Tracking(answer, results, paper)
 
 
 def _by_name(

@@ -134,6 +134,6 @@ def _words(path: str, run: Next) -> str:
             )
     lines.append(
         f"Reference written to {path}, {number(run.reference.duration)} s. It knows nothing of obstacles, nor of the arm "
-        "hitting itself: watch it in slow motion first."
+        f"hitting itself: watch it in slow motion first (`armloop track SCENARIO --reference {path}` in simulation)."
     )
     return table + "\n".join(map(wrapped, lines))

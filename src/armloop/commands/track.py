@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from armloop.commands.arguments import Chain, Json
 from armloop.commands.options import Check, argument, flag, option, several
 from armloop.util.errors import InputError
-from armloop.util.outputs import take_folder
+from armloop.util.outputs import take_file, take_folder
 
 if TYPE_CHECKING:
     from armloop.drake.experiments.scenarios import TrackingScenario
@@ -43,13 +43,20 @@ class Track(Chain, Json):
         "one of several in a file (three_axis_tracking:all_controllers)",
     )
     arm: str | None = option("the arm of a scenario that leaves it open (ur10e_tracking)", metavar="URDF")
+    reference: str | None = option(
+        "track this motion, as `excite` and `diagnose --next-run` write it, in place of the scenario's, and score all of it",
+        metavar="REF.csv",
+    )
     model: list[str] = several(
         "step1, step2 and step3 are the feedforwards of pid_step1, pid_step2 and pid_step3, computed_torque is that "
         "controller's model, `model` serves all of them; any other NAME adds a controller pid_NAME. Without any, a model is "
         "reconstructed from data collected on the scenario's arm first, if a controller needs it",
         "NAME=MODEL.json",
     )
-    out: str | None = option("folder for tracking.json, plots and replay.html")
+    out: str | None = option(
+        "folder for tracking.json, plots, replay.html and, per controller, what the arm's own sensors said: logs/NAME.csv, "
+        "for `diagnose` and `evaluate`"
+    )
     meshcat: bool = flag(
         "show the arms while they move, in a browser on this computer; waits half a minute for it at most"
     )
@@ -76,11 +83,15 @@ def run(options: Track) -> None:
     from armloop.drake.experiments.scenarios import load_tracking
     from armloop.reports.tables import eta_table
     from armloop.reports.tracking_tables import metrics_table, not_run, phases_table, spread_table
-    from armloop.workflows import run_pickup_scenario, run_scenario, run_wear_scenario
+    from armloop.workflows import log_files, run_pickup_scenario, run_scenario, run_wear_scenario
 
-    scenario = load_tracking(options.scenario, simulated_arm(options))
+    scenario = load_tracking(options.scenario, simulated_arm(options), options.reference)
     for name, model in models.items():
         model.arm.require_same(scenario.plant.arm, paths[name])
+    logs = [] if scenario.pickup or scenario.wear else log_files(scenario, models)
+    if folder is not None:
+        for name in logs:
+            take_file(folder / name, "--out")
     view = _view(options, scenario) if options.meshcat else None
     if scenario.pickup is not None:
         answer, pickup = run_pickup_scenario(scenario, models, folder, progress(options), view)
@@ -94,9 +105,9 @@ def run(options: Track) -> None:
         files = "tracking.json, spread.png"
     else:
         answer, results = run_scenario(scenario, models, folder, progress(options), view)
-        paper = scenario.name.startswith("three_axis_tracking")
+        paper = scenario.name.startswith("three_axis_tracking") and options.reference is None
         tables = [eta_table(results, paper=paper), metrics_table(results)]
-        files = "tracking.json, tracking.png, replay.html"
+        files = ", ".join(["tracking.json, tracking.png, replay.html", *logs])
     if options.json:
         print_json(answer)
         return

@@ -161,14 +161,15 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     every = list(range(FOLDS))
     # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
     given, free = effect.embed(effect.start(np.zeros(columns.shape[2])))
-    ridge = 1e-12 * len(columns) * np.eye(free.shape[1])
+    # for columns of nothing, and large ones that are alike, as of presliding on the log of another arm
+    eye = 1e-12 * np.eye(free.shape[1])
     taken, fitted = columns @ given, columns @ free
     X, taken_in = ([each[fold == k] for k in every] for each in (fitted, taken))
     G = [np.einsum("ksp,ksr->spr", x, x) for x in X]
 
     def best(folds: list[int], y: Array) -> float:
         left = [y[fold == k, None] - taken_in[k] for k in every]
-        A = sum((G[k] for k in folds), ridge)
+        A = sum(G[k] for k in folds) * (1.0 + eye) + len(columns) * eye
         c = np.sum([np.einsum("ksp,ks->sp", X[k], left[k]) for k in folds], axis=0)
         explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
         energy = np.sum([(left[k] ** 2).sum(axis=0) for k in folds], axis=0)

@@ -2,9 +2,11 @@
 
 from armloop.dynamics.arrays import (
     Dynamics,
+    coefficients,
     nearest_rigid_body,
     require_mass_matrix,
     training_range,
+    viscous_coefficients,
     with_mass_matrix,
 )
 from armloop.dynamics.effects import EffectLaw, effect_law
@@ -17,9 +19,11 @@ __all__ = [
     "ModelEquations",
     "PhysicsChecks",
     "check_physics",
+    "coefficients",
     "effect_law",
     "nearest_rigid_body",
     "require_mass_matrix",
     "training_range",
+    "viscous_coefficients",
     "with_mass_matrix",
 ]

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from armloop.dynamics.model import ModelEquations
 from armloop.features.rigid_body import BaseParameters
+from armloop.laws.effects.base import number
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
 from armloop.util.arrays import Array
@@ -117,6 +118,22 @@ def training_range(model: ReconstructedModel) -> tuple[Array, Array]:
     """Lower and upper positions (n,) that the model was fitted on; a radian (metre) about zero if it does not say."""
     half, _, _, centre = model.ranges
     return centre - half, centre + half
+
+
+def coefficients(model: ReconstructedModel, kind: str, effect: str = "", key: str = "") -> Array:
+    """(n,) sums of the coefficients of a kind of friction term and of a parameter of an effect that is the same."""
+    found = np.array(
+        [sum(t.coefficient for t in terms if t.kind == kind) for terms in model.friction.terms], float
+    )
+    for added in model.effects:
+        if added.effect.name == effect and added.effect.joint is not None:
+            found[added.effect.joint - 1] += number(added.parameters[key].value)
+    return found
+
+
+def viscous_coefficients(model: ReconstructedModel) -> Array:
+    """(n,) sums of the joints' viscous coefficients."""
+    return coefficients(model, "viscous", "viscous_friction", "coefficient")
 
 
 def require_mass_matrix(model: ReconstructedModel) -> tuple[float, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from armloop.data.motion import Motion
-from armloop.dynamics import ModelEquations, training_range
+from armloop.dynamics import ModelEquations, coefficients, training_range, viscous_coefficients
 from armloop.dynamics.consistent import ConsistentInertia, consistent_inertia
 from armloop.features.rigid_body import full_columns
 from armloop.laws.effects.base import number
@@ -84,7 +84,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
     arm = model.arm
     missing: list[str] = []
     notes: list[str] = []
-    constants = _summed(model, "offset") if nearest_friction else np.zeros(arm.n)
+    constants = coefficients(model, "offset") if nearest_friction else np.zeros(arm.n)
     links, rotors, left, constants = rigid_parameters(model, constants)
     if left.max() > _NO_BODY:
         listed = ", ".join(f"{x:.2g}" for x in left)
@@ -110,7 +110,9 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             missing.append(f"{added.effect.label()}: {why}")
     for j in np.flatnonzero(constants).tolist():
         missing.append(f"joint {j + 1}: a constant torque, {constants[j]:.4g} {arm.joints[j].torque_unit}")
-    damping, dry = _friction(model, missing) if nearest_friction else (_viscous(model), np.zeros(arm.n))
+    damping, dry = (
+        _friction(model, missing) if nearest_friction else (viscous_coefficients(model), np.zeros(arm.n))
+    )
     if (damping < 0).any():
         j = int(np.argmin(damping))
         raise ModelError(
@@ -161,17 +163,6 @@ def rigid_parameters(model: ReconstructedModel, constants: Array) -> tuple[Array
     return full[: 10 * n], full[10 * n :], np.where(left > _NO_BODY, left, 0.0), offsets
 
 
-def _summed(model: ReconstructedModel, kind: str, effect: str = "", key: str = "") -> Array:
-    """(n,) sums of the coefficients of a kind of friction term and of a parameter of an effect that is the same."""
-    found = np.array(
-        [sum(t.coefficient for t in terms if t.kind == kind) for terms in model.friction.terms], float
-    )
-    for added in model.effects:
-        if added.effect.name == effect and added.effect.joint is not None:
-            found[added.effect.joint - 1] += number(added.parameters[key].value)
-    return found
-
-
 def random_motion(model: ReconstructedModel, samples: int, seed: int) -> Motion:
     """Random states within the range that the model was fitted on; no joint stands still."""
     n, rng = model.arm.n, np.random.default_rng(seed)
@@ -189,7 +180,7 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
     Where a joint's law is a sum of the two, they are its coefficients; else those nearest to it over the speeds that
     the model was fitted on, by least squares, and what they leave goes to ``missing``.
     """
-    damping, dry = _viscous(model), _summed(model, "sign", "coulomb_friction", "level")
+    damping, dry = viscous_coefficients(model), coefficients(model, "sign", "coulomb_friction", "level")
     others = _other_laws(model)
     if any(others) or (damping < 0).any() or (dry < 0).any():
         v, torques = friction_torques(model)
@@ -207,11 +198,6 @@ def _friction(model: ReconstructedModel, missing: list[str]) -> tuple[Array, Arr
                 f"{left / np.sqrt(len(v)):.3g} of {total:.3g} {unit} (RMS), constants apart"
             )
     return damping, dry
-
-
-def _viscous(model: ReconstructedModel) -> Array:
-    """(n,) sums of the joints' viscous coefficients."""
-    return _summed(model, "viscous", "viscous_friction", "coefficient")
 
 
 def _other_laws(model: ReconstructedModel) -> list[list[str]]:

@@ -100,6 +100,19 @@ class ReferenceData(Struct, forbid_unknown_fields=True):
     )
 
 
+class PlantEffectData(Struct, forbid_unknown_fields=True):
+    """An effect that the simulated arm has and no model is told of."""
+
+    effect: Name  # as a diagnosis names it
+    joint: Annotated[int, Meta(ge=1, le=MOST_JOINTS)] | None = (
+        None  # from 1; none for what is of the whole arm
+    )
+    other_joint: Annotated[int, Meta(ge=1, le=MOST_JOINTS)] | None = None  # of a pair
+    parameters: Annotated[
+        dict[str, Finite | Vector3], Meta(max_length=100)
+    ] = {}  # in SI units, as in docs/effects.md
+
+
 class PickupData(Struct, forbid_unknown_fields=True):
     """A load that is grasped mid-run; the run is by PID with Step III."""
 
@@ -149,5 +162,7 @@ class TrackingData(Struct, forbid_unknown_fields=True):
     bandwidth: Positive | None = None
     random_seed: Seed = 0
     limits: LimitsData | None = None
+    # what has changed about the arm; where a model is reconstructed first, it is of the arm without them
+    effects: Annotated[list[PlantEffectData], Meta(max_length=100)] = []
     pickup: PickupData | None = None
     wear: WearData | None = None

@@ -151,6 +151,8 @@ def take_folder(path: str | Path, names: Iterable[str] = (), option: str = "--ou
         _existing(folder, option, "name")
         for name in names:
             target(folder / name)
+            if Path(name).parent != Path():
+                _existing((folder / name).parent, option, "name")
         if _guard is not None:
             _lock(folder, option, _guard)
     except OSError as error:

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from armloop.data.log import write_log
 from armloop.drake.experiments.collection import collect
 from armloop.drake.experiments.metrics import BAND
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan
 from armloop.drake.experiments.tracking import (
     MAIN_MODEL,
     TrackingResult,
+    controllers_for,
     needs_model,
     require_use,
     run_tracking,
@@ -36,7 +38,7 @@ def run_scenario(
     progress: Progress,
     view: LiveView | None = None,
 ) -> tuple[dict[str, Any], dict[str, TrackingResult]]:
-    """Track with every controller of a scenario, and write tracking.json, tracking.png and replay.html.
+    """Track with every controller of a scenario, and write tracking.json, tracking.png, replay.html and the logs.
 
     Without any model one is reconstructed first, from data collected on the scenario's own arm, if a controller of
     the scenario needs one.
@@ -60,11 +62,26 @@ def run_scenario(
 
         progress("drawing and recording the replay")
         write_json(folder / "tracking.json", answer)
+        for result in results.values():
+            if result.log is not None:
+                write_log(folder / log_file(result.controller), result.log)
         write_figure(folder / "tracking.png", tracking_figure(results))
         labels = {name: controller(name) for name in results}
         write_replay(folder / "replay.html", scenario.plant.arm, results, labels=labels)
         save_made(folder, chosen, models)
     return answer, results
+
+
+def log_file(controller: str) -> str:
+    """The name of a controller's log in the folder of a run."""
+    return f"logs/{controller}.csv"
+
+
+def log_files(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> list[str]:
+    """The names of the logs that `run_scenario` writes."""
+    if not models:  # it reconstructs one
+        return list(map(log_file, scenario.controllers))
+    return list(map(log_file, controllers_for(scenario, models)))
 
 
 def models_for(

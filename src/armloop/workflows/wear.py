@@ -58,7 +58,15 @@ def _depends(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel
     motion = scenario.reference.evaluate(np.linspace(0.0, scenario.reference.duration, 2001))
     return [
         repr(
-            (scenario.name, scenario.score, scenario.seed, scenario.bandwidth, scenario.used, scenario.wear)
+            (
+                scenario.name,
+                scenario.score,
+                scenario.seed,
+                scenario.bandwidth,
+                scenario.used,
+                scenario.wear,
+                scenario.effects,
+            )
         ),
         repr((plant.config.friction, plant.config.instruments, plant.config.time_step)),
         repr([(joint.kind, joint.effort) for joint in plant.arm.joints]),

@@ -1,10 +1,14 @@
 """Diagrams of a user's own, from the exported parts."""
 
+import runpy
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
+from pydrake.trajectories import PiecewisePolynomial
 
 from armloop.drake import PidGains, add_arm_with_controller
 from armloop.experiment.excitation import FourierReference, paper_reference
@@ -13,6 +17,7 @@ from armloop.model import ReconstructedModel, load_model
 from armloop.model.components import RigidBody
 from armloop.robot.arm import load_arm
 from armloop.robot.kinematics import nominal_parameters
+from armloop.util.errors import InputError
 
 MOTIONS = {
     3: paper_reference(),
@@ -94,7 +99,42 @@ def test_several_arms_in_one_diagram_move_as_each_alone(arms):
         np.testing.assert_allclose(state, alone, atol=1e-9)
 
 
+def test_a_drake_trajectory_is_a_reference():
+    knots = np.array([[0.0, 0.3, 0.1], [-0.2, 0.1, 0.0], [0.5, 0.2, 0.4]])
+    wanted = PiecewisePolynomial.CubicWithContinuousSecondDerivatives([2.0, 3.0, 4.0], knots)
+    builder = DiagramBuilder()
+    loop = add_arm_with_controller(builder, "three_axis", PidGains.paper(3), wanted)
+    assert loop.followed.duration == 2.0
+    for k, table in enumerate(loop.reference.tables):
+        assert_allclose(table[500], wanted.EvalDerivative(2.5, k).ravel(), atol=1e-12)
+    q, v, vdot = loop.followed.evaluate([2.0, 9.0])
+    assert_allclose(q, np.tile(knots[:, 2], (2, 1)), atol=1e-12)
+    assert v[0].any() and not v[1].any() and not vdot[1].any()
+    simulator = Simulator(builder.Build())
+    loop.start_on_reference(simulator.get_mutable_context())
+    simulator.AdvanceTo(0.05)
+    table = PiecewisePolynomial(np.eye(3))
+    for other in (table, PiecewisePolynomial.FirstOrderHold([0.0, 1.0], [[0.0, 1.0]])):
+        with pytest.raises(InputError, match=r"3 rows and 3 columns|the reference for 1"):
+            add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), other)
+
+
 def test_reference_and_gains_must_fit_the_arm():
     still = FourierReference(np.zeros(2), np.zeros((2, 1)), np.zeros((2, 1)), np.ones((2, 1)), 1.0)
     with pytest.raises(ValueError, match="three_axis has 3 joints; the gains are for 3, the reference for 2"):
         add_arm_with_controller(DiagramBuilder(), "three_axis", PidGains.paper(3), still)
+
+
+def test_the_script_to_copy_runs_and_tells_what_is_wrong(repository, tmp_path, capsys):
+    script = runpy.run_path(str(repository / "scenarios" / "closed_loop.py"))["main"]
+    script(["--seconds", "0.2"])
+    alone, fed = (line.split()[-3:] for line in capsys.readouterr().out.splitlines())
+    assert float(fed[1].rstrip("°")) < 0.01 < float(alone[1].rstrip("°"))
+    for words, told in (
+        (["nowhere.json"], "nowhere.json: no such file"),
+        (["--seconds", "41"], "--seconds 41: give 0.004 to 40"),
+        (["--seconds", "nan"], "--seconds nan: give"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            script(words)
+        assert told in capsys.readouterr().err

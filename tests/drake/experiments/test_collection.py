@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from armloop.data.log import read_log, write_log
 from armloop.drake.experiments import collection
 from armloop.drake.experiments.collection import collect, measure_run
+from armloop.drake.experiments.recording import Recording, as_log
 from armloop.drake.experiments.scenarios import load_plan, load_plant, plant_for
-from armloop.drake.experiments.speed_mode import Recording
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.plant.friction import JointFriction
@@ -247,7 +247,7 @@ class TestPieces:
         time = np.arange(5) * 0.01
         q = np.linspace(0.0, 1e-3, 5)[:, None] + 1.23456789123e-3
         parts = [Recording(time, q, q, 3.0 + 0 * q), Recording(time + 0.5, q, q, 4.0 + 0 * q)]
-        log = collection._as_log("two", parts, Instruments(torque_noise=0.02), np.random.default_rng(8))
+        log = as_log("two", parts, Instruments(torque_noise=0.02), np.random.default_rng(8))
         assert_allclose(log.time, [*time, *(0.04 + 0.2 + 0.5 + time)], atol=1e-9)
         assert len(log.runs()) == 2 and log.name == "two"
         noise = 0.02 * np.sqrt(12.5) * np.random.default_rng(8).standard_normal((10, 1))

@@ -69,7 +69,7 @@ def test_at_the_start_and_along_the_reference(monkeypatch: pytest.MonkeyPatch) -
     assert_allclose(found.worst[0], [51.0, 52.0])
     assert_allclose(found.worst[1], [1.59, 1.59])
     assert found.stable and not looked_at([50.0, 10.0], monkeypatch, unstable=7.0)[0].stable
-    assert found.tracking == {"gains": "gains", "controllers": ("pid", "exact")}
+    assert found.tracking == {"gains": "gains", "controllers": ("pid", "exact"), "effects": ()}
     assert len(found.w) == 600 and found.w[[0, -1]] == pytest.approx([0.1, np.pi / 0.01])
     assert_allclose(found.loops, np.stack([found.w, 2 * found.w], axis=1))
 

@@ -6,13 +6,14 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import Demultiplexer
-from pydrake.trajectories import PiecewisePolynomial
+from pydrake.trajectories import PiecewisePolynomial, Trajectory
 
 from armloop.drake.control.feedforward import FeedforwardModel
-from armloop.drake.given import require_joints, require_predicts, require_reference, require_step
+from armloop.drake.given import require_joints, require_predicts, require_step
 from armloop.drake.scalar_types import scalar_template
 from armloop.dynamics import ModelEquations
 from armloop.experiment.excitation import Reference
@@ -31,6 +32,42 @@ def held_rows(rows: Array, period: float) -> PiecewisePolynomial:
     return PiecewisePolynomial.ZeroOrderHold(breaks, np.vstack([rows, rows[-1:]]).T)
 
 
+class TrajectoryReference:
+    """A Drake trajectory as a motion to follow: its value is q, its derivatives are v and vdot; at rest after its end."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        """trajectory : of n rows and one column; its start is time 0."""
+        if trajectory.cols() != 1 or not trajectory.has_derivative():
+            raise InputError(
+                f"the trajectory has {trajectory.rows()} rows and {trajectory.cols()} columns; a motion to follow has a row "
+                "per joint, one column, and derivatives"
+            )
+        self._start = trajectory.start_time()
+        self._derivatives = [trajectory.MakeDerivative(order) for order in range(3)]
+        self.duration = float(trajectory.end_time() - self._start)
+
+    def evaluate(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return q, v, vdot, each (N, n), at the times `t` (N,)."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        inside = np.clip(t, 0.0, self.duration)
+        q, v, vdot = (each.vector_values(self._start + inside).T for each in self._derivatives)
+        moves = (t == inside)[:, None]
+        return q, v * moves, vdot * moves
+
+
+def as_reference(given: Any) -> Reference:
+    """Return a motion to follow of one, or of a Drake trajectory; raises `InputError` for what is neither."""
+    if isinstance(given, Trajectory):
+        return TrajectoryReference(given)
+    if not (callable(getattr(given, "evaluate", None)) and hasattr(given, "duration")):
+        raise InputError(
+            "the reference must have evaluate(t) and a duration, such as one of armloop.experiment.excitation, or be a "
+            f"Trajectory of pydrake; it is of type {type(given).__name__}"
+        )
+    motion: Reference = given
+    return motion
+
+
 class ReferenceSource(Diagram):
     """Give q_ref(t), v_ref(t), vdot_ref(t) of a reference, held over each period, and a model's feedforward of it.
 
@@ -47,14 +84,18 @@ class ReferenceSource(Diagram):
     """
 
     def __init__(
-        self, reference: Reference, period: float, model: FeedforwardModel | None = None, step: int = 3
+        self,
+        reference: Reference | Trajectory,
+        period: float,
+        model: FeedforwardModel | None = None,
+        step: int = 3,
     ) -> None:
-        """reference : what to follow; period : s; model, step : see `Feedforward`.
+        """reference : what to follow, or a Drake trajectory of it; period : s; model, step : see `Feedforward`.
 
         Raises `InputError` for what is none, or where the model is of another number of joints.
         """
         require("a number above 0", period=period)
-        require_reference(reference)
+        reference = as_reference(reference)
         if not period <= reference.duration:
             raise InputError(f"the period is {period:g} s, the reference lasts {reference.duration:g} s only")
         super().__init__()

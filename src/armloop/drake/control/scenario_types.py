@@ -8,7 +8,7 @@ import numpy as np
 
 from armloop.drake.control.pid import PidGains
 from armloop.drake.plant.config import PlantConfig
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import Effects, UndeclaredEffect
 from armloop.experiment.excitation import Reference
 from armloop.robot.arm import Arm
 from armloop.schemas.scenarios import WearData
@@ -44,6 +44,7 @@ class TrackingScenario:
     bandwidth : rad/s, of computed torque; None for what makes it as stiff as kp
     rate : (n,) N*m/s (N/s), how fast the drives can change their torques; None for any
     used : share of the drives' limits that `bounded` plans with
+    effects : what the plant has and the models may not know
     """
 
     name: str
@@ -58,3 +59,4 @@ class TrackingScenario:
     wear: Wear | None
     rate: np.ndarray | None
     used: float
+    effects: Effects = ()

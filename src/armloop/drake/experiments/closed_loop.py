@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, System
+from pydrake.trajectories import Trajectory
 
 from armloop.drake.control.computed_torque import AccelerationGains, ComputedTorque
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
-from armloop.drake.control.reference import ReferenceSource
+from armloop.drake.control.reference import ReferenceSource, as_reference
 from armloop.drake.experiments.scenarios import Plant, built_in, plant_for
-from armloop.drake.given import require_of, require_predicts, require_reference, require_step
+from armloop.drake.given import require_of, require_predicts, require_step
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.nearest_friction import nearest_friction
 from armloop.drake.plant.plant import ArmPlant
@@ -77,7 +78,7 @@ def add_arm_with_controller(
     builder: DiagramBuilder,
     arm: str | Path | Arm | Plant,
     gains: PidGains | AccelerationGains,
-    reference: Reference,
+    reference: Reference | Trajectory,
     model: FeedforwardModel | None = None,
     step: int = 3,
     *,
@@ -100,6 +101,7 @@ def add_arm_with_controller(
     arm : a plant of `scenarios.load_plant`; a built-in name, then its plant; or the path of a URDF, or an arm of
         `load_arm` (with `lock` or `tip` where it has a gripper), then with the friction of a reconstructed `model`
         (`nearest_friction`), without one that of `scenarios.plant_for`
+    reference : of `armloop.experiment.excitation`, or a Drake trajectory of n rows, such as a `PiecewisePolynomial`
     gains : of the arm's n joints, `PidGains.paper(n)` or `AccelerationGains.critical(n)` for instance
     model : by its terms up to `step` (1, 2 or 3) for `"pid"`
     effects : what the plant has and the model may not know
@@ -114,7 +116,7 @@ def add_arm_with_controller(
     _check_controller(controller, gains, model, step)
     if isinstance(model, ReconstructedModel):
         model.arm.require_same(spec.arm, "the model")
-    require_reference(reference)
+    reference = as_reference(reference)
     followed = reference.evaluate([0.0])[0].shape[1]
     if not len(gains.kp) == followed == n:
         raise InputError(
@@ -142,7 +144,7 @@ def add_arm_under(
     builder: DiagramBuilder,
     plant: Plant,
     law: LeafSystem,
-    reference: Reference,
+    reference: Reference | Trajectory,
     model: FeedforwardModel | None = None,
     step: int = 3,
     *,
@@ -168,7 +170,7 @@ def add_arm_under(
             f"{name}: has the input ports {', '.join(ports) or 'none'}; a control law has state, those that it wants of "
             f"{', '.join(_REFERENCE)}, and the output port tau"
         )
-    n = plant.arm.n
+    reference, n = as_reference(reference), plant.arm.n
     sizes = {port: law.GetInputPort(port).size() for port in ports} | {"tau": law.GetOutputPort("tau").size()}
     for port, size in sizes.items():
         if size != (2 * n if port == "state" else n):

@@ -13,8 +13,9 @@ from functools import cache
 import numpy as np
 
 from armloop.data.log import MotionLog
-from armloop.drake.experiments.speed_mode import Recording, SpeedModeArm
-from armloop.drake.plant.config import Instruments, PlantConfig
+from armloop.drake.experiments.recording import Recording, as_log
+from armloop.drake.experiments.speed_mode import SpeedModeArm
+from armloop.drake.plant.config import PlantConfig
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.joint_loads import Law
 from armloop.experiment.excitation import (
@@ -78,7 +79,7 @@ def collect(
         progress(parts[job[0]].name, done / total)
     noise = np.random.default_rng(seed)
     return {
-        part.name: _as_log(
+        part.name: as_log(
             part.name, [recordings[k, i] for i in range(len(part.references))], config.instruments, noise
         )
         for k, part in enumerate(parts)
@@ -153,22 +154,4 @@ def measure_run(
     progress("run", 0.0)
     recording = rig.follow(reference, rate=rate)
     progress("run", 1.0)
-    return _as_log("run", [recording], config.instruments, np.random.default_rng(seed))
-
-
-def _as_log(
-    name: str, recordings: Sequence[Recording], instruments: Instruments, rng: np.random.Generator
-) -> MotionLog:
-    """Join recordings into one log, one run each, with the torque sensor's noise."""
-    period = float(np.median(np.diff(recordings[0].time)))
-    time, now = [], 0.0
-    for recording in recordings:
-        # At least 20 periods apart: longer than the gap that separates runs.
-        time.append(now + recording.time)
-        now = float(time[-1][-1]) + 20 * period
-    q, v, tau = (np.concatenate([getattr(r, key) for r in recordings]) for key in ("q", "v", "tau"))
-    tau = instruments.sense(tau, rng)
-    # No more digits than the instruments have: the files stay small.
-    return MotionLog(
-        np.concatenate(time).round(6), np.round(q, 9), np.round(v, 7), np.round(tau, 6), name=name
-    )
+    return as_log("run", [recording], config.instruments, np.random.default_rng(seed))

@@ -22,13 +22,11 @@ from armloop.drake.experiments.tracking import (
 )
 from armloop.drake.plant.fault_injection import UndeclaredEffect
 from armloop.drake.view.live import LiveView
-from armloop.util.arrays import Array
 
 CONTROLLER = "pid_step3"
 PHASES = ("unloaded", "loaded", "augmented")
 """Before the grasp; with the load and the model as it was; with the load and the model that knows of it."""
 _SETTLE = 0.5  # s after the grasp that are not logged
-_SAMPLE = 2  # steps per sample of the log
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +66,8 @@ def run_pickup(
     loaded.context.SetTime(free.context.get_time())
     loaded.context.SetDiscreteState(free.context.get_discrete_state())
     loaded.advance(pickup.diagnose_at)
-    log = _log(scenario, *loaded.arm.recorded(loaded.context)[:3])
+    log = loaded.arm.log(loaded.context, _SETTLE, "since the grasp")
+    assert log is not None  # a scenario leaves a diagnosis its seconds
     loaded.arm.systems.set_model(learn(log))
     loaded.integrator().SetDiscreteState(free.integrator().get_discrete_state_vector().CopyToVector())
     loaded.advance(scenario.reference.duration)
@@ -114,17 +113,3 @@ class _Run:
         controller = self.arm.systems.controller
         assert isinstance(controller, PidController)
         return controller.GetSubsystemByName("integral").GetMyMutableContextFromRoot(self.context)
-
-
-def _log(scenario: TrackingScenario, time: Array, state: Array, tau: Array) -> MotionLog:
-    """Return what the arm's own instruments say, as `SpeedModeArm.follow` records it."""
-    arm, config = scenario.plant.arm, scenario.plant.config
-    instruments, n = config.instruments, arm.n
-    half = max(1, round(instruments.velocity_half_window / config.time_step))
-    first = max(half, round(_SETTLE / config.time_step))
-    rows = np.arange(first, len(time) - half, _SAMPLE)
-    q = instruments.encode(arm, state[:, :n])
-    v = (q[rows + half] - q[rows - half]) / (2 * half * config.time_step)
-    # a torque is held over the step that follows: the mean of both steps is centred on the sample
-    measured = instruments.sense(0.5 * (tau[rows - 1] + tau[rows]), np.random.default_rng(scenario.seed))
-    return MotionLog(time[rows], q[rows], v, measured, name="since the grasp")

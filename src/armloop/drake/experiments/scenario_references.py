@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from pydrake.trajectories import Trajectory
 
+from armloop.drake.control.reference import as_reference
 from armloop.drake.experiments.scenario_files import beside
 from armloop.experiment.excitation import (
     MotionRanges,
@@ -43,17 +45,30 @@ def reference_of(
         raise ScenarioError(
             f"{where}: reference.kind is {data.kind!r}; it must be paper, fourier, places or csv"
         )
-    if data.kind in ("csv", "places") and not reference.duration <= LONGEST:
-        given = "file" if data.kind == "csv" else "places"
-        raise ScenarioError(
-            f"{where}: reference.{given} lasts {reference.duration:g} s; it must be at most {LONGEST:g} s"
-        )
+    given = {"csv": ".file", "places": ".places"}.get(data.kind, "")
+    return _possible(reference, arm, f"{where}: reference{given}")
+
+
+def reference_from(given: str | Path | Reference | Trajectory, arm: Arm) -> Reference:
+    """Return the reference of a table, or one that is given as it is, checked against the arm and its limits."""
+    if isinstance(given, str | Path):
+        return _possible(read_reference(given, arm.n), arm, f"{given}: the reference")
+    reference = as_reference(given)
+    joints = reference.evaluate([0.0])[0].shape[1]
+    if joints != arm.n:
+        raise ScenarioError(f"the reference has {joints} joints; {arm.name} has {arm.n}")
+    return _possible(reference, arm, "the reference")
+
+
+def _possible(reference: Reference, arm: Arm, what: str) -> Reference:
+    if not reference.duration <= LONGEST:
+        raise ScenarioError(f"{what} lasts {reference.duration:g} s; it must be at most {LONGEST:g} s")
     q, _, _ = reference.evaluate(np.arange(0.0, reference.duration, 0.01))
     for j, joint in enumerate(arm.joints):
         if q[:, j].min() < joint.lower or q[:, j].max() > joint.upper:
             raise ScenarioError(
-                f"{where}: reference: joint {j + 1} would go from {q[:, j].min():.3g} to {q[:, j].max():.3g}; "
-                f"its limits are {joint.lower:.3g} to {joint.upper:.3g}"
+                f"{what}: joint {j + 1} would go from {q[:, j].min():.3g} to {q[:, j].max():.3g}; its limits are "
+                f" {joint.lower:.3g} to {joint.upper:.3g}"
             )
     return reference
 

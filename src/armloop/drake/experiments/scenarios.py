@@ -12,15 +12,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 from msgspec.structs import asdict, replace
+from pydrake.trajectories import Trajectory
 
 from armloop.drake.control.controllers import LISTED, REGISTRY
 from armloop.drake.control.pid import PidGains
 from armloop.drake.control.scenario_types import Pickup, Plant, TrackingScenario, Wear
 from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenario_files import beside, entry, per_joint, read, scenario_entry
-from armloop.drake.experiments.scenario_references import reference_of
+from armloop.drake.experiments.scenario_references import reference_from, reference_of
 from armloop.drake.plant.config import Instruments, PlantConfig
-from armloop.drake.plant.fault_injection import UndeclaredEffect
+from armloop.drake.plant.fault_injection import UndeclaredEffect, realise
 from armloop.drake.plant.friction import JointFriction
 from armloop.experiment.excitation import MotionRanges, Reference
 from armloop.robot.arm import Arm, load_arm
@@ -28,6 +29,7 @@ from armloop.schemas.scenarios import (
     LimitsData,
     PickupData,
     PlantData,
+    PlantEffectData,
     TrackingData,
 )
 from armloop.util.doubts import warn
@@ -120,19 +122,30 @@ def load_plan(name: str) -> CollectionPlan:
     return plan
 
 
-def load_tracking(spec: str | Path, arm: str | Path | Arm | None = None) -> TrackingScenario:
+def load_tracking(
+    spec: str | Path,
+    arm: str | Path | Arm | None = None,
+    motion: str | Path | Reference | Trajectory | None = None,
+) -> TrackingScenario:
     """Return a tracking scenario by its built-in name or the path of its YAML file.
 
     spec : of a file with several scenarios, FILE:NAME, or FILE for the first or the one named as the file
     arm : in place of the arm of the scenario's own plant: a built-in name or the path of a URDF, with the scenario's
         `lock` and `tip`; or an arm that is loaded, as it is
+    motion : in place of the scenario's reference, all of it is scored: one, the path of one that `write_reference` wrote,
+        or a Drake trajectory
 
     Raises `ScenarioError`, one line that names the file and the field, or `ArmError` for its URDF.
     """
     path, name, where, data = scenario_entry(spec, TrackingData)
     plant, rate, used = _limited(data.limits, _plant_of(data, name, path, where, arm), where)
     n, period = plant.arm.n, plant.config.time_step
-    reference = reference_of(data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where)
+    if motion is None:
+        reference = reference_of(
+            data.reference, plant.arm, plant.config.ranges, data.random_seed, path, where
+        )
+    else:
+        reference, data = reference_from(motion, plant.arm), replace(data, score=[])
     gains = [per_joint(getattr(data, key), n, f"{where}: {key}") for key in ("kp", "ki", "kd")]
     if any(np.any(gain < 0) for gain in gains):
         raise ScenarioError(f"{where}: kp, ki and kd must not be negative")
@@ -172,6 +185,7 @@ def load_tracking(spec: str | Path, arm: str | Path | Arm | None = None) -> Trac
         data.wear,
         rate,
         used,
+        _effects(data.effects, plant.arm, where),
     )
 
 
@@ -190,6 +204,15 @@ def _limited(data: LimitsData | None, plant: Plant, where: str) -> tuple[Plant, 
         plant = dataclasses.replace(plant, arm=dataclasses.replace(arm, joints=joints))
     rate = per_joint(data.rate, arm.n, f"{where}: limits.rate") if data.rate else None
     return plant, rate, data.used
+
+
+def _effects(data: list[PlantEffectData], arm: Arm, where: str) -> tuple[UndeclaredEffect, ...]:
+    try:
+        effects = tuple(UndeclaredEffect(e.effect, e.joint, e.parameters, e.other_joint) for e in data)
+        realise(arm, effects)
+    except ScenarioError as error:
+        raise ScenarioError(f"{where}: effects: {error}") from error
+    return effects
 
 
 def _pickup(data: PickupData | None, arm: Arm, reference: Reference, where: str) -> Pickup | None:

@@ -6,7 +6,6 @@ The diagram is built once; every motion starts at time 0 from the state it is gi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -14,6 +13,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 
 from armloop.drake.control.reference import held_rows
+from armloop.drake.experiments.recording import Recording, record
 from armloop.drake.plant.config import Instruments
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.plant.friction import JointFriction
@@ -25,16 +25,6 @@ from armloop.util.arrays import Array
 
 STIFF = ServoGains(p=1e6, d=1e4)
 """A stiff drive: 10 N*m move it by 1e-5 rad, and it settles in d/p = 10 ms."""
-
-
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """What a logger holds of one motion, before the torque sensor's noise: time (N,), q, v, tau (N, n)."""
-
-    time: Array
-    q: Array
-    v: Array
-    tau: Array
 
 
 class SpeedModeArm:
@@ -66,12 +56,11 @@ class SpeedModeArm:
     def follow(self, reference: Reference, *, rate: float = 500.0, settle: float = 0.0) -> Recording:
         """Start on the reference, follow it to its end; record from `settle` seconds on, `rate` Hz at most.
 
-        q is read from the encoders; v is their central difference over `velocity_half_window` to both sides,
-        as an offline logger computes it (zero phase). tau is the drives' torque, without the friction,
-        averaged over the steps before and after the sample, which centres it on the sample's time.
+        tau is the drives' torque, without the friction, averaged over the steps before and after the sample, which
+        centres it on the sample's time.
         """
-        arm, n, context = self.arm, self.arm.n, self._simulator.get_mutable_context()
-        half = max(1, round(self.instruments.velocity_half_window / self._step))
+        n, context = self.arm.n, self._simulator.get_mutable_context()
+        half = self.instruments.half_window(self._step)
         last = round(reference.duration / self._step)
         first = max(half, round(settle / self._step))
         steps = last + half  # what the central difference needs beyond the end
@@ -90,13 +79,6 @@ class SpeedModeArm:
             raise RuntimeError(f"the simulation recorded {len(state)} steps; {steps + 1} were due")
 
         torque = self.plant.servo_torque(state, desired)
-        q = self.instruments.encode(arm, state[:, :n])
         rows = np.arange(first, last, max(1, round(1.0 / (rate * self._step))))
-        v = (q[rows + half] - q[rows - half]) / (2 * half * self._step)
         tau = 0.5 * (torque[:-1] + torque[1:])
-        q = q[:-1]
-        for effect, parameters in self.plant.effects.faults:
-            falsified = effect.falsified(t[:-1], q, tau, parameters)
-            assert falsified is not None
-            q, tau = falsified
-        return Recording(t[rows], q[rows], v, tau[rows])
+        return record(self.plant, self.instruments, self._step, t, state[:, :n], tau, rows)

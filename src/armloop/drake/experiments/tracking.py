@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
+from armloop.data.log import MotionLog
 from armloop.drake.control.bounded_feedforward import BoundedReference
 from armloop.drake.control.controllers import MAIN_MODEL, Exact, controller_named, controller_of
 from armloop.drake.control.feedforward import Models
 from armloop.drake.experiments.closed_loop import ControlledArm, add_arm_under
 from armloop.drake.experiments.metrics import Metrics, measure
+from armloop.drake.experiments.recording import as_log, record
 from armloop.drake.experiments.scenarios import TrackingScenario
 from armloop.drake.plant.fault_injection import Effects
 from armloop.drake.view.live import LiveView
 from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.workers import Processes
+
+_RATE = 500.0
+"""Samples per second of a log, at most."""
 
 _RUNAWAY = 1e3
 """A joint faster than this has run away, rad/s (m/s): no log with such a speed would be read."""
@@ -35,6 +40,7 @@ class TrackingResult:
     scored : the samples that eta, rms and largest, (n,) each in `unit`, are of: mean absolute, root mean
         square and largest absolute error; unit : per joint, "deg" or "mm"
     metrics : effort, time in stick, settling; of a run that was simulated
+    log : the same run as the arm's own instruments say it, for a diagnosis; None of one too short to have a velocity
     """
 
     controller: str
@@ -48,6 +54,7 @@ class TrackingResult:
     largest: Array
     unit: tuple[str, ...]
     metrics: Metrics | None = None
+    log: MotionLog | None = None
 
 
 def needs_model(controller: str) -> bool:
@@ -95,7 +102,7 @@ def run_tracking(
         `"step1"`, `"step2"`, `"step3"` and `"computed_torque"` serve one of them each and come first; any other
         NAME adds a controller `pid_NAME`, that model's third step. Controllers of the scenario that have no
         model do not run; `pid` needs none, and `exact` is PID with the plant's own inverse dynamics.
-    effects : what the plant has and the models may not know
+    effects : what the plant has and the models may not know, in addition to the scenario's
     processes : how many run at once, each in a forked process that builds its own diagram; 1 runs them here
     """
     names = controllers_for(scenario, models)
@@ -174,7 +181,28 @@ class RecordedArm:
         tables, asked_for = self.systems.reference.tables, self._scenario.reference
         if self.systems.followed is not asked_for:
             tables = asked_for.evaluate(time)
-        return score(self._scenario, self._controller, time, tables, state, tau, asked)
+        found = score(self._scenario, self._controller, time, tables, state, tau, asked)
+        return replace(found, log=self.log(root_context))
+
+    def log(self, root_context: Context, settle: float = 0.0, name: str = "") -> MotionLog | None:
+        """Return what the arm's own instruments say of the run so far, from `settle` s after its beginning on.
+
+        None where it is too short to have a velocity.
+
+        A drive's torque is held over a step: the mean of two steps is centred on the sample between them.
+        """
+        config = self._scenario.plant.config
+        instruments, step = config.instruments, config.time_step
+        time, state, tau, _ = self.recorded(root_context)
+        half, sample = instruments.half_window(step), max(1, round(1.0 / (_RATE * step)))
+        rows = np.arange(max(half, round(settle / step)), len(time) - half, sample)
+        if len(rows) < 2:
+            return None
+        mean = 0.5 * (np.vstack([tau[:1], tau[:-1]]) + tau)
+        q = state[:, : len(mean[0])]
+        recording = record(self.systems.plant, instruments, step, time, q, mean, rows)
+        seed = [self._scenario.seed, *self._controller.encode()]  # no two controllers' sensors err alike
+        return as_log(name or self._controller, [recording], instruments, np.random.default_rng(seed))
 
 
 @contextmanager
@@ -215,6 +243,7 @@ def add_controlled_arm(
 
     Raises `ValueError` when `models` has none for the controller.
     """
+    effects = (*scenario.effects, *effects)
     kind = controller_named(controller)
     model = kind.model(scenario, models, effects)
     reference = kind.reference(scenario, model)

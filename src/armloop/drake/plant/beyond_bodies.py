@@ -12,7 +12,7 @@ from armloop.drake.given import require_model
 from armloop.drake.plant.friction_system import PreslidingFriction, Stop, presliding_of
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector
-from armloop.dynamics import ModelEquations
+from armloop.dynamics import ModelEquations, viscous_coefficients
 from armloop.laws.effects.base import number
 from armloop.laws.friction import KINDS, FrictionLaw
 from armloop.model import ReconstructedModel
@@ -39,9 +39,10 @@ def BeyondBodies_(T: type) -> Any:
         float, AutoDiffXd and Expression.
 
         The plant must have the model's links and rotor inertias (payloads included), and its viscous terms as joint
-        damping: what `armloop export --to drake` writes. An explicit force cannot make a joint stick: see
-        `JointFrictionSystem`. Not supported: elasto-plastic elements, which remember (`presliding_elements` gives them to
-        `PreslidingFriction`; here they are left out), and the inertia of a `transmission_coupling`.
+        damping: what `armloop export --to drake` writes (`armloop.dynamics.viscous_coefficients`). An explicit force cannot
+        make a joint stick: see `JointFrictionSystem`. Not supported: elasto-plastic elements, which remember
+        (`presliding_elements` gives them to `PreslidingFriction`; here they are left out), and the inertia of a
+        `transmission_coupling`.
         """
 
         def _construct(
@@ -54,6 +55,7 @@ def BeyondBodies_(T: type) -> Any:
             n = self._n = model.arm.n
             widths = per_joint(smoothing, n)
             self.arm = model.arm
+            self.damping = viscous_coefficients(model)
             functions = functions_of(T)
             sliding = explicit_part(model, widths)
             self._whole = ModelEquations(sliding, functions, smoothing=widths)

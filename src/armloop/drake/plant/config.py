@@ -32,6 +32,10 @@ class Instruments:
         travel = np.where(arm.revolute, 2 * np.pi, self.prismatic_lead)
         return travel / self.encoder_counts if self.encoder_counts else 0.0 * travel
 
+    def half_window(self, time_step: float) -> int:
+        """Return the steps to each side that a velocity is taken over."""
+        return max(1, round(self.velocity_half_window / time_step))
+
     def encode(self, arm: Arm, q: Array) -> Array:
         """Return positions (N, n) as the encoders read them."""
         step = self.resolution(arm)

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, LeafSystem_, System
-from pydrake.systems.primitives import Adder
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem_, System
+from pydrake.systems.primitives import Adder, MatrixGain
 
-from armloop.drake.given import require_of, require_order, require_plant
+from armloop.drake.given import joints_for, require_of, require_plant, warn_of_damping
 from armloop.drake.scalar_types import scalar_template
 from armloop.drake.scalars import functions_of, vector, within
 from armloop.dynamics import effect_law
@@ -115,34 +117,47 @@ EffectTorque = EffectTorque_[None]
 
 
 def add_joint_forces(
-    builder: DiagramBuilder, plant: MultibodyPlant, systems: Sequence[System]
+    builder: DiagramBuilder,
+    plant: MultibodyPlant,
+    systems: Sequence[System] | Mapping[ModelInstanceIndex, Sequence[System]],
 ) -> list[System]:
     """Add friction and effects to a plant of one's own; leave one out of the list, and it is gone.
 
     Each system's `force` is summed into the plant's applied generalized forces, and its `state` port is fed
     the plant's state. Further ports (`vdot`, `load`) stay to be connected.
 
-    plant : finalized, in the builder, one degree of freedom per joint of the systems; its port for applied
-        generalized forces must be free
-    systems : such as `JointFrictionSystem`, `PreslidingFriction`, `EffectTorque`, not yet in the builder
+    plant : finalized, in the builder; its port for applied generalized forces must be free. Where more moves in it than the
+        arm, as a gripper's fingers or a thing to grasp, a system acts on the joints that have the names of its arm's
+    systems : such as `JointFrictionSystem`, `PreslidingFriction`, `EffectTorque`, not yet in the builder; of several arms,
+        or one whose joints have other names, by its model instance
 
-    Returns the systems added. Raises `InputError` for a plant that is not finalized or floats, whose joints are others
-    than those of a system's arm or stand in another order, and for a system without these ports.
+    A plant whose joints have another damping than the viscous friction that `BeyondBodies` leaves to them is warned of.
+
+    Returns the systems added. Raises `InputError` for a plant that is not finalized or whose arm floats, whose joints are
+    others than those of a system's arm or stand in another order, and for a system without these ports.
     """
     require_of(DiagramBuilder, builder=builder)
     require_plant(plant)
-    require_of(Sequence, systems=systems)
+    given = systems if isinstance(systems, Mapping) else {None: systems}
+    for each in given.values():
+        require_of(Sequence, systems=each)
     if all(plant is not system for system in builder.GetSystems()):
         raise InputError("the plant is in no diagram of this builder: call builder.AddSystem(plant) first")
     if builder.IsConnectedOrExported(plant.get_applied_generalized_force_input_port()):
         raise InputError(
             "the plant's port applied_generalized_force is taken; give all systems in one call of add_joint_forces"
         )
-    n = plant.num_velocities()
-    if not systems:
+    # what knows no arm, as friction alone, is of the same one as those beside it
+    arms = {
+        instance: next((arm for x in each if isinstance(arm := getattr(x, "arm", None), Arm)), None)
+        for instance, each in given.items()
+    }
+    placed = [(system, instance) for instance, each in given.items() for system in each]
+    joints = []
+    if not placed:
         raise InputError("systems is empty; give those whose force acts on the plant")
-    for system in systems:
-        name = type(system).__name__
+    for system, instance in placed:
+        name = type(system).__name__.partition("_")[0]  # of a template without its scalar type
         if not (
             isinstance(system, System) and system.HasInputPort("state") and system.HasOutputPort("force")
         ):
@@ -151,15 +166,31 @@ def add_joint_forces(
             raise InputError(
                 f"{system.get_name() or name}: is in the builder already; add_joint_forces adds it"
             )
-        size = system.GetInputPort("state").size()
-        if size != 2 * n:
-            raise InputError(f"{system.get_name() or name}: is for {size // 2} joints, the plant has {n}")
-        if isinstance(arm := getattr(system, "arm", None), Arm):
-            require_order(plant, arm)
-    total = builder.AddSystem(Adder(len(systems), n))
-    for index, system in enumerate(systems):
+        n, arm = system.GetInputPort("state").size() // 2, getattr(system, "arm", None)
+        arm = arm if isinstance(arm, Arm) else arms[instance]
+        arm = arm if arm is None or arm.n == n else None
+        joints.append(joints_for(plant, system.get_name() or name, n, arm, instance))
+        warn_of_damping(joints[-1], getattr(system, "damping", None))
+    total = builder.AddSystem(Adder(len(placed), plant.num_velocities()))
+    for index, (system, _) in enumerate(placed):
         builder.AddSystem(system)
-        builder.Connect(plant.get_state_output_port(), system.GetInputPort("state"))
-        builder.Connect(system.GetOutputPort("force"), total.get_input_port(index))
+        _connect(builder, plant, system, joints[index], total.get_input_port(index))
     builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
-    return list(systems)
+    return [system for system, _ in placed]
+
+
+def _connect(
+    builder: DiagramBuilder, plant: MultibodyPlant, system: System, joints: Sequence[Any], sum_port: InputPort
+) -> None:
+    """Connect a system with some of a plant's joints: past a selection where there are more."""
+    nq, nv, n = plant.num_positions(), plant.num_velocities(), len(joints)
+    state, force = plant.get_state_output_port(), system.GetOutputPort("force")
+    if nq + nv > 2 * n:
+        rows = [j.position_start() for j in joints] + [nq + j.velocity_start() for j in joints]
+        chosen = builder.AddSystem(MatrixGain(np.eye(nq + nv)[rows]))
+        builder.Connect(state, chosen.get_input_port())
+        placed = builder.AddSystem(MatrixGain(np.eye(nv)[:, [j.velocity_start() for j in joints]]))
+        builder.Connect(force, placed.get_input_port())
+        state, force = chosen.get_output_port(), placed.get_output_port()
+    builder.Connect(state, system.GetInputPort("state"))
+    builder.Connect(force, sum_port)

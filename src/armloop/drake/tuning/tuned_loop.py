@@ -94,7 +94,7 @@ def look_at(scenario: TrackingScenario, gains: PidGains) -> TunedLoop:
     smooth, dry = (
         simulated_step(plant, gains, q0, unit, duration, dry=with_dry)[1] for with_dry in (False, True)
     )
-    tracking = run_tracking(replace(scenario, gains=gains, controllers=("pid", "exact")), {})
+    tracking = run_tracking(replace(scenario, gains=gains, controllers=("pid", "exact"), effects=()), {})
     return TunedLoop(
         gains,
         margins,
