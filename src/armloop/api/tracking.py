@@ -18,10 +18,9 @@ from armloop.util.progress import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pydrake.trajectories import Trajectory
 
+    from armloop.drake.control.reference import Motion
     from armloop.drake.experiments.tracking import TrackingResult
-    from armloop.experiment.excitation import Reference as Motion
 
 
 class Tracking:
@@ -78,7 +77,7 @@ def track(
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
     arm: str | Path | Arm | None = None,
-    reference: str | Path | Motion | Trajectory | None = None,
+    reference: str | Path | Motion | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:

@@ -55,6 +55,10 @@ class TrajectoryReference:
         return q, v * moves, vdot * moves
 
 
+Motion = Reference | Trajectory
+"""What can be followed."""
+
+
 def as_reference(given: Any) -> Reference:
     """Return a motion to follow of one, or of a Drake trajectory; raises `InputError` for what is neither."""
     if isinstance(given, Trajectory):

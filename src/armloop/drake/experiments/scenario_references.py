@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from pydrake.trajectories import Trajectory
 
-from armloop.drake.control.reference import as_reference
+from armloop.drake.control.reference import Motion, as_reference
 from armloop.drake.experiments.scenario_files import beside
 from armloop.experiment.excitation import (
     MotionRanges,
@@ -49,7 +48,7 @@ def reference_of(
     return _possible(reference, arm, f"{where}: reference{given}")
 
 
-def reference_from(given: str | Path | Reference | Trajectory, arm: Arm) -> Reference:
+def reference_from(given: str | Path | Motion, arm: Arm) -> Reference:
     """Return the reference of a table, or one that is given as it is, checked against the arm and its limits."""
     if isinstance(given, str | Path):
         return _possible(read_reference(given, arm.n), arm, f"{given}: the reference")
