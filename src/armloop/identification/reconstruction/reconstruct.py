@@ -47,6 +47,7 @@ from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.torque_lag import torque_lag
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -167,13 +168,17 @@ def reconstruct(
     usual = [conditioning or one.conditioning for one in wanted]
     bandwidth, blocks = filter_and_blocks(kept or logs, arm, usual, settings, conditioning is None, progress)
     settings = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
-    zeros = None
+    zeros, filters = None, list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
+    aside = held_out_intervals(kept or logs, filters, settings) if bandwidth.cutoff_hz > 0 else []
     if kept and bandwidth.cutoff_hz > 0 and method != REFERENCE:
-        filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
-        aside = held_out_intervals(kept, filters, settings)
         zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
         logs = kept = zeros.corrected(kept)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
+    late = None
+    if bandwidth.cutoff_hz > 0 and method != REFERENCE:
+        progress("whether the torque is in step with the motion")
+        lowest = min(filters, key=lambda one: one.cutoff_hz)
+        late = torque_lag(kept or logs, arm, lowest, aside, blocks.seconds)
 
     refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
     refused = {} if library is not None else {one: why for one, why in refused.items() if why}
@@ -186,6 +191,7 @@ def reconstruct(
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(library.conditioning)
+        how = how if late is None else replace(how, torque_lag=late.seconds)
         progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if streamed:
             data = Data.streamed(logs, how, settings, workers, progress)
@@ -200,6 +206,9 @@ def reconstruct(
         if zeros is not None and zeros.found:
             found.history["encoder_zeros"] = zeros.to_dict(kept)
             found.notes += zeros.notes(arm)
+        if late is not None and late.seconds:
+            found.history["torque_lag"] = late.to_dict()
+            found.notes += late.notes()
         return Attempt(library, how, data, found, blocks.margin)
 
     tried = [Contender(one, refused=why) for one, why in refused.items()]
