@@ -85,6 +85,14 @@ def test_the_model_is_of_the_arm_and_says_that_the_record_is_late(tmp_path: Path
     assert load_model(tmp_path / "model.json").conditioning == how
 
 
+def test_a_late_record_asks_for_no_lower_corner() -> None:
+    """As recorded, 50 ms of delay leave so much that a filter which takes most of the motion away leaves less."""
+    late = [recorded(seed, 0.05) for seed in (1, 2)]
+    conditioned = reconstruct(late, three_axis(), library="rigid-body").model.conditioning
+    assert conditioned.torque_lag == pytest.approx(0.05, abs=0.1 * DEAD)
+    assert conditioned.cutoff_hz == model_of(DEAD).model.conditioning.cutoff_hz
+
+
 def test_the_recorders_own_lag_is_no_change_and_another_is() -> None:
     model = model_of(DEAD).model
     assert diagnose(model, [recorded(11, DEAD)], jobs=1).named == []
