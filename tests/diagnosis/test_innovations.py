@@ -134,6 +134,24 @@ class TestInnovations:
         )
         np.testing.assert_allclose(found, [1.5, 1.1])
 
+    def test_a_joint_slower_than_it_slid_in_the_training_logs_may_rub_as_at_rest(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Whatever they left of faster creeping: a wrist that other joints drag along is no event."""
+        history = {"range": [[9.0], [2.0], [9.0], [9.0]], "slowest": [0.05]}
+        v, residual = [0.04, -0.04, 0.04, 0.06], [0.7, -0.7, 3.0, 3.0]
+        found = self.found(
+            monkeypatch,
+            v,
+            residual,
+            [False] * 4,
+            held=[0.0] * 4,
+            history=history,
+            rows=[False] * 4,
+            baseline={"creeping": [0.01]},
+        )
+        np.testing.assert_allclose(found, [0.0, 0.0, 1.1, (3 - 0.03 * np.exp(-0.36)) / 2])
+
     def test_what_is_known_of_a_creeping_joint_is_what_the_training_logs_left(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -67,15 +67,19 @@ def _in_time(log: Recorded, lag: float) -> Array:
     """
     if lag <= 0:
         return log.v
-    # Here, for a fault of the input is to be told before this is imported.
-    from scipy.interpolate import CubicSpline
-
     v = log.v.copy()
     for run in log.runs:
         if run.stop - run.start >= _FEWEST_TO_SHIFT:
-            time = log.time[run]
-            v[run] = CubicSpline(time, log.v[run])(np.minimum(time + lag, time[-1]))
+            v[run] = later(log.time[run], log.v[run], lag)
     return v
+
+
+def later(time: Array, x: Array, seconds: float) -> Array:
+    """x (N, ...) of a run at instants so much later, before or after the run as at its ends."""
+    # Here, for a fault of the input is to be told before this is imported.
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(time, x)(np.clip(time + seconds, time[0], time[-1])))
 
 
 def dropouts(log: Recorded) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from armloop.data.dropouts import repaired
+from armloop.data.dropouts import later, repaired
 from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, filter_reach
 from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
@@ -25,8 +25,8 @@ from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
 _SHORTEST = 6
-#: A lag of v that is a smaller part of a period of the corner is not felt below it.
-_FELT = 0.01
+#: A lag that is a smaller part of a period of the corner is not felt below it.
+FELT = 0.01
 #: Periods that differ by less than this part are one.
 _ALIKE = 0.01
 #: Hz; a filter of a lower corner would need hours of a log.
@@ -45,6 +45,8 @@ class Conditioning:
         dead_zone: a joint counts as moving above this many standard deviations of its velocity noise.
         smear: periods of the corner around a standstill in which a joint does not count as moving, because
             the filter smears the torque of the standstill that far.
+        torque_lag: seconds by which the torque is recorded later than the motion (negative: earlier), a property of who
+            records: it is moved back.
 
     Raises:
         ValueError: a setting is no number, or out of range.
@@ -54,10 +56,12 @@ class Conditioning:
     oversampling: float = 25.0
     dead_zone: float = 4.0
     smear: float = SMEAR
+    torque_lag: float = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not isinstance(value, int | float) or not 0 <= value < np.inf:
+            size = abs(value) if name == "torque_lag" and isinstance(value, int | float) else value
+            if not isinstance(value, int | float) or not 0 <= size < np.inf:
                 raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
         if 0 < self.cutoff_hz < LOWEST_CORNER:
             raise ValueError(
@@ -120,7 +124,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     parts, spans = [], []
     for log in logs:
         lag = log.velocity_lag
-        fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= _FELT else 0.0)
+        fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= FELT else 0.0)
         for run in log.runs():
             part = _condition_run(fresh, run, how, how.dead_zone * noise)
             if part is not None:
@@ -285,6 +289,7 @@ def _condition_run(log: Recorded, run: slice, how: Conditioning, dead_zone: Arra
     low_pass = LowPass(WIDER * how.cutoff_hz, period)
     q, v, tau = (on_grid(x) for x in (log.q, log.v, log.tau))
     slow, tau = np.split(LowPass(how.cutoff_hz, period)(np.hstack([v, tau])), 2, axis=1)
+    tau = later(grid, tau, how.torque_lag) if how.torque_lag else tau
     q, v = np.split(low_pass(np.hstack([q, v])), 2, axis=1)
     vdot = derivative(v, period) if log.vdot is None else low_pass(on_grid(log.vdot))
     still = np.abs(slow) <= dead_zone
@@ -296,7 +301,7 @@ def _condition_run(log: Recorded, run: slice, how: Conditioning, dead_zone: Arra
     smeared = binary_dilation(still, around)
     lost = np.zeros_like(still)
     if log.lost is not None:
-        nearest = np.clip(np.searchsorted(elapsed, grid - 0.5 * period), 0, len(grid) - 1)
+        nearest = np.clip(np.searchsorted(elapsed, grid + how.torque_lag - 0.5 * period), 0, len(grid) - 1)
         lost = binary_dilation(log.lost[run][nearest], around)
     return time[0] + grid[keep], q[keep], v[keep], vdot[keep], tau[keep], ~smeared[keep], lost[keep]
 

@@ -17,7 +17,7 @@ from armloop.data.blocks import widened
 from armloop.data.creep import CREEPING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.evidence import Evidence, too_slow
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics
 from armloop.model import AddedEffect, ReconstructedModel
@@ -29,7 +29,7 @@ WINDOW = 0.2
 #: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
 CREEP = 0.01
 #: Dry friction of a joint that creeps is known but for what may, by chance, be left there as on the model's training
-#: logs, at most, and where nobody knows that, but for this part …
+#: logs, at most, and where nobody knows that, or slower than it slid in them, but for this part …
 _UNSURE = 0.8
 #: … and at rest it can hold this many times its sliding level.
 _STICTION = 1.2
@@ -59,6 +59,7 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
     creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
+    creeping = np.where(too_slow(model, motion), _UNSURE * dry, creeping)
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)
     # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.

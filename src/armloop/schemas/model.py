@@ -127,6 +127,9 @@ class ConditioningData(Struct, forbid_unknown_fields=True):
     oversampling: Annotated[float, Meta(gt=1.0, le=1e4)] = 25.0
     dead_zone: Annotated[float, Meta(ge=0.0, le=1e3)] = 4.0
     smear: Annotated[float, Meta(ge=0.0, le=1e3)] = 0.5
+    torque_lag: Annotated[
+        float, Meta(ge=-1.0, le=1.0, description="s by which torque is later than motion")
+    ] = 0.0
 
 
 class RecordedData(Struct):

@@ -357,7 +357,7 @@ class TestPieces:
     ) -> None:
         monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
         nothing: Any = [SimpleNamespace(samples=0)] * 2
-        assert bandwidth._selected(nothing) == [0, 1]
+        assert bandwidth.selected(nothing) == [0, 1]
         for each, picked in (
             (60, [0]),
             (59, [0, 9]),
@@ -366,7 +366,7 @@ class TestPieces:
             (6, list(range(10))),
         ):
             logs: Any = [SimpleNamespace(samples=each)] * 10
-            assert bandwidth._selected(logs) == picked
+            assert bandwidth.selected(logs) == picked
         q = 0.01 * np.arange(100.0)[:, None]
         time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0))
         log = MotionLog(time, q, np.ones_like(q), q)

@@ -421,7 +421,7 @@ class TestCorners:
     )
     def test_some_logs_evenly(self, count: int, samples: int, picked: list[int]) -> None:
         logs = [self.log(0.01, samples) for _ in range(count)]
-        assert bandwidth._selected(logs) == picked
+        assert bandwidth.selected(logs) == picked
         each = bandwidth.even_selection(logs)
         assert [log.rows for log in each] == [slice(0, min(samples, 60_000 // len(picked)))] * len(picked)
 

@@ -43,7 +43,7 @@ _SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
 #: A corner may leave out such a part of the samples more than the highest does.
 _MISSED = 0.05
 #: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
-_SLIDES, _FADES = 0.05, 0.01
+SLIDES, _FADES = 0.05, 0.01
 #: The least that a joint weighs by.
 LEAST = 1e-12
 
@@ -107,7 +107,7 @@ def choose_bandwidth(
         return Bandwidth(highest)
     filters = {Bandwidth(corner).suited(one) for corner in corners for one in (libraries or (how,))}
     held_out = held_out_intervals(logs, sorted(filters, key=astuple), options or Options())
-    aside = [held_out[k] for k, enough in zip(_selected(logs), long, strict=True) if enough]
+    aside = [held_out[k] for k, enough in zip(selected(logs), long, strict=True) if enough]
     chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
     tables = (table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners)
@@ -129,7 +129,7 @@ def choose_bandwidth(
 
 def left_out(logs: Sequence[LogSource], how: Conditioning, corner: float) -> float:
     """Part of the samples, of some of the logs, in runs too short for the filter that a library has at this corner."""
-    some, suited = [logs[k].read() for k in _selected(logs)], Bandwidth(corner).suited(how)
+    some, suited = [logs[k].read() for k in selected(logs)], Bandwidth(corner).suited(how)
     return sum(too_short(log, suited) for log in some) / sum(log.samples for log in some)
 
 
@@ -143,7 +143,7 @@ def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
             )
 
 
-def _selected(logs: Sequence[LogSource]) -> list[int]:
+def selected(logs: Sequence[LogSource]) -> list[int]:
     """Some of the logs, evenly, that hold about so many samples as are looked at."""
     total = sum(log.samples for log in logs)
     count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
@@ -152,7 +152,7 @@ def _selected(logs: Sequence[LogSource]) -> list[int]:
 
 def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
     """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
-    picked, found = _selected(logs), []
+    picked, found = selected(logs), []
     for k in picked:
         log = logs[k].read()
         longest = max(log.runs(), key=lambda run: run.stop - run.start)
@@ -250,7 +250,7 @@ def table_at(
         speed = np.abs(part.v)
         blocks = following + ((part.time - part.time[0]) / _BLOCK).astype(np.intp)
         following = int(blocks[-1]) + 1
-        parts.append((columns, samples.tau[inside], blocks, speed > _SLIDES * speed.max(axis=0)))
+        parts.append((columns, samples.tau[inside], blocks, speed > SLIDES * speed.max(axis=0)))
         motions.append(part)
     if not parts:
         return None
@@ -275,7 +275,7 @@ def determined_solution(X: Array, y: Array) -> Array:
     """Least squares with a ridge, of columns of unit length, that is felt by what nothing determines alone."""
     lengths = np.maximum(np.linalg.norm(X, axis=0), TINY)
     X = X / lengths
-    return np.asarray(np.linalg.solve(X.T @ X + RIDGE * np.eye(X.shape[1]), X.T @ y) / lengths)
+    return np.asarray((np.linalg.solve(X.T @ X + RIDGE * np.eye(X.shape[1]), X.T @ y).T / lengths).T)
 
 
 def root_mean_square(x: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -47,6 +47,7 @@ from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
+from armloop.identification.reconstruction.torque_lag import torque_lag
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -165,12 +166,25 @@ def reconstruct(
         # samples that are no time series show the first library alone what it needs
         wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
     usual = [conditioning or one.conditioning for one in wanted]
-    bandwidth, blocks = filter_and_blocks(kept or logs, arm, usual, settings, conditioning is None, progress)
-    settings = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
-    zeros = None
+    late, lag, corners = None, 0.0, set[float]()
+    while True:
+        bandwidth, blocks = filter_and_blocks(
+            kept or logs, arm, usual, settings, conditioning is None, progress, lag
+        )
+        dealt = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
+        filters = sorted({conditioning or bandwidth.suited(one.conditioning) for one in wanted}, key=astuple)
+        aside = held_out_intervals(kept or logs, filters, dealt) if bandwidth.cutoff_hz > 0 else []
+        if bandwidth.cutoff_hz in {0.0, *corners} or method == REFERENCE:
+            break
+        corners.add(bandwidth.cutoff_hz)
+        progress("whether the torque is in step with the motion")
+        found = torque_lag(kept or logs, arm, filters[0], aside, blocks.seconds)
+        if not found.seconds:
+            break
+        # what is out of step asks for a low corner, and a lag is known best at a high one
+        late, lag = found, found.seconds
+    settings, zeros = dealt, None
     if kept and bandwidth.cutoff_hz > 0 and method != REFERENCE:
-        filters = list({conditioning or bandwidth.suited(one.conditioning) for one in wanted})
-        aside = held_out_intervals(kept, filters, settings)
         zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
         logs = kept = zeros.corrected(kept)
     check_torques(kept or logs, arm, bandwidth.cutoff_hz)
@@ -186,6 +200,7 @@ def reconstruct(
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = conditioning or bandwidth.suited(library.conditioning)
+        how = replace(how, torque_lag=lag)
         progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if streamed:
             data = Data.streamed(logs, how, settings, workers, progress)
@@ -200,6 +215,9 @@ def reconstruct(
         if zeros is not None and zeros.found:
             found.history["encoder_zeros"] = zeros.to_dict(kept)
             found.notes += zeros.notes(arm)
+        if late is not None:
+            found.history["torque_lag"] = late.to_dict()
+            found.notes += late.notes()
         return Attempt(library, how, data, found, blocks.margin)
 
     tried = [Contender(one, refused=why) for one, why in refused.items()]
@@ -233,6 +251,7 @@ def filter_and_blocks(
     options: Options,
     choosing: bool,
     progress: Progress,
+    torque_lag: float = 0.0,
 ) -> tuple[Bandwidth, Blocks]:
     """The low-pass, and the blocks that are held out: from it, too.
 
@@ -242,21 +261,24 @@ def filter_and_blocks(
     Args:
         usual: filters of the libraries that are going to be regressed.
         choosing: whether the corner is chosen; else it is the usual one.
+        torque_lag: of the logs, s.
     """
+    highest = Conditioning(torque_lag=torque_lag)
 
     def blocks_at(bandwidth: Bandwidth) -> Blocks:
-        return independent_blocks(arm, logs, bandwidth.suited(usual[0]), options.block_seconds, options.folds)
+        how = replace(bandwidth.suited(usual[0]), torque_lag=torque_lag)
+        return independent_blocks(arm, logs, how, options.block_seconds, options.folds)
 
     if not choosing:
         bandwidth = Bandwidth(usual[0].cutoff_hz)
         return bandwidth, blocks_at(bandwidth)
     progress("choosing the low-pass on blocks that judge nothing else")
-    bandwidth = Bandwidth(highest_corner(logs, Conditioning()))
+    bandwidth = Bandwidth(highest_corner(logs, highest))
     seconds, blocks = 0.0, blocks_at(bandwidth)
     while blocks.seconds > seconds:
         seconds, before = blocks.seconds, bandwidth.cutoff_hz
         dealt = replace(options, block_seconds=seconds)
-        bandwidth = choose_bandwidth(logs, arm, Conditioning(), dealt, usual)
+        bandwidth = choose_bandwidth(logs, arm, highest, dealt, usual)
         if bandwidth.cutoff_hz != before:
             blocks = blocks_at(bandwidth)
     return bandwidth, blocks.within(seconds)

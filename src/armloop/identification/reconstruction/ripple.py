@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
-from armloop.data.signals import Conditioning, ShortRunError, preprocess
+from armloop.data.signals import ShortRunError, preprocess
 from armloop.identification.reconstruction.inner_folds import FOLDS
 from armloop.identification.reconstruction.lines import MOST, lines, waves
 from armloop.identification.reconstruction.projected import CHANCE, block_covariance, block_score
@@ -110,7 +110,7 @@ def _residuals(
             except ShortRunError:
                 continue
             period = low.period
-            full = preprocess([one], Conditioning(cutoff_hz=_BAND / period, oversampling=1e9))
+            full = preprocess([one], replace(fine, cutoff_hz=_BAND / period))
             time, known = low.motion.time, samples.motion.time[runs[number]]
             nearest = np.clip(np.searchsorted(known, time), 0, len(known) - 1) + runs[number].start
             number += 1

@@ -1,0 +1,204 @@
+"""Dead time between the torque and the motion of a log: a nuisance parameter, by meta-analysis over the joints.
+
+Controllers record what they command, or what a drive reports some cycles later, beside the position of another instant.
+What of it looks like friction and inertia goes into those, until friction drives and M(q) is not positive definite. Here
+the torques are regressed on rigid bodies and friction with memory beside their rates, each joint with a lag of its own
+(Gauss-Newton steps). A record has one lag, a law that the regression lacks another at every joint: the lag is taken where
+the joints agree, as the mean of effects that differ by more than their standard errors say (DerSimonian and Laird,
+Controlled Clinical Trials 7, 1986; Hartung and Knapp, Statistics in Medicine 20, 2001). The blocks that judge the model in
+the end take no part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from armloop.data.blocks import block_numbers, block_sums
+from armloop.data.log import MotionLog
+from armloop.data.motion import Samples
+from armloop.data.pieces import LogSource
+from armloop.data.signals import (
+    FELT,
+    Conditioning,
+    ShortRunError,
+    independent_rows,
+    later,
+    preprocess,
+    rate_along,
+)
+from armloop.features.rigid_body import BaseParameters
+from armloop.identification.reconstruction.bandwidth import (
+    LEAST,
+    SLIDES,
+    determined_solution,
+    even_selection,
+    selected,
+)
+from armloop.identification.reconstruction.design import Design
+from armloop.identification.reconstruction.held_out import within
+from armloop.identification.reconstruction.shared import FRICTION, sliding_rows
+from armloop.laws.friction import FrictionTerm
+from armloop.robot.arm import Arm
+from armloop.util.arrays import TINY, Array, Index, Mask
+
+#: Chance of a lag where there is none, Gauss-Newton steps, and fewest samples of a joint.
+_CHANCE, _ROUNDS, _FEWEST = 0.01, 4, 200
+#: At two corners it differs by no more standard errors, or by less than this part of it.
+_SURE, _ALIKE = 3.0, 0.5
+#: No record is out of step by more, s.
+_LONGEST = 0.1
+#: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
+_FRICTION = (*FRICTION, *(FrictionTerm("stribeck", parameter=speed) for speed in (0.03, 0.1, 0.3)))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueLag:
+    """By how much a log's torque is later than its motion.
+
+    Attributes:
+        seconds: what is taken; 0 where nothing is clear.
+        std_error: of the mean over the joints, s.
+        joints: (n,) each joint's own, s; NaN where it tells nothing.
+    """
+
+    seconds: float
+    std_error: float
+    joints: Array
+
+    @property
+    def clear(self) -> bool:
+        """Whether it is one of all joints, by Student's t of as many degrees of freedom as they leave."""
+        free = len(self.joints) - 1
+        return free > 0 and abs(self.seconds) > float(student.ppf(1 - _CHANCE / 2, free)) * self.std_error
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a model keeps of it."""
+        own = [float(x) if np.isfinite(x) else None for x in self.joints]
+        return {"seconds": self.seconds, "std_error": self.std_error, "joints": own}
+
+    def notes(self) -> list[str]:
+        """What was found, and what is done about it."""
+        if not self.seconds:
+            return []
+        way = "later" if self.seconds > 0 else "earlier"
+        return [
+            f"the torque is recorded {1e3 * abs(self.seconds):.2g} ± {1e3 * self.std_error:.1g} ms {way} than the motion, "
+            "at all joints alike: the recording, not the arm. It is moved back, here and in logs that the model judges"
+        ]
+
+
+def torque_lag(
+    logs: Sequence[LogSource], arm: Arm, how: Conditioning, aside: Sequence[Array], block_seconds: float
+) -> TorqueLag:
+    """The lag of the logs' torque.
+
+    A lag is one at all frequencies; what noise of the motion that a controller answers to looks like is none, and is gone
+    below half the corner.
+
+    Args:
+        logs: of which as many samples are looked at as tell a lag, the same wherever they are kept.
+        how: filter.
+        aside: per log, (B, 2) intervals that take no part.
+        block_seconds: length of pieces whose errors are independent.
+    """
+    some, left_out = even_selection(logs), [aside[k] for k in selected(logs)]
+    found = _found(some, arm, how, left_out, block_seconds)
+    if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
+        return replace(found, seconds=0.0)
+    slow = _found(some, arm, replace(how, cutoff_hz=how.cutoff_hz / 2), left_out, block_seconds)
+    allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
+    return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
+
+
+def _found(
+    logs: Sequence[MotionLog], arm: Arm, how: Conditioning, aside: Sequence[Array], block_seconds: float
+) -> TorqueLag:
+    """The lag below one corner; a standard error without bound where too little moves."""
+    base = BaseParameters.of_arm(arm, rotors=True)
+    design = Design(arm, partial(base.columns, arm), base.count)
+    parts, following = [], 0
+    for log, intervals in zip(logs, aside, strict=True):
+        try:
+            samples = preprocess([log], how)
+        except ShortRunError:
+            continue
+        speed = np.abs(samples.motion.v)
+        rows = (
+            sliding_rows(samples) & (speed > SLIDES * speed.max(axis=0)) & independent_rows(samples)[:, None]
+        )
+        rows &= ~within(samples.motion.time, intervals, how.reach)[:, None]
+        blocks = following + block_numbers(samples.motion, block_seconds)
+        following = int(blocks[-1]) + 1
+        X: list[list[Array]] = [[] for _ in range(arm.n)]
+        for part in design.walk(samples, [list(_FRICTION)] * arm.n):
+            own = part.X[rows[part.first : part.first + len(part.X), part.joint]]
+            where = np.where(part.where < base.count, part.where, part.where + part.joint * len(_FRICTION))
+            X[part.joint].append(np.zeros((len(own), base.count + arm.n * len(_FRICTION))))
+            X[part.joint][-1][:, where] = own
+        stacked = np.concatenate([piece for pieces in X for piece in pieces])
+        parts.append(_Part(samples, rows.T, stacked, np.broadcast_to(blocks, rows.T.shape)[rows.T]))
+    if not parts or (sum(part.rows.sum(axis=1) for part in parts) < _FEWEST).any():
+        return TorqueLag(0.0, np.inf, np.full(arm.n, np.nan))
+    lags, errors = _own(parts)
+    return TorqueLag(*_mean(lags, errors), lags)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A log's samples with those of each joint that are regressed (n, N), and of these columns (R, p) and blocks (R,)."""
+
+    samples: Samples
+    rows: Mask
+    X: Array
+    blocks: Index
+
+    def torque(self, lag: float) -> Array:
+        """(R, 2) torque that is recorded so much later, and its rate."""
+        tau = later(self.samples.motion.time, self.samples.tau, lag)
+        return np.stack([tau.T, rate_along(self.samples, tau).T], axis=2)[self.rows]
+
+
+def _own(parts: Sequence[_Part]) -> tuple[Array, Array]:
+    """Each joint's lag (n,) beside the coefficients of all, and its standard error, s."""
+    joint = np.concatenate([np.nonzero(part.rows)[0] for part in parts])
+    block = np.concatenate([part.blocks for part in parts])
+    X = np.concatenate([part.X for part in parts])
+    lag, lags, errors = 0.0, np.zeros(0), np.zeros(0)
+    size = _sizes(np.concatenate([part.torque(0.0)[:, 0] for part in parts]), joint)
+    for _ in range(_ROUNDS):
+        tau, rate = np.concatenate([part.torque(lag) for part in parts]).T / size[joint]
+        rates = np.where(joint[:, None] == np.arange(len(size)), rate[:, None], 0.0)
+        A = X / size[joint, None]
+        left = np.column_stack([tau, rates])
+        left -= A @ determined_solution(A, left)
+        inverse = np.linalg.pinv(left[:, 1:].T @ left[:, 1:])
+        steps = -inverse @ (left[:, 1:].T @ left[:, 0])
+        rest = left[:, 0] + left[:, 1:] @ steps
+        scores = np.stack([block_sums(column * rest, block) for column in left[:, 1:].T])
+        lags, errors = lag + steps, np.sqrt(np.diag(inverse @ scores @ scores.T @ inverse))
+        size = np.maximum(size * _sizes(left[:, 0], joint), LEAST)
+        lag = float(np.clip(_mean(lags, errors)[0], -_LONGEST, _LONGEST))
+    return lags, errors
+
+
+def _sizes(x: Array, joint: Index) -> Array:
+    """(n,) root mean square of each joint's rows."""
+    return np.sqrt(np.maximum(np.bincount(joint, x**2) / np.bincount(joint), LEAST**2))
+
+
+def _mean(lags: Array, errors: Array) -> tuple[float, float]:
+    """Mean of the joints' lags, which differ by more than their errors say, and its standard error."""
+    variance = np.maximum(errors, TINY) ** 2
+    weight, more = 1 / variance, len(lags) - 1
+    excess = float(weight @ (lags - weight @ lags / weight.sum()) ** 2) - more
+    between = max(excess, 0.0) / max(float(weight.sum() - weight @ weight / weight.sum()), TINY)
+    weight = 1 / (variance + between)
+    mean = float(weight @ lags / weight.sum())
+    spread = float(weight @ (lags - mean) ** 2) / max(more, 1)
+    return mean, float(np.sqrt(max(spread, 1.0) / weight.sum()))

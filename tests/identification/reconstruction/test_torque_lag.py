@@ -1,0 +1,123 @@
+"""A record whose torque is out of step with its motion at all joints alike is moved into step; nothing else is."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import COULOMB, VISCOUS, fourier_motion, friction, measured, rigid_torque, three_axis
+
+from armloop.data.log import MotionLog
+from armloop.data.signals import Conditioning, preprocess
+from armloop.diagnosis import diagnose
+from armloop.identification.reconstruction import Reconstruction, reconstruct
+from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
+from armloop.model import load_model
+
+DEAD = 0.008
+
+
+def recorded(seed: int, dead: float | np.ndarray, seconds: float = 30.0) -> MotionLog:
+    """A run whose torque is recorded so many seconds late, one number or one a joint."""
+    motion = fourier_motion(seconds, 250.0, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    late = [
+        np.interp(motion.time - d, motion.time, x) for d, x in zip(np.resize(dead, 3), tau.T, strict=True)
+    ]
+    return measured(motion, np.column_stack(late), seed, name=f"run {seed}")
+
+
+def found(dead: float | np.ndarray, seeds: tuple[int, ...] = (1, 2)) -> TorqueLag:
+    logs = [recorded(seed, dead) for seed in seeds]
+    return torque_lag(logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0)
+
+
+@cache
+def model_of(dead: float) -> Reconstruction:
+    return reconstruct([recorded(seed, dead) for seed in (1, 2, 3)], three_axis(), library="rigid-body")
+
+
+@pytest.mark.parametrize("dead", [DEAD, -DEAD, 0.02])
+def test_a_lag_of_all_joints_is_found(dead: float) -> None:
+    late = found(dead)
+    # a tenth of the lag: an eighth of a sample period
+    assert late.seconds == pytest.approx(dead, abs=max(4 * late.std_error, 0.1 * DEAD))
+    assert late.joints == pytest.approx(dead, abs=0.25 * DEAD)
+
+
+@pytest.mark.parametrize("dead", [0.0, 0.0005, np.array([0.0, 0.02, 0.0]), np.array([0.01, -0.01, 0.005])])
+def test_what_is_in_step_or_of_a_joint_alone_is_left(dead: float | np.ndarray) -> None:
+    late = found(dead)
+    assert late.seconds == 0.0 and late.notes() == []
+
+
+def test_held_out_blocks_take_no_part() -> None:
+    logs, how = [recorded(seed, DEAD) for seed in (1, 2)], Conditioning(8.5)
+    half = np.array([[10.0, 20.0]])
+    spoilt = []
+    for log in logs:
+        tau = log.tau.copy()
+        tau[(log.time > 11.0) & (log.time < 19.0)] *= -1.0
+        spoilt.append(replace(log, tau=tau))
+    clean, other = (torque_lag(some, three_axis(), how, [half] * 2, 2.0) for some in (logs, spoilt))
+    assert other.seconds == pytest.approx(clean.seconds, rel=1e-6) and clean.seconds > 0
+
+
+def test_the_model_is_of_the_arm_and_says_that_the_record_is_late(tmp_path: Path) -> None:
+    result = model_of(DEAD)
+    how = result.model.conditioning
+    assert how.torque_lag == pytest.approx(DEAD, abs=0.1 * DEAD)
+    assert any(f"recorded {1e3 * how.torque_lag:.2g} ±" in note and "later" in note for note in result.notes)
+    assert result.model.history["torque_lag"]["seconds"] == how.torque_lag
+    # what is left is less than a tenth
+    assert abs(result.model.uncertainty["torque_lag"]) < 0.1 * DEAD
+    for j, line in enumerate(result.model.uncertainty["stribeck"]):
+        for name, true in (("coulomb", COULOMB), ("viscous", VISCOUS)):
+            if name in line:
+                assert line[name]["value"] == pytest.approx(true[j], abs=4 * line[name]["std_error"])
+    assert result.model.uncertainty["friction_line"][0]["viscous"]["std_error"] < 0.02 * VISCOUS[0]
+    result.model.save(tmp_path / "model.json")
+    assert json.loads((tmp_path / "model.json").read_text())["conditioning"]["torque_lag"] == how.torque_lag
+    assert load_model(tmp_path / "model.json").conditioning == how
+
+
+def test_a_late_record_asks_for_no_lower_corner() -> None:
+    """As recorded, 50 ms of delay leave so much that a filter which takes most of the motion away leaves less."""
+    late = [recorded(seed, 0.05) for seed in (1, 2)]
+    conditioned = reconstruct(late, three_axis(), library="rigid-body").model.conditioning
+    assert conditioned.torque_lag == pytest.approx(0.05, abs=0.1 * DEAD)
+    assert conditioned.cutoff_hz == model_of(DEAD).model.conditioning.cutoff_hz
+
+
+def test_the_recorders_own_lag_is_no_change_and_another_is() -> None:
+    model = model_of(DEAD).model
+    assert diagnose(model, [recorded(11, DEAD)], jobs=1).named == []
+    other = diagnose(model, [recorded(12, 3 * DEAD)], jobs=1)
+    assert other.named == [("time_delay", None)]
+    (added,) = other.outcome.added()
+    seconds = added.parameters["seconds"]
+    assert seconds.value == pytest.approx(3 * DEAD - model.conditioning.torque_lag, abs=0.1 * DEAD)
+
+
+def test_torque_is_moved_into_step_with_the_motion() -> None:
+    late, none = recorded(5, 0.02), recorded(5, 0.0)
+    moved = preprocess([late], Conditioning(8.5, torque_lag=0.02))
+    assert moved.tau == pytest.approx(preprocess([none], Conditioning(8.5)).tau, abs=0.1)
+    assert np.abs(preprocess([late], Conditioning(8.5)).tau - moved.tau).max() > 0.5
+    with pytest.raises(ValueError, match="torque_lag"):
+        Conditioning(torque_lag=np.nan)
+
+
+def test_a_stuck_torque_is_left_out_where_it_was_measured() -> None:
+    log = recorded(6, 0.0)
+    tau = log.tau.copy()
+    tau[2000:2100, 1] = tau[2000, 1]
+    stuck = replace(log, tau=tau)
+    plain, moved = (preprocess([stuck], Conditioning(8.5, torque_lag=lag)).moving[:, 1] for lag in (0.0, 0.2))
+    time = preprocess([stuck], Conditioning(8.5)).motion.time
+    centres = [float(np.mean(time[~own & (np.abs(time - 8.0) < 0.5)])) for own in (plain, moved)]
+    assert centres[0] - centres[1] == pytest.approx(0.2, abs=0.02)
