@@ -146,7 +146,8 @@ def test_a_joint_sticks_that_slides_for_half_of_a_burst_at_most_while_another_sl
     given.v[20:30, 0] = np.where(np.arange(10) < own, -0.011, 0.01)
     given.v[20:30, 1] = np.where(np.arange(10) < other, 0.011, 0.0)
     model = SimpleNamespace(history={"range": [[1, 1], [1, 1], [1, 1], [0, 0]]})
-    evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given), model=model)
+    rows = np.ones_like(given.v, dtype=bool)
+    evidence: Any = SimpleNamespace(samples=SimpleNamespace(motion=given), model=model, rows=rows)
     beyond = np.zeros_like(given.v)
     # on average over the burst; before and after it, and of other joints, it does not matter
     beyond[20:30, 0] = 2 * held * (np.arange(10) % 2)

@@ -145,9 +145,13 @@ def test_a_joint_that_sticks_while_another_slides_shows_no_event(model: Reconstr
     v[a:b] = [0.0, 0.5, 0.5]  # joint 1 is held by its friction, the others go on
     evidence = Evidence.of(model, replace(samples, motion=replace(samples.motion, v=v)), [])
     alone, both, other = (Burst(slice(a, b), frozenset(js)) for js in ({0}, {0, 1}, {1}))
-    assert _sticks(evidence, alone)
-    assert not _sticks(evidence, both)
-    assert not _sticks(evidence, other)
+    nothing, much = np.zeros_like(v), np.full_like(v, 1.5)
+    assert _sticks(evidence, alone, nothing)
+    assert not _sticks(evidence, both, nothing)
+    assert not _sticks(evidence, other, nothing)
+    # more than twice its friction it does not hold; a joint that never slides may have a brake
+    assert not _sticks(evidence, alone, much)
+    assert _sticks(evidence.only(evidence.rows & [False, True, True]), alone, much)
 
 
 def test_what_friction_holds_meanwhile_does_not_hide_an_event(model: ReconstructedModel) -> None:

@@ -170,14 +170,16 @@ def _sticks(evidence: Evidence, burst: Burst, held: Array) -> bool:
     """Whether a joint that alone shows a burst sticks while others slide: they load it, and its friction holds that.
 
     Args:
-        held: (N, n) what is left beyond the dry friction that the model knows, in parts of that; as much again may be held.
+        held: (N, n) what is left beyond the dry friction that the model knows, in parts of that; as much again may be held,
+            and of a joint that never slides in its run, anything: it may have a brake.
     """
     motion = evidence.samples.motion
     if len(burst.joints) > 1:
         return False
     (j,) = burst.joints
     slides = (np.abs(motion.v[burst.rows]) > creep(evidence.model)).mean(axis=0) > MOSTLY
-    return bool(slides.any() and not slides[j] and held[burst.rows, j].mean() <= 1.0)
+    may_hold = held[burst.rows, j].mean() <= 1.0 or not evidence.rows[:, j].any()
+    return bool(slides.any() and not slides[j] and may_hold)
 
 
 def _strays(far: Mask, burst: Burst) -> bool:
