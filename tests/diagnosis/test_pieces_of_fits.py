@@ -212,7 +212,7 @@ class TestTrials:
             fold=fold,
         )
         effect: Any = SimpleNamespace(
-            joint=1, other_joint=None, start=lambda beta: beta, embed=lambda x: (x, np.eye(len(x)))
+            joint=1, indices=[0], start=lambda beta: beta, embed=lambda x: (x, np.eye(len(x)))
         )
         known = Known(evidence, np.zeros((80, 1)), current)
         assert trials._best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
