@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,6 +54,29 @@ def test_a_lag_of_all_joints_is_found(dead: float) -> None:
 def test_what_is_in_step_or_of_a_joint_alone_is_left(dead: float | np.ndarray) -> None:
     late = found(dead)
     assert late.seconds == 0.0 and late.notes() == []
+
+
+@pytest.mark.parametrize(
+    ("below", "error", "taken"),
+    [
+        (DEAD, 1e-4, True),
+        (0.52 * DEAD, 1e-4, True),
+        (0.48 * DEAD, 1e-4, False),  # what is half as large below half the corner is no lag
+        (-DEAD, 1e-4, False),
+        (0.0, 0.35 * DEAD, True),  # three standard errors
+        (0.0, 0.32 * DEAD, False),
+    ],
+)
+def test_a_lag_is_the_same_at_all_frequencies(
+    below: float, error: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def own(logs: Any, arm: Any, how: Conditioning, *_: Any) -> TorqueLag:
+        whole = how.cutoff_hz == 8.5
+        assert whole or how.cutoff_hz == 4.25
+        return TorqueLag(DEAD if whole else below, 1e-5 if whole else error, np.zeros(3))
+
+    monkeypatch.setattr("armloop.identification.reconstruction.torque_lag._found", own)
+    assert found(DEAD).seconds == (DEAD if taken else 0.0)
 
 
 def test_held_out_blocks_take_no_part() -> None:
