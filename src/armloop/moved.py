@@ -50,7 +50,7 @@ MOVED = {
     "armloop.diagnosis.alternatives": "armloop.diagnosis.diagnose",
     "armloop.diagnosis.apart": "armloop.diagnosis.isolability",
     "armloop.diagnosis.closing": "armloop.diagnosis.compensation",
-    "armloop.diagnosis.remedies": "armloop.diagnosis.diagnose",
+    "armloop.diagnosis.remedies": "armloop.laws.effects.base",
     "armloop.diagnosis.rivals": "armloop.diagnosis.confounded",
     "armloop.drake.plant.own_effects": "armloop.drake.plant.fault_injection",
     "armloop.drake_systems": "armloop.drake",
