@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stretches import motion, steps
 
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import innovations
@@ -338,3 +339,28 @@ def test_a_window_is_a_fifth_of_a_second_and_at_least_a_sample() -> None:
         np.testing.assert_allclose(
             mean, np.where(np.abs(np.arange(11) - 5) <= width // 2, 1 / width, 0), atol=1e-12
         )
+
+
+class TestPieces:
+    def test_a_running_mean_stays_within_its_run(self) -> None:
+        samples: Any = SimpleNamespace(motion=motion([50, 50], 0.04), period=0.04)
+        values = steps(100, (48, 49, 5.0), (70, 70, 10.0))
+        mean = innovations.averaged(samples, values[:, None])[:, 0]
+        np.testing.assert_allclose(mean[68:73], 2.0)
+        np.testing.assert_allclose(mean[[45, 50, 67, 73]], 0.0, atol=1e-12)
+        assert mean[49] == pytest.approx(4 * 5.0 / 5)
+
+    def test_a_standstill_is_eroded_by_the_filters_reach_but_creeping_rests(self) -> None:
+        given = motion([40, 60], 0.01)
+        given.v[:] = 1.0
+        given.v[90] = 0.005
+        moving = np.ones((100, 1), dtype=bool)
+        moving[10:31] = False
+        moving[50:] = False
+        moving[75] = True
+        samples: Any = SimpleNamespace(motion=given, moving=moving, period=0.01, reach=0.03, cutoff_hz=5.0)
+        rest = np.flatnonzero(innovations.at_rest(samples)).tolist()
+        assert rest == [*range(13, 28), *range(53, 72), *range(79, 100)]
+        samples.cutoff_hz = 0.0
+        rest = np.flatnonzero(innovations.at_rest(samples)).tolist()
+        assert rest == [*range(10, 31), *range(50, 75), *range(76, 100)]
