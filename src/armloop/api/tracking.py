@@ -19,7 +19,7 @@ from armloop.util.progress import Progress, silent
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from armloop.drake.control.reference import Motion
+    from armloop.drake.control.reference import ReferenceLike
     from armloop.drake.experiments.tracking import TrackingResult
 
 
@@ -77,7 +77,7 @@ def track(
     model: ReconstructedModel | Mapping[str, ReconstructedModel] | None = None,
     *,
     arm: str | Path | Arm | None = None,
-    reference: str | Path | Motion | None = None,
+    reference: str | Path | ReferenceLike | None = None,
     out: str | Path | None = None,
     progress: Progress = silent,
 ) -> Tracking:

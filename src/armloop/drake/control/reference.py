@@ -55,7 +55,7 @@ class TrajectoryReference:
         return q, v * moves, vdot * moves
 
 
-Motion = Reference | Trajectory
+ReferenceLike = Reference | Trajectory
 """What can be followed."""
 
 

@@ -15,7 +15,7 @@ from armloop.drake.control.computed_torque import AccelerationGains, ComputedTor
 from armloop.drake.control.feedforward import FeedforwardModel
 from armloop.drake.control.pid import PidController, PidGains
 from armloop.drake.control.rate_limiter import RateLimiter
-from armloop.drake.control.reference import Motion, ReferenceSource, as_reference
+from armloop.drake.control.reference import ReferenceLike, ReferenceSource, as_reference
 from armloop.drake.experiments.scenarios import Plant, built_in, plant_for
 from armloop.drake.given import require_of, require_predicts, require_step
 from armloop.drake.plant.fault_injection import Effects
@@ -77,7 +77,7 @@ def add_arm_with_controller(
     builder: DiagramBuilder,
     arm: str | Path | Arm | Plant,
     gains: PidGains | AccelerationGains,
-    reference: Motion,
+    reference: ReferenceLike,
     model: FeedforwardModel | None = None,
     step: int = 3,
     *,
@@ -143,7 +143,7 @@ def add_arm_under(
     builder: DiagramBuilder,
     plant: Plant,
     law: LeafSystem,
-    reference: Motion,
+    reference: ReferenceLike,
     model: FeedforwardModel | None = None,
     step: int = 3,
     *,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from armloop.drake.control.reference import Motion, as_reference
+from armloop.drake.control.reference import ReferenceLike, as_reference
 from armloop.drake.experiments.scenario_files import beside
 from armloop.experiment.excitation import (
     MotionRanges,
@@ -48,7 +48,7 @@ def reference_of(
     return _possible(reference, arm, f"{where}: reference{given}")
 
 
-def reference_from(given: str | Path | Motion, arm: Arm) -> Reference:
+def reference_from(given: str | Path | ReferenceLike, arm: Arm) -> Reference:
     """Return the reference of a table, or one that is given as it is, checked against the arm and its limits."""
     if isinstance(given, str | Path):
         return _possible(read_reference(given, arm.n), arm, f"{given}: the reference")
@@ -67,7 +67,7 @@ def _possible(reference: Reference, arm: Arm, what: str) -> Reference:
         if q[:, j].min() < joint.lower or q[:, j].max() > joint.upper:
             raise ScenarioError(
                 f"{what}: joint {j + 1} would go from {q[:, j].min():.3g} to {q[:, j].max():.3g}; its limits are "
-                f" {joint.lower:.3g} to {joint.upper:.3g}"
+                f"{joint.lower:.3g} to {joint.upper:.3g}"
             )
     return reference
 

@@ -15,7 +15,7 @@ from msgspec.structs import asdict, replace
 
 from armloop.drake.control.controllers import LISTED, REGISTRY
 from armloop.drake.control.pid import PidGains
-from armloop.drake.control.reference import Motion
+from armloop.drake.control.reference import ReferenceLike
 from armloop.drake.control.scenario_types import Pickup, Plant, TrackingScenario, Wear
 from armloop.drake.experiments.collection import CollectionPlan
 from armloop.drake.experiments.scenario_files import beside, entry, per_joint, read, scenario_entry
@@ -125,7 +125,7 @@ def load_plan(name: str) -> CollectionPlan:
 def load_tracking(
     spec: str | Path,
     arm: str | Path | Arm | None = None,
-    motion: str | Path | Motion | None = None,
+    motion: str | Path | ReferenceLike | None = None,
 ) -> TrackingScenario:
     """Return a tracking scenario by its built-in name or the path of its YAML file.
 
