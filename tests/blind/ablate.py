@@ -62,7 +62,11 @@ def _rule(name: str, without: Callable[..., Any], *places: tuple[Any, str]) -> R
 diagnosing = sys.modules["armloop.diagnosis.diagnose"]
 RULES = [
     _rule("what comes back with the motion is no event", lambda *_: False, (contacts, "_comes_back")),
-    _rule("a joint that sticks shows no event", lambda *_: False, (contacts, "_sticks")),
+    _rule(
+        "a joint that sticks shows no event of up to twice its friction",
+        lambda *_: False,
+        (contacts, "_sticks"),
+    ),
     _rule("no event beyond the trained range", lambda *_: False, (contacts, "_strays")),
     _rule("an event stands out", lambda motion, rows, level, bursts: bursts, (contacts, "_standing_out")),
     _rule("an event begins and ends in its run", lambda *_: True, (contacts, "_seen_whole")),
