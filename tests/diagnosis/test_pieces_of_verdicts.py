@@ -124,7 +124,9 @@ class TestReasons:
         """Three joints with baselines of 0.5 N·m of which twenty samples slide; the model leaves its own 0.75."""
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(tau=np.ones((50, 3)), motion=None, moving=np.ones((50, 3), dtype=bool)),
-            model=SimpleNamespace(history={}, baseline={"nrmse": [of.get("poor"), None]}),
+            model=SimpleNamespace(
+                history={}, baseline={"nrmse": [of.get("poor"), None]}, arm=SimpleNamespace(name="arm")
+            ),
             context=SimpleNamespace(load=None),
             left_by=lambda model: np.full((50, 3), model),
             rows=np.repeat(np.arange(50) < 20, 3).reshape(50, 3),
@@ -162,6 +164,18 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9]) == ([], False)
         assert self.standing(monkeypatch, [0.9, 0.5, 0.9], left=True) == ()
         assert self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3]) == (["1 18"], False)
+
+    def test_most_joints_far_above_the_baseline_are_another_arm_or_another_record(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        words, _ = self.standing(monkeypatch, [1.0, 0.9, 1.0])
+        assert words[0].startswith("2 of 3 joints leave 2 times the baseline or more") and len(words) == 3
+        assert "a log of arm with its order of joints, zeros, units and drive gains" in words[0]
+        # most, but of joints that can be judged, and one alone is no arm
+        assert self.standing(monkeypatch, [1.0, 0.9, 0.9])[0] == ["1 2"]
+        assert self.standing(monkeypatch, [1.0, None, 1.0], slides=19)[0][0].startswith("2 of 2 joints")
+        # what the verdict names is not left without an account
+        assert self.standing(monkeypatch, [1.0, 1.0, 0.9], explained=[1])[0] == ["2 2"]
 
     def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(
         self, monkeypatch: pytest.MonkeyPatch

@@ -56,7 +56,7 @@ def standing(
     slow = (creeps & samples.moving).sum(axis=0) / np.maximum(samples.moving.sum(axis=0), 1)
     slides = sliding(samples, model)
     reasons: list[str] = []
-    unknown, unexplained = False, []
+    unknown, unexplained, judged, multiples = False, [], 0, 0
     for j, part in enumerate(parts):
         reasons += _range(j, float(outside[j]), float(far[j])) + _slow(model, j, float(slow[j]))
         unknown |= bool(far[j] > NEARLY_ALL)
@@ -69,14 +69,27 @@ def standing(
             unknown = True
         of = after[j]
         ratio = np.nan if of is None else of / float(evidence.scale[j])
+        judged += 1
         if j + 1 in explained or poor or not ratio > 1:
             continue
         words, real = _multiple(part, j, ratio)
         unexplained += [j] if real else []
         if ratio >= MULTIPLE:
+            multiples += 1
             reasons.append(words)
             unknown |= real is not False
+    if multiples > max(MOSTLY * judged, 1):
+        reasons.insert(0, _all_over(model, multiples, judged))
     return Standing(reasons, merged(parts, outside), unknown, tuple(unexplained))
+
+
+def _all_over(model: ReconstructedModel, multiples: int, judged: int) -> str:
+    """A sentence on a run of which most joints leave a multiple of the baseline, whatever was found."""
+    return (
+        f"{multiples} of {judged} joints leave {MULTIPLE:g} times the baseline or more with all that was found: so much "
+        "differs from the training logs that what is named may stand for something else; check that this is a log of "
+        f"{model.arm.name} with its order of joints, zeros, units and drive gains"
+    )
 
 
 def too_still(evidence: Evidence) -> str:
