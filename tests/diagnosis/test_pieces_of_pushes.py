@@ -54,7 +54,9 @@ class TestIntervalOfAPush:
         residual = np.zeros((given.samples, 1))
         residual[slice(*of.get("true", (50, 100)))] = 3.0
         kind: Any = self.KIND
-        found = pushes._interval(evidence, residual, np.ones_like(residual), slice(*burst), kind)
+        weight = np.ones_like(residual)
+        weight[slice(*of.get("silent", (0, 0)))] = 0.0
+        found = pushes._interval(evidence, residual, weight, slice(*burst), kind)
         return found.start, found.stop
 
     def test_it_is_where_the_push_explains_most_in_and_around_the_burst(self) -> None:
@@ -66,6 +68,11 @@ class TestIntervalOfAPush:
         assert self.found((90, 98), true=(40, 150), lengths=(100, 100))[1] == 100
         assert self.found((102, 110), true=(40, 150), lengths=(100, 100))[0] == 100
 
+    def test_what_does_not_tell_of_it_is_no_part_of_it(self) -> None:
+        """Where the joint rests before and after, a push is as long as it is seen."""
+        assert self.found((60, 90), silent=(30, 65)) == (65, 100)
+        assert self.found((60, 90), silent=(85, 130)) == (50, 85)
+
     def test_its_size_is_that_of_its_middle(self) -> None:
         # the reach, but no more than a fifth, is left aside at each end: of 20 samples four
         assert self.found((90, 96), true=(90, 93)) == (90, 96)  # an instant is none
@@ -76,6 +83,28 @@ class TestIntervalOfAPush:
         # four samples are more than an instant
         assert self.found((88, 96), true=(90, 94), reach=0.0) == (90, 94)
         assert self.found((88, 96), true=(90, 93), reach=0.0) == (88, 96)
+
+
+@pytest.mark.parametrize(
+    ("silent", "start", "end"),
+    [
+        ((0, 0), 0.0, 0.0),
+        ((120, 140), 0.2, 0.0),  # the joint rests for 0.2 s before it
+        ((180, 190), 0.0, 0.1),
+        ((110, 139), 0.0, 0.0),  # it was seen just before not to be there
+        ((100, 140), 0.4, 0.0),  # since the run's start
+        ((180, 200), 0.0, 0.2),  # to its end
+    ],
+)
+def test_it_may_begin_and_end_wherever_nothing_tells_of_it(
+    silent: tuple[int, int], start: float, end: float
+) -> None:
+    samples = SimpleNamespace(motion=motion((100, 100, 100)), period=0.01, reach=0.02)
+    evidence: Any = SimpleNamespace(samples=samples)
+    tells = np.ones(300, dtype=bool)
+    tells[slice(*silent)] = False
+    found = pushes._edge_errors(evidence, slice(140, 180), tells)
+    assert found == pytest.approx([np.hypot(0.03, beside / np.sqrt(3)) for beside in (start, end)])
 
 
 class TestTrialOfAPush:

@@ -156,10 +156,11 @@ def _trial(
         return None
     size = _size(columns, y)
     error = _size_error(columns, size, y - columns @ size, pieces)
-    edge = max(evidence.samples.period, 1.5 * evidence.samples.reach)
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
-    parameters = interval(float(part.time[0]), float(part.time[-1]), edge, part.q[0], unit)
+    tells = weight[:, columns.any(axis=(0, 2))].any(axis=1)
+    errors = _edge_errors(evidence, burst, tells)
+    parameters = interval(float(part.time[0]), float(part.time[-1]), errors, part.q[0], unit)
     if kind.effect.joint is not None:
         torque = joints[kind.effect.joint - 1].torque_unit
         parameters["torque"] = Estimate(float(size[0]), float(error[0]), torque)
@@ -221,11 +222,32 @@ def _interval(evidence: Evidence, residual: Array, weight: Array, burst: slice, 
     # Half of it explains a sample as well as nothing or all does: what comes and goes smoothly counts from there.
     removed = (y**2 - (y - columns @ size) ** 2).sum(axis=1)
     running = np.concatenate([[0.0], np.cumsum(removed)])
-    # The stretch with the largest sum: up to each end, from where the running sum was least.
+    # The stretch with the largest sum: up to each end, from where the running sum was least. The shortest of equals: what
+    # does not tell of it (the joint rests, or turns round) adds nothing.
     least = np.minimum.accumulate(running)
     end = int(np.argmax(running - least))
-    start = int(np.argmin(running[: end + 1]))
+    start = end - int(np.argmin(running[end::-1]))
     return slice(near.start + start, near.start + end) if end - start >= 4 else burst
+
+
+def _edge_errors(evidence: Evidence, burst: slice, tells: Mask) -> tuple[float, float]:
+    """Standard errors of an event's start and end, s: the filter's reach, and the samples beside it that tell nothing of it.
+
+    It may have begun, or ended, at any of those as likely: the root mean square of a uniform distribution.
+
+    Args:
+        tells: (N,) samples in which a joint that feels it counts.
+    """
+    motion = evidence.samples.motion
+    run = motion.run_of(burst.start)
+    before = np.flatnonzero(tells[run.start : burst.start])
+    after = np.flatnonzero(tells[burst.stop : run.stop])
+    first = run.start + (int(before[-1]) + 1 if len(before) else 0)
+    last = burst.stop + (int(after[0]) if len(after) else run.stop - burst.stop) - 1
+    edge = max(evidence.samples.period, 1.5 * evidence.samples.reach)
+    silent = motion.time[burst.start] - motion.time[first], motion.time[last] - motion.time[burst.stop - 1]
+    start, end = (float(np.hypot(edge, beside / np.sqrt(3))) for beside in silent)
+    return start, end
 
 
 def _size(columns: Array, y: Array) -> Array:

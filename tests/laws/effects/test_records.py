@@ -92,7 +92,7 @@ def test_an_event_is_in_every_log_of_that_time_or_in_the_one_of_its_posture() ->
 
 def test_an_interval_is_what_tells_an_event_again() -> None:
     motion = runs()
-    told = interval(float(motion.time[14]), float(motion.time[16]), 0.05, motion.q[14], "rad")
+    told = interval(float(motion.time[14]), float(motion.time[16]), (0.05, 0.4), motion.q[14], "rad")
     assert np.flatnonzero(during(motion, {key: e.value for key, e in told.items()})).tolist() == [14, 15, 16]
-    assert (told["start"].std_error, told["end"].std_error) == (0.05, 0.05)
+    assert (told["start"].std_error, told["end"].std_error) == (0.05, 0.4)
     assert told["posture"].std_error == [0.0, 0.0] and told["posture"].unit == "rad"

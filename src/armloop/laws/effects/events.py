@@ -47,11 +47,13 @@ def ends_before_it_starts(parameters: Mapping[str, Any]) -> str:
     return "end must come after start" if late else ""
 
 
-def interval(start: float, end: float, error: float, posture: Array, unit: str) -> dict[str, Estimate]:
-    """The parameters by which :func:`during` knows an event."""
+def interval(
+    start: float, end: float, errors: tuple[float, float], posture: Array, unit: str
+) -> dict[str, Estimate]:
+    """The parameters by which :func:`during` knows an event; standard errors of its start and its end."""
     still = [0.0] * len(posture)
     return {
-        "start": Estimate(start, error, "s"),
-        "end": Estimate(end, error, "s"),
+        "start": Estimate(start, errors[0], "s"),
+        "end": Estimate(end, errors[1], "s"),
         "posture": Estimate([float(x) for x in posture], still, unit),
     }
