@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import bilinear, lfilter
 from synthetic import COULOMB, VISCOUS, fourier_motion, friction, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
@@ -145,3 +146,28 @@ def test_a_stuck_torque_is_left_out_where_it_was_measured() -> None:
     time = preprocess([stuck], Conditioning(8.5)).motion.time
     centres = [float(np.mean(time[~own & (np.abs(time - 8.0) < 0.5)])) for own in (plain, moved)]
     assert centres[0] - centres[1] == pytest.approx(0.2, abs=0.02)
+
+
+def shaken(seed: int, dead: float, step: float = 5e-4, stiff: float = 40.0) -> MotionLog:
+    """A run whose stiff controller answers to a coarse encoder: the noise moves the arm by the complementary sensitivity."""
+    motion = fourier_motion(40.0, 250.0, seed)
+    noise = step * np.round(motion.q / step) - motion.q
+    loop = bilinear([2 * stiff, stiff**2], [1.0, 2 * stiff, stiff**2], fs=250.0)
+    q = motion.q - lfilter(*loop, noise, axis=0)
+    v = np.gradient(q, motion.time, axis=0)
+    vdot = np.gradient(v, motion.time, axis=0)
+    tau = rigid_torque(three_axis(), q, v, vdot) + friction(v)
+    late = np.column_stack([np.interp(motion.time - dead, motion.time, x) for x in tau.T])
+    return replace(
+        measured(motion, late, seed, name=f"run {seed}"),
+        q=q + noise,
+        v=np.gradient(q + noise, motion.time, axis=0),
+    )
+
+
+@pytest.mark.parametrize("dead", [DEAD, 0.0])
+def test_noise_that_the_controller_answers_to_is_no_lag_and_hides_none(dead: float) -> None:
+    logs = [shaken(seed, dead) for seed in (1, 2, 3)]
+    late = torque_lag(logs, three_axis(), Conditioning(8.5), [np.zeros((0, 2))] * len(logs), 2.0)
+    assert late.seconds == pytest.approx(dead, abs=3 * late.std_error if dead else 0.0)
+    assert late.std_error < 0.25 * DEAD

@@ -7,6 +7,11 @@ the torques are regressed on rigid bodies and friction with memory beside their 
 the joints agree, as the mean of effects that differ by more than their standard errors say (DerSimonian and Laird,
 Controlled Clinical Trials 7, 1986; Hartung and Knapp, Statistics in Medicine 20, 2001). The blocks that judge the model in
 the end take no part.
+
+A stiff controller answers to the noise of a coarse encoder, which then is in the torque as well as in the columns, and least
+squares take what it makes of one for a lag, or hide one. The same columns of a smoother motion, in which that noise is not,
+are instruments: where these contradict least squares (Hausman, Econometrica 46, 1978), they are believed (Janot, Vandanjon
+and Gautier, IEEE Transactions on Control Systems Technology 22, 2014).
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from armloop.data.blocks import block_numbers, block_sums
+from armloop.data.blocks import block_numbers, block_sums, stretch
 from armloop.data.log import MotionLog
 from armloop.data.motion import Samples
 from armloop.data.pieces import LogSource
@@ -27,6 +32,7 @@ from armloop.data.signals import (
     FELT,
     Conditioning,
     ShortRunError,
+    as_torque,
     independent_rows,
     later,
     preprocess,
@@ -51,6 +57,8 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 _CHANCE, _ROUNDS, _FEWEST = 0.01, 4, 200
 #: At two corners it differs by no more standard errors, or by less than this part of it.
 _SURE, _ALIKE = 3.0, 0.5
+#: The lower of the two corners, and that of the motion of which instruments are made, are so much lower.
+_SLOWER = 2.0
 #: No record is out of step by more, s.
 _LONGEST = 0.1
 #: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
@@ -111,7 +119,7 @@ def torque_lag(
     found = _found(some, arm, how, left_out, block_seconds)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
-    slow = _found(some, arm, replace(how, cutoff_hz=how.cutoff_hz / 2), left_out, block_seconds)
+    slow = _found(some, arm, replace(how, cutoff_hz=how.cutoff_hz / _SLOWER), left_out, block_seconds)
     allowed = max(_SURE * float(np.hypot(found.std_error, slow.std_error)), _ALIKE * abs(found.seconds))
     return found if abs(found.seconds - slow.seconds) <= allowed else replace(found, seconds=0.0)
 
@@ -135,27 +143,49 @@ def _found(
         rows &= ~within(samples.motion.time, intervals, how.reach)[:, None]
         blocks = following + block_numbers(samples.motion, block_seconds)
         following = int(blocks[-1]) + 1
-        X: list[list[Array]] = [[] for _ in range(arm.n)]
-        for part in design.walk(samples, [list(_FRICTION)] * arm.n):
-            own = part.X[rows[part.first : part.first + len(part.X), part.joint]]
-            where = np.where(part.where < base.count, part.where, part.where + part.joint * len(_FRICTION))
-            X[part.joint].append(np.zeros((len(own), base.count + arm.n * len(_FRICTION))))
-            X[part.joint][-1][:, where] = own
-        stacked = np.concatenate([piece for pieces in X for piece in pieces])
-        parts.append(_Part(samples, rows.T, stacked, np.broadcast_to(blocks, rows.T.shape)[rows.T]))
+        slower = as_torque(replace(samples, cutoff_hz=how.cutoff_hz / _SLOWER)).motion
+        parts.append(
+            _Part(
+                samples,
+                rows.T,
+                _columns(design, samples, rows.T)[0],
+                *_columns(design, replace(samples, motion=slower), rows.T),
+                np.broadcast_to(blocks, rows.T.shape)[rows.T],
+            )
+        )
     if not parts or (sum(part.rows.sum(axis=1) for part in parts) < _FEWEST).any():
         return TorqueLag(0.0, np.inf, np.full(arm.n, np.nan))
-    lags, errors = _own(parts)
-    return TorqueLag(*_mean(lags, errors), lags)
+    plain, by_instruments = (_own(parts, instruments) for instruments in (False, True))
+    contradicted = abs(by_instruments.seconds - plain.seconds) > _SURE * by_instruments.std_error
+    return by_instruments if contradicted else plain
+
+
+def _columns(design: Design, samples: Samples, rows: Mask) -> tuple[Array, Array]:
+    """(R, p) columns of all coefficients in the rows (n, N) of each joint, and their rates."""
+    n, shared = design.arm.n, design.count
+    found: list[list[Array]] = [[] for _ in range(n)]
+    for part in design.walk(samples, [list(_FRICTION)] * n):
+        now = slice(part.first, part.first + len(part.X))
+        inside = rows[part.joint, now]
+        where = np.where(part.where < shared, part.where, part.where + part.joint * len(_FRICTION))
+        own = np.zeros((2, int(inside.sum()), shared + n * len(_FRICTION)))
+        own[0][:, where] = part.X[inside]
+        own[1][:, where] = rate_along(stretch(samples, now.start, now.stop), part.X)[inside]
+        found[part.joint].append(own)
+    X, rate = np.concatenate([piece for pieces in found for piece in pieces], axis=1)
+    return X, rate
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A log's samples with those of each joint that are regressed (n, N), and of these columns (R, p) and blocks (R,)."""
+    """A log's samples with those of each joint that are regressed (n, N), and of these columns (R, p), instruments (R, p)
+    with their rates, and blocks (R,)."""
 
     samples: Samples
     rows: Mask
     X: Array
+    Z: Array
+    rate: Array
     blocks: Index
 
     def torque(self, lag: float) -> Array:
@@ -164,27 +194,36 @@ class _Part:
         return np.stack([tau.T, rate_along(self.samples, tau).T], axis=2)[self.rows]
 
 
-def _own(parts: Sequence[_Part]) -> tuple[Array, Array]:
-    """Each joint's lag (n,) beside the coefficients of all, and its standard error, s."""
+def _own(parts: Sequence[_Part], instruments: bool) -> TorqueLag:
+    """Each joint's lag beside the coefficients of all, and their mean, by least squares or by instruments."""
     joint = np.concatenate([np.nonzero(part.rows)[0] for part in parts])
     block = np.concatenate([part.blocks for part in parts])
-    X = np.concatenate([part.X for part in parts])
-    lag, lags, errors = 0.0, np.zeros(0), np.zeros(0)
+    X, Z, along = (np.concatenate([getattr(part, name) for part in parts]) for name in ("X", "Z", "rate"))
+    p, of_joint = X.shape[1], joint[:, None] == np.arange(len(parts[0].rows))
+    found = TorqueLag(0.0, np.inf, np.zeros(0))
     size = _sizes(np.concatenate([part.torque(0.0)[:, 0] for part in parts]), joint)
     for _ in range(_ROUNDS):
+        lag = float(np.clip(found.seconds, -_LONGEST, _LONGEST))
         tau, rate = np.concatenate([part.torque(lag) for part in parts]).T / size[joint]
-        rates = np.where(joint[:, None] == np.arange(len(size)), rate[:, None], 0.0)
-        A = X / size[joint, None]
-        left = np.column_stack([tau, rates])
-        left -= A @ determined_solution(A, left)
-        inverse = np.linalg.pinv(left[:, 1:].T @ left[:, 1:])
-        steps = -inverse @ (left[:, 1:].T @ left[:, 0])
-        rest = left[:, 0] + left[:, 1:] @ steps
-        scores = np.stack([block_sums(column * rest, block) for column in left[:, 1:].T])
+        unit = size[joint, None]
+        A = seen = np.hstack([X / unit, of_joint * rate[:, None]])
+        if instruments:
+            # Two-stage least squares. The rate's own instrument is that of the torque which the others predict.
+            W = Z / unit
+            theta = determined_solution(W @ determined_solution(W, A[:, :p]), tau)
+            W = np.hstack([W, of_joint * (along / unit @ theta)[:, None]])
+            seen = W @ determined_solution(W, A)
+        rates = seen[:, p:] - seen[:, :p] @ determined_solution(seen[:, :p], seen[:, p:])
+        inverse = np.linalg.pinv(rates.T @ rates)
+        steps = -inverse @ (rates.T @ tau)
+        late = tau + A[:, p:] @ steps
+        left = late - A[:, :p] @ determined_solution(seen[:, :p], tau + seen[:, p:] @ steps)
+        scores = np.stack([block_sums(column * left, block) for column in rates.T])
         lags, errors = lag + steps, np.sqrt(np.diag(inverse @ scores @ scores.T @ inverse))
-        size = np.maximum(size * _sizes(left[:, 0], joint), LEAST)
-        lag = float(np.clip(_mean(lags, errors)[0], -_LONGEST, _LONGEST))
-    return lags, errors
+        before = tau - A[:, :p] @ determined_solution(seen[:, :p], tau)
+        size = np.maximum(size * _sizes(before, joint), LEAST)
+        found = TorqueLag(*_mean(lags, errors), lags)
+    return found
 
 
 def _sizes(x: Array, joint: Index) -> Array:
