@@ -3,7 +3,7 @@
 import numpy as np
 
 from armloop.data.motion import Motion, Samples
-from armloop.data.reversals import at_reversals, turning
+from armloop.data.reversals import at_reversals, passing, turning
 
 
 def test_a_joint_that_turns_around_does_not_rest() -> None:
@@ -53,6 +53,23 @@ def test_the_sign_counts_where_it_moves_again_and_the_time_until_then() -> None:
     # three steps of an eighth of a second are within four tenths, four are not
     motion = Motion(0.125 * np.arange(7), v, v, v, np.array([0]))
     assert np.flatnonzero(turning(motion, moving)).tolist() == [2, 3]
+
+
+def test_a_joint_that_sticks_where_it_turns_round_does_not_pass() -> None:
+    """Below 10 Hz 0.05 s are smeared on either side: it stands still for 0.03 s, and for 0.1 s."""
+    time = 0.01 * np.arange(200)
+    still = np.zeros((200, 2), dtype=bool)
+    still[100:103, 0] = still[100:110, 1] = True
+    v = np.where(still, 0.0, np.sign(time - 1.0)[:, None])
+    moving = ~still
+    moving[95:108, 0] = moving[95:115, 1] = False
+    motion = Motion(time, 0 * v, v, 0 * v, np.array([0]))
+    assert turning(motion, moving).any(axis=0).tolist() == [True, True]
+    passes = passing(Samples(motion, 0 * v, moving, 0.01, 10.0))
+    assert np.flatnonzero(passes[:, 0]).tolist() == list(range(95, 108)) and not passes[:, 1].any()
+    # below 2 Hz a quarter of a second is smeared, but what lasts longer than a turn is none
+    passes = passing(Samples(motion, 0 * v, np.abs(time - 1.0)[:, None] > [0.15, 0.25], 0.01, 2.0))
+    assert passes.any(axis=0).tolist() == [True, False]
 
 
 def test_a_tenth_of_a_second_around_a_turn_belongs_to_it() -> None:

@@ -256,7 +256,7 @@ def test_effects_are_found_one_after_the_other_until_nothing_plain_is_left(
 
     monkeypatch.setattr(reversals, "clear", clear)
     turns = np.ones((6, 2), dtype=bool)
-    monkeypatch.setattr(reversals, "turning", lambda motion, moving: turns)
+    monkeypatch.setattr(reversals, "passing", lambda samples: turns)
     motion = Motion(np.arange(6.0), *np.zeros((3, 6, 2)), np.array([0]))
     samples = Samples(motion, np.ones((6, 2)), ~turns, 1.0)
 
@@ -314,7 +314,7 @@ def test_what_is_judged_is_a_tenth_of_a_second_around_a_turn_of_what_may_count(
     kept[[3, 25], [0, 1]] = False
     rows[:7, 0] = rows[10:16, 1] = True
     independent = np.arange(N) != 8
-    monkeypatch.setattr(reversals, "turning", lambda motion, moving: turns)
+    monkeypatch.setattr(reversals, "passing", lambda samples: turns)
     monkeypatch.setattr(reversals, "independent_rows", lambda samples: independent)
     monkeypatch.setattr(reversals, "Known", SimpleNamespace(of=lambda *_: SimpleNamespace(fit=None)))
     asked: list[Any] = []

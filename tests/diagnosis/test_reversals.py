@@ -10,7 +10,7 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
-from armloop.data.reversals import at_reversals, turning
+from armloop.data.reversals import at_reversals, passing
 from armloop.data.signals import preprocess
 from armloop.diagnosis import diagnose, reversals
 from armloop.identification.scoring import residual, score
@@ -40,7 +40,7 @@ def coulomb_and_viscous(baseline: MotionLog) -> ReconstructedModel:
     bare = ReconstructedModel(three_axis(), (body,), law)
     samples = preprocess([baseline], bare.conditioning)
     rmse = score(bare, samples).moving
-    turns = turning(samples.motion, samples.moving)
+    turns = passing(samples)
     there = at_reversals(samples, turns, samples.moving | turns)
     turned = np.sqrt(np.mean(residual(bare, samples) ** 2, axis=0, where=there)).tolist()
     return replace(bare, baseline={**rmse, "worst": [2 * x for x in rmse["rmse"]], "reversals": turned})

@@ -3,7 +3,8 @@
 The torque of a joint at rest is not determined by its motion, so standstill is kept out of training, baseline and
 search, with as much around it as the filter smears. A joint that turns around is not at rest, but it passes zero
 speed, and so its reversals are kept out, too. There alone does friction with memory differ from a step of the
-direction: among samples that slide it can hardly be seen, and no model's baseline says anything of it.
+direction: among samples that slide it can hardly be seen, and no model's baseline says anything of it. A joint that
+sticks while it turns around does rest.
 
 So they are judged after the search, as a condition of their own. As no fit has seen them, what is named must be plain: it
 at least halves the joint's error there, on blocks that were not fitted, and what it removes is a noticeable torque. The
@@ -22,7 +23,7 @@ import numpy as np
 from scipy.stats import norm, t
 
 from armloop.data.blocks import block_sums
-from armloop.data.reversals import at_reversals, turning
+from armloop.data.reversals import at_reversals, passing
 from armloop.data.signals import independent_rows
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
@@ -80,7 +81,7 @@ def judge_reversals(
         kept: (N, n) samples that may count: not those of contacts, nor of joints that nothing may be named on.
     """
     samples = evidence.samples
-    turns = turning(samples.motion, samples.moving) & kept & independent_rows(samples)[:, None]
+    turns = passing(samples) & kept & independent_rows(samples)[:, None]
     turns &= ~(_never_seen(evidence) | _remembering(evidence, outcome))
     own = evidence.only(evidence.rows | turns)
     judged = at_reversals(samples, turns, own.rows & kept)

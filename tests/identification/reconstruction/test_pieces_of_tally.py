@@ -76,7 +76,7 @@ def test_squares_where_a_joint_turns_round_and_where_it_creeps(monkeypatch: pyte
         asked.append(speeds.tolist())
         return slow
 
-    monkeypatch.setattr(tally, "turning", lambda motion, moving: turns)
+    monkeypatch.setattr(tally, "passing", lambda samples: turns)
     monkeypatch.setattr(tally, "at_reversals", around)
     monkeypatch.setattr(tally, "creeping", creeping)
     model: Any = SimpleNamespace(history={"range": [[9.0, 9.0], [2.0, 3.0], [8.0, 8.0]]})

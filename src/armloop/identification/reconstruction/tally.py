@@ -10,7 +10,7 @@ import numpy as np
 from armloop.data.blocks import block_numbers
 from armloop.data.creep import creeping
 from armloop.data.motion import Samples
-from armloop.data.reversals import at_reversals, turning
+from armloop.data.reversals import at_reversals, passing
 from armloop.identification.reconstruction.data import Chunk
 from armloop.identification.reconstruction.nearest_regime import Sorter
 from armloop.identification.scoring import (
@@ -162,7 +162,7 @@ class Tally:
 
 def _places(samples: Samples, model: ReconstructedModel) -> dict[str, Mask]:
     """(N, n) samples where a joint turns round, and where it creeps."""
-    turns, ranges = turning(samples.motion, samples.moving), model.history.get("range")
+    turns, ranges = passing(samples), model.history.get("range")
     speeds = np.zeros(samples.motion.joints) if ranges is None else np.asarray(ranges[1])
     places = at_reversals(samples, turns, samples.moving | turns), creeping(samples, speeds)
     return dict(zip(PLACES, places, strict=True))
