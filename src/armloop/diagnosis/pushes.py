@@ -158,7 +158,7 @@ def _trial(
     error = _size_error(columns, size, y - columns @ size, pieces)
     joints = evidence.model.arm.joints
     unit = joints[0].position_unit if len({j.position_unit for j in joints}) == 1 else "rad or m"
-    tells = weight[:, columns.any(axis=(0, 2))].any(axis=1)
+    tells = np.asarray(weight[:, columns.any(axis=(0, 2))].any(axis=1))
     errors = _edge_errors(evidence, burst, tells)
     parameters = interval(float(part.time[0]), float(part.time[-1]), errors, part.q[0], unit)
     if kind.effect.joint is not None:
