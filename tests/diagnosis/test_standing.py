@@ -9,13 +9,13 @@ import pytest
 from synthetic import fourier_motion, measured, rigid_torque, three_axis
 
 from armloop.data.log import MotionLog
+from armloop.data.reversals import turning
 from armloop.data.signals import preprocess
 from armloop.diagnosis import contacts, diagnose
 from armloop.diagnosis.contacts import Burst, _distinct, _standing_out, _sticks, find_contacts
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.innovations import contradiction, deviations, innovations
 from armloop.diagnosis.pushes import Contact
-from armloop.diagnosis.reversals import turning
 from armloop.features.double_feature_set import Factors
 from armloop.identification.scoring import score
 from armloop.laws.effects import Estimate, effect
