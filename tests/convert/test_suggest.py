@@ -117,6 +117,20 @@ def dated(path: Path, log: MotionLog) -> Path:
     return write(path, names, [log.q, log.tau], decimal=",", stamps=STAMPS)
 
 
+def topics(path: Path, log: MotionLog) -> Path:
+    """Columns under the paths of messages and their fields, as plotting tools write them."""
+    names = [
+        "/joint_states/header/stamp",
+        *per_joint(*(f"/joint_states/joint{{}}/{c}" for c in ("position", "velocity", "effort"))),
+    ]
+    return write(path, names, [log.time, log.q, log.v, log.tau], ",")
+
+
+def in_finnish(path: Path, log: MotionLog) -> Path:
+    """A clock whose name says nothing, beside names that do."""
+    return write(path, ["aika", *per_joint("q{}", "v{}", "tau{}")], [log.time, log.q, log.v, log.tau], ",")
+
+
 def untimed(path: Path, log: MotionLog) -> Path:
     """No clock at all."""
     return write(path, per_joint("q{}", "Kraft {}"), [log.q, log.tau], ",")
@@ -136,6 +150,8 @@ TABLES = {
         "tau: columns": "[K4, K5, K6]",
         "tau: unit": "N*m",
     },
+    topics: {"time: unit": "s", "q: unit": "rad", "v: unit": "rad/s", "tau: unit": "N*m"},
+    in_finnish: {"time: unit": "s", "q: unit": "rad", "v: unit": "rad/s", "tau: unit": "N*m"},
     untimed: {"time: rate": "100", "q: unit": "rad", "tau: unit": "N*m"},
 }
 

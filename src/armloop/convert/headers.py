@@ -194,16 +194,16 @@ def unit_of(kind: str, group: Group) -> str | None:
 
 
 def time_of(columns: Sequence[str], units: Mapping_[str, str] | None = None) -> tuple[TimeMap, str]:
-    """The column of time by its name, and what is not sure of it."""
+    """The column of time by its name, if one is named so, and what is not sure of it."""
     found, units = [], units or {}
     for column in columns:
         name, unit = _split_unit(column, units)
-        # a variable inside a struct: data.time
-        words = [word for word in words_of(name.rpartition(".")[2]) if word not in _UNIT_WORDS]
+        # a variable inside a struct or a topic: data.time, /joint_states/header/stamp
+        words = [word for word in words_of(re.split(r"[./]", name)[-1]) if word not in _UNIT_WORDS]
         if words and all(word in WORDS["time"] for word in words):
             found.append((WORDS["time"].index(words[0]), column, canonical(unit, "time")))
     if not found:
-        return TimeMap(column=None, rate=None), "no column of time was recognised; say time: {rate: HZ}"
+        return TimeMap(), ""
     found.sort(key=lambda entry: entry[0])
     _, column, written = found[0]
     doubt = "" if len(found) == 1 else "also possible: " + ", ".join(entry[1] for entry in found[1:3])

@@ -23,10 +23,8 @@ def inferred(recording: Recording, joints: Sequence[str]) -> tuple[Mapping, dict
     ``joints`` are the names of the arm's. What cannot be told has the one column ``?``.
     """
     unsure: dict[str, str] = {}
-    time, doubt = time_of(list(recording.columns), recording.units)
+    time, doubt = clock_of(recording)
     seen = evidence(recording.columns, time.column, recording.starts)
-    if time.column is None:
-        time, doubt = _clock(seen, recording)
     if doubt:
         unsure["time"] = doubt
     groups = groups_of(list(recording.columns), joints, recording.units)
@@ -82,7 +80,12 @@ def alternatives(recording: Recording, mapping: Mapping) -> list[list[str]]:
     return list({frozenset(names): names for names in reversed(fit)}.values())[::-1]
 
 
-def _clock(seen: Evidence, recording: Recording) -> tuple[TimeMap, str]:
+def clock_of(recording: Recording) -> tuple[TimeMap, str]:
+    """The column of time by its name, else by its values, and what is not sure of it."""
+    time, doubt = time_of(list(recording.columns), recording.units)
+    if time.column is not None:
+        return time, doubt
+    seen = evidence(recording.columns, None, recording.starts)
     if not seen.clocks:
         return TimeMap(), "no column rises throughout; say time: {rate: HZ}"
     first, others = seen.clocks[0], seen.clocks[1:]

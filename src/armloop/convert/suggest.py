@@ -6,10 +6,11 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec.structs import replace
 
 from armloop.convert.assemble import rate_ratio
 from armloop.convert.headers import suggest
-from armloop.convert.inferred import alternatives, described, inferred
+from armloop.convert.inferred import alternatives, clock_of, described, inferred
 from armloop.convert.mapping import SCHEMA, UNSAID, Mapping, QuantityMap
 from armloop.convert.recording import Recording, some
 from armloop.convert.units import FACTORS, RATES, canonical, fitting, time_unit
@@ -29,6 +30,10 @@ def suggested(recording: Recording, arm: Arm | None) -> tuple[Mapping, dict[str,
             mapping, unsure = found.mapping, found.unsure
         else:
             mapping, unsure = inferred(recording, names)
+    if mapping.time.column is None and mapping.time.rate is None:
+        time, doubt = clock_of(recording)
+        mapping = replace(mapping, time=time)
+        unsure |= {"time": doubt} if doubt else {}
     if mapping.tau.unit is None:
         unsure["tau.unit"] = "N*m for torques, A for motor currents (then with gains, in N·m/A)"
     for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
