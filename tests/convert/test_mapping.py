@@ -9,6 +9,7 @@ from armloop.cli import main
 from armloop.convert import read_map
 from armloop.convert.headers import suggest
 from armloop.data.log import MotionLog, read_log, write_log
+from armloop.robot.arm import load_arm
 
 
 @pytest.fixture(scope="module")
@@ -166,3 +167,26 @@ def test_a_bad_map_is_told_in_a_line(tmp_path, log, capsys, case):
     )
     assert word in error
     assert not (tmp_path / "o.csv").exists()
+
+
+def test_one_unit_of_angles_for_all_joints_does_not_scale_one_that_slides(tmp_path, capsys):
+    q = np.cumsum(np.random.default_rng(3).normal(0.0, 0.01, (200, 4)), axis=0)
+    table = tmp_path / "table.csv"
+    names = ["t", *(f"{stem}{j}" for stem in ("p", "i") for j in range(1, 5))]
+    np.savetxt(
+        table,
+        np.column_stack([0.01 * np.arange(200), q, q]),
+        delimiter=",",
+        header=",".join(names),
+        comments="",
+    )
+    tau = "time: {column: t, unit: s}\ntau: {columns: 'i{1..4}', unit: N*m}\n"
+    line = ["convert", str(table), "--arm", "scara", "--map", str(tmp_path / "map.yaml"), "--out"]
+    (tmp_path / "map.yaml").write_text(tau + "q: {columns: 'p{1..4}', unit: deg}\n")
+    slides = next(joint for joint in load_arm("scara").joints if joint.kind == "prismatic")
+    assert f"{slides.name} is said to be in deg, but this joint slides" in refused(
+        [*line, str(tmp_path / "o.csv")], capsys
+    )
+    units = ", ".join("deg" if joint.kind == "revolute" else "mm" for joint in load_arm("scara").joints)
+    (tmp_path / "map.yaml").write_text(tau + f"q: {{columns: 'p{{1..4}}', unit: [{units}]}}\n")
+    assert main([*line, str(tmp_path / "o.csv")]) == 0

@@ -54,6 +54,8 @@ def part(recording: Recording, mapping: Mapping, arm: Arm | None, answers: Answe
     notes = list(recording.notes)
     order = _order(recording, mapping, arm, notes)
     n, N = len(order), recording.samples
+    if arm is not None:
+        _require_units_of(mapping, arm, order, where)
     values: dict[str, Array] = {}
     for kind, quantity in mapping.quantities().items():
         values[kind] = np.stack([_column(recording, quantity, kind, j) for j in order], axis=1)
@@ -248,6 +250,24 @@ def _order(recording: Recording, mapping: Mapping, arm: Arm | None, notes: list[
     if mapping.n != arm.n:
         raise LogError(f"{where}: has {mapping.n} joints; the arm {arm.name} has {arm.n}")
     return list(range(arm.n))
+
+
+def _require_units_of(mapping: Mapping, arm: Arm, order: list[int], where: str) -> None:
+    """Raise ``LogError`` where a unit would scale a joint that slides as an angle, or one that turns as a length.
+
+    SI units scale nothing: sources that call all of them rad mean m where a joint slides.
+    """
+    for kind, quantity in (("q", mapping.q), ("v", mapping.v)):
+        units = [] if quantity is None else quantity.units()
+        for joint, turns, source in zip(arm.joints, arm.revolute, order, strict=True):
+            unit = canonical(units[source] or "", kind) if units else None
+            if unit is None or FACTORS[kind][unit] == 1.0 or (unit in ("mm", "mm/s")) != turns:
+                continue
+            moves, wanted = ("turns", "an angle's") if turns else ("slides", "a length's")
+            raise LogError(
+                f"{where}: {kind} of {joint.name} is said to be in {unit}, but this joint {moves}; give each joint its "
+                f"own unit in a --map, unit: [..], {wanted} for this one"
+            )
 
 
 def _column(recording: Recording, quantity: QuantityMap, kind: str, j: int) -> Array:
