@@ -19,6 +19,7 @@ from armloop.data.signals import (
     preprocess,
     smooth,
     uniform_period,
+    velocity_noise,
 )
 from armloop.util.errors import LogError
 
@@ -227,6 +228,28 @@ def test_the_dead_zone_follows_the_noise():
 def test_a_joint_that_rests_never_counts_as_moving():
     log = stop_and_go(speed=0.0)
     assert not preprocess([log], TEN_HZ).moving.any()
+
+
+def test_a_joint_that_rests_to_the_last_digit_shows_no_noise_then():
+    """Of five seconds it moves for one, and the noise of its speed is seen then alone."""
+    time = np.arange(0, 5, 0.004)
+    moves = (time < 1)[:, None]
+    speed = 0.5 + 0.02 * np.random.default_rng(5).normal(size=(len(time), 1))
+    rests = MotionLog(time, 0.5 * np.minimum(time, 1.0)[:, None], np.where(moves, speed, 0.0), 1.0 * moves)
+    level = velocity_noise(rests.select(moves[:, 0]), 10.0)
+    assert level[0] > 1e-3
+    np.testing.assert_allclose(velocity_noise(rests, 10.0), level, rtol=0.3)
+    assert velocity_noise(rests.select(time > 2), 10.0)[0] == 0.0
+
+
+def test_the_noise_is_that_of_all_runs_not_of_the_longest():
+    time = np.arange(0, 4, 0.004)
+    still, moves = sines(time), sines(time[:800])
+    still = replace(still, q=0 * still.q, v=0 * still.v)
+    moves = replace(moves, v=moves.v + 0.1 * np.random.default_rng(4).normal(size=moves.v.shape))
+    both = [np.concatenate([getattr(still, key), getattr(moves, key)]) for key in ("q", "v", "tau")]
+    joined = MotionLog(np.concatenate([time, 10 + moves.time]), *both)
+    np.testing.assert_allclose(velocity_noise(joined, 10.0), velocity_noise(moves, 10.0), rtol=1e-9)
 
 
 def test_short_runs_are_dropped_and_long_ones_kept():

@@ -181,18 +181,30 @@ def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
     """(n,) standard deviation of the noise that a filter of this corner leaves in v.
 
     It is taken to be as strong below the corner as in the octave above it, where there is hardly any
-    motion; the median over the run with the most samples keeps impacts and reversals out. It is never
-    less than what rounding the recorded v leaves. Of a log without a run long enough for a filter it is zero.
+    motion; the median keeps impacts and reversals out. Where v stands still to the last digit a stuck joint shows none
+    of it, and that does not count. It is never less than what rounding the recorded v leaves. Of a log without a run
+    long enough for a filter it is zero.
     """
-    run = max(log.runs(), key=lambda run: run.stop - run.start)
-    if run.stop - run.start < FEWEST_SAMPLES:
+    from scipy.ndimage import binary_dilation
+
+    runs = [run for run in log.runs() if run.stop - run.start >= FEWEST_SAMPLES]
+    if not runs:
         return np.zeros(log.joints)
-    v, period = log.v[run], uniform_period(log.time[run])
-    octave = LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v)
-    rough = np.median(np.abs(octave), axis=0) / 0.6745
-    steps = np.abs(np.diff(v, axis=0))
-    resolution = np.min(np.where(steps > 1e-12, steps, np.inf), axis=0)
+    octaves, steps = [], []
+    for run in runs:
+        v, period = log.v[run], uniform_period(log.time[run])
+        octave = np.abs(LowPass(2 * cutoff_hz, period)(v) - LowPass(cutoff_hz, period)(v))
+        steps.append(np.abs(np.diff(v, axis=0)))
+        changes = np.vstack([steps[-1], steps[-1][-1:]]) > 1e-12
+        reach = at_least(0.5 / (cutoff_hz * period))
+        octaves.append(np.where(binary_dilation(changes, np.ones((2 * reach + 1, 1))), octave, np.nan))
+    moves = np.concatenate(octaves)
+    moves[:, np.isnan(moves).all(axis=0)] = 0.0
+    rough = np.nanmedian(moves, axis=0) / 0.6745
+    every = np.concatenate(steps)
+    resolution = np.min(np.where(every > 1e-12, every, np.inf), axis=0)
     rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)
+    period = uniform_period(log.time[max(runs, key=lambda run: run.stop - run.start)])
     return np.maximum(rough, rounding * np.sqrt(min(1.0, 2 * cutoff_hz * period)))
 
 

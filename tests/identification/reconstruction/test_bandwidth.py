@@ -63,6 +63,22 @@ def test_a_corner_that_leaves_out_short_runs_is_not_tried() -> None:
     assert choose_bandwidth([noisy, few], three_axis(), TEN_HZ).cutoff_hz <= 5.0
 
 
+def test_a_log_of_several_runs_tells_what_they_tell_as_logs() -> None:
+    """In the longest run one joint moves; that alone would tell the links apart by noise."""
+    alone = run(seed=4, seconds=20.0)
+    some = np.array([1.0, 0.0, 0.0])
+    still = replace(alone, q=alone.q * some, v=alone.v * some, tau=alone.tau * some)
+    runs = [run(5, noise=0.1, seconds=15.0), still, run(6, noise=0.1, seconds=15.0)]
+    times = np.concatenate([100.0 * k + one.time for k, one in enumerate(runs)])
+    q, v, tau = (np.concatenate([getattr(one, key) for one in runs]) for key in ("q", "v", "tau"))
+    joined = MotionLog(times, q, v, tau)
+    assert len(joined.runs()) == 3
+    apart, together = (choose_bandwidth(logs, three_axis(), TEN_HZ) for logs in (runs, [joined]))
+    assert together.cutoff_hz == apart.cutoff_hz
+    # what is no measurement is told by the log it is in
+    np.testing.assert_allclose(together.trials, apart.trials, rtol=1e-3)
+
+
 def test_runs_that_are_left_out_are_said() -> None:
     logs = [replace(run(), name="long"), replace(pieces(run(2, seconds=20.0), 0.4), name="short")]
     how = Conditioning(cutoff_hz=5.0)
@@ -328,7 +344,7 @@ class TestPieces:
         assert choose_bandwidth(named, three_axis(), TEN_HZ) == Bandwidth(10.0) and len(asked) == 5
         # one log that is no series is enough to ask for none
         monkeypatch.setattr(bandwidth, "is_time_series", lambda q, runs: q is not named[1].q)
-        monkeypatch.setattr(bandwidth, "even_selection", lambda logs: list(logs))
+        monkeypatch.setattr(bandwidth, "placed_runs", lambda logs: list(enumerate(logs)))
         asked.clear()
         assert choose_bandwidth(named, three_axis(), TEN_HZ) == Bandwidth(10.0) and not asked
 
@@ -352,7 +368,7 @@ class TestPieces:
         assert Bandwidth(5.0).suited(replace(TEN_HZ, cutoff_hz=4.0)).cutoff_hz == 4.0
         assert Bandwidth(5.0).notes() == []
 
-    def test_some_of_many_logs_are_looked_at_and_of_each_its_longest_run(
+    def test_some_of_many_logs_are_looked_at_and_of_each_some_of_its_runs(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
@@ -371,13 +387,18 @@ class TestPieces:
         time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0))
         log = MotionLog(time, q, np.ones_like(q), q)
         assert len(log.runs()) == 2
-        (one,) = bandwidth.even_selection([log])
-        assert one.q.tolist() == q[30:90].tolist()
-        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 70, 50.0, 0.0))
+        first, second = bandwidth.even_selection([log])
+        assert first.q.tolist() == q[:30].tolist() and second.q.tolist() == q[30:90].tolist()
+        monkeypatch.setattr(bandwidth, "_SAMPLES", 40)
+        (longest,) = bandwidth.even_selection([log])
+        assert longest.q.tolist() == q[30:70].tolist()
+        # what is too short for any filter is no run
+        monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
+        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 81, 50.0, 0.0))
         early = MotionLog(time, q, log.v, q)
         assert bandwidth.even_selection([early])[0].q.tolist() == q[:60].tolist()
-        several = bandwidth.even_selection([log] * 3)
-        assert [len(part.q) for part in several] == [60 // len(several)] * len(several)
+        several = bandwidth.placed_runs([log.select(slice(0, 60)), log.select(slice(0, 30))])
+        assert [(k, len(part.q)) for k, part in several] == [(0, 30), (1, 30)]
 
     def test_a_corner_stays_below_half_of_the_sample_rate(self) -> None:
         log = run(seconds=2.0)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.filters import filter_reach
-from armloop.data.log import MotionLog
+from armloop.data.log import FEWEST_SAMPLES, MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
@@ -93,7 +93,7 @@ def choose_bandwidth(
         options: how the logs are dealt into blocks, of which those held out are left aside here.
         libraries: usual filters of the libraries that are going to be regressed; ``how`` by default.
     """
-    chosen = even_selection(logs)
+    places, chosen = zip(*placed_runs(logs), strict=True)
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
     highest = highest_corner(chosen, how)
@@ -107,7 +107,7 @@ def choose_bandwidth(
         return Bandwidth(highest)
     filters = {Bandwidth(corner).suited(one) for corner in corners for one in (libraries or (how,))}
     held_out = held_out_intervals(logs, sorted(filters, key=astuple), options or Options())
-    aside = [held_out[k] for k, enough in zip(selected(logs), long, strict=True) if enough]
+    aside = [held_out[k] for k, enough in zip(places, long, strict=True) if enough]
     chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
     tables = (table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners)
@@ -151,13 +151,26 @@ def selected(logs: Sequence[LogSource]) -> list[int]:
 
 
 def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
-    """Some of the logs, evenly, that hold about so many samples as are looked at; the longest run of each."""
+    """Runs of some of the logs, evenly, that hold about so many samples as are looked at; see :func:`placed_runs`."""
+    return [run for _, run in placed_runs(logs)]
+
+
+def placed_runs(logs: Sequence[LogSource]) -> list[tuple[int, MotionLog]]:
+    """The place of its log, and a run of it: of some logs, and of the lengths of their runs, evenly.
+
+    A log may hold as many recordings, of motion as different, as many logs do: its longest run alone may not tell links
+    apart.
+    """
     picked, found = selected(logs), []
+    most = _SAMPLES // len(picked)
     for k in picked:
         log = logs[k].read()
-        longest = max(log.runs(), key=lambda run: run.stop - run.start)
-        most = _SAMPLES // len(picked)
-        found.append(log.select(slice(longest.start, min(longest.stop, longest.start + most))))
+        runs = sorted(log.runs(), key=lambda run: run.start - run.stop)
+        runs = [run for run in runs if run.stop - run.start >= FEWEST_SAMPLES] or runs[:1]
+        count = max(1, min(len(runs), int(np.ceil(len(runs) * most / max(log.samples, 1)))))
+        some = [runs[int(place)] for place in np.linspace(0, len(runs) - 1, count)]
+        for run in sorted(some, key=lambda run: run.start):
+            found.append((k, log.select(slice(run.start, min(run.stop, run.start + most)))))
     return found
 
 

@@ -40,7 +40,8 @@ def check_torques(logs: Sequence[LogSource], arm: Arm, cutoff_hz: float) -> None
     problem = Problem.of(chosen, arm, cutoff_hz)
     if problem is None:
         return
-    names = ", ".join(dict.fromkeys(log.name for log in chosen[:3])) + (", ..." if len(chosen) > 3 else "")
+    named = list(dict.fromkeys(log.name for log in chosen))
+    names = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
     plain = problem.fit(np.ones(arm.n), np.arange(arm.n))
     turned = problem.turned(plain)
     if turned:

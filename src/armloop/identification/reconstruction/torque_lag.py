@@ -43,8 +43,7 @@ from armloop.identification.reconstruction.bandwidth import (
     LEAST,
     SLIDES,
     determined_solution,
-    even_selection,
-    selected,
+    placed_runs,
 )
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.held_out import within
@@ -115,7 +114,8 @@ def torque_lag(
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
     """
-    some, left_out = even_selection(logs), [aside[k] for k in selected(logs)]
+    places, some = zip(*placed_runs(logs), strict=True)
+    left_out = [aside[k] for k in places]
     found = _found(some, arm, how, left_out, block_seconds)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
