@@ -93,7 +93,8 @@ def choose_bandwidth(
         options: how the logs are dealt into blocks, of which those held out are left aside here.
         libraries: usual filters of the libraries that are going to be regressed; ``how`` by default.
     """
-    places, chosen = zip(*placed_runs(logs), strict=True)
+    placed = placed_runs(logs)
+    chosen = [run for _, run in placed]
     if not all(is_time_series(log.q, log.runs()) for log in chosen):
         return Bandwidth(how.cutoff_hz)
     highest = highest_corner(chosen, how)
@@ -107,7 +108,7 @@ def choose_bandwidth(
         return Bandwidth(highest)
     filters = {Bandwidth(corner).suited(one) for corner in corners for one in (libraries or (how,))}
     held_out = held_out_intervals(logs, sorted(filters, key=astuple), options or Options())
-    aside = [held_out[k] for k, enough in zip(places, long, strict=True) if enough]
+    aside = [held_out[k] for (k, _), enough in zip(placed, long, strict=True) if enough]
     chosen = [log for log, enough in zip(chosen, long, strict=True) if enough]
     base = BaseParameters.of_arm(arm, rotors=True)
     tables = (table_at(chosen, arm, base, how, corner, corners, aside) for corner in corners)

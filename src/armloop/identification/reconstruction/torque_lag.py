@@ -114,8 +114,8 @@ def torque_lag(
         aside: per log, (B, 2) intervals that take no part.
         block_seconds: length of pieces whose errors are independent.
     """
-    places, some = zip(*placed_runs(logs), strict=True)
-    left_out = [aside[k] for k in places]
+    placed = placed_runs(logs)
+    some, left_out = [run for _, run in placed], [aside[k] for k, _ in placed]
     found = _found(some, arm, how, left_out, block_seconds)
     if abs(found.seconds) * how.cutoff_hz < FELT or not found.clear:
         return replace(found, seconds=0.0)
