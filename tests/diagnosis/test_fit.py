@@ -61,6 +61,26 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     assert evidence.asked == [1.0, 3.0]
 
 
+def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
+    drift: Any = effect("friction_drift", 1)
+    drift.shapes = lambda context: (1.0,)
+    X = np.random.default_rng(3).normal(size=(40, 2))
+    for ratio, nearest in ((0.2, 0.2), (-0.25, -0.25), (4.0, 0.3), (-4.0, -0.3)):
+        evidence: Any = SimpleNamespace(
+            context=None,
+            columns=lambda effect, value: X[:, None],
+            stack=lambda residual, columns: SimpleNamespace(
+                X=columns[0][:, 0], y=residual, fold=np.zeros(40, dtype=int)
+            ),
+        )
+        y = X @ [2.0, 2.0 * ratio]
+        _, beta, _, J, _ = fit._solved(fit._Problem(evidence, y, [drift]), [1.0], None)
+        law = X @ [1.0, nearest]
+        level = law @ y / (law @ law)  # least squares of what the law can be
+        assert_allclose(beta, [level, nearest * level], rtol=1e-6)
+        assert_allclose(J, [[1.0, 0.0], [0.0, 1.0] if nearest == ratio else [nearest, 0.0]])
+
+
 def test_a_nonlinear_parameter_is_not_refined_beyond_what_is_tried() -> None:
     evidence: Any = SimpleNamespace(context=None)
     for tried, inside in (((0.0,), 5.0), ((1.0, 2.0), 2.0), ((6.0, 7.0, 9.0), 6.0)):

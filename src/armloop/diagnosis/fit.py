@@ -119,6 +119,18 @@ def deviate(chi_square: float, freedom: int) -> float:
     return float(norm.isf(chance / 2)) if chance > TINY else float(np.sqrt(chi_square))
 
 
+class _Judged(NamedTuple):
+    """An effect as what it is judged by."""
+
+    effect: Effect
+
+    def start(self, beta: Array) -> Array:
+        return self.effect.start(beta)
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        return self.effect.judged(x)
+
+
 class _Problem:
     """Effects and the residual that they have to explain; the rows of the last nonlinear parameters are kept.
 
@@ -151,7 +163,8 @@ def _solved(
     for attempt in range(REFINEMENTS + 1):
         stacked, sizes = problem.rows(values)
         rows = np.ones(len(stacked.y), dtype=bool) if without is None else stacked.fold != without
-        beta, x, J = solve(Moments.of(stacked.X[rows], stacked.y[rows]), effects, sizes)
+        moments = Moments.of(stacked.X[rows], stacked.y[rows])
+        beta, x, J = solve(moments, [_Judged(effect) for effect in effects], sizes)
         better = [
             _bounded(e, evidence, e.refined(free, value))
             for e, free, value in zip(effects, x, values, strict=True)

@@ -245,6 +245,10 @@ class Effect(ABC):
         """
         return x, np.eye(len(x))
 
+    def judged(self, x: Array) -> tuple[Array, Array]:
+        """Coefficients (p,) by which a diagnosis judges free parameters x (k,), and their derivative (p, k)."""
+        return self.embed(x)
+
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
         """The scalar parameters, in their order, of free parameters x (k,): these themselves by default."""
         return tuple(x.tolist())

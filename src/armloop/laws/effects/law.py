@@ -124,6 +124,19 @@ class Law(Effect):
             full[:, along.other] = along.ratio * own
         return full
 
+    def judged(self, x: Array) -> tuple[Array, Array]:
+        """The coefficients themselves; that of de/dlog s no larger than where the first order holds.
+
+        Farther off, e and de/dlog s together are the law at no s: what they happen to span would be judged in its name.
+        """
+        given, slope = super().judged(x)
+        if self._profiled() and abs(x[1]) > self._FARTHEST * abs(x[0]):
+            ratio = self._FARTHEST * np.sign(x[0] * x[1])
+            given = given.copy()
+            given[1] = ratio * x[0]
+            slope[1, :2] = ratio, 0.0
+        return given, slope
+
     def refined(self, x: Array, shape: float) -> float:
         if not self._profiled():
             return shape
