@@ -300,6 +300,20 @@ def test_two_effects_are_told_apart(model: ReconstructedModel) -> None:
     assert answer["effects"][0]["share"] > answer["effects"][1]["share"]
 
 
+def test_friction_that_rises_while_a_joint_warms_up_is_a_level_less_what_fades(
+    model: ReconstructedModel,
+) -> None:
+    def law(motion: Motion) -> np.ndarray:
+        return on_joint(motion, 3, 0.6 * (1 - np.exp(-motion.time / 15.0)) * np.sign(motion.v[:, 2]))
+
+    answer = diagnose(model, [run(law, seed=7, seconds=60.0)]).to_dict()
+    found = {(e["effect"], e["joint"]): e["parameters"] for e in answer["effects"]}
+    assert found.keys() == {("coulomb_friction", 3), ("friction_drift", 3)}
+    check_parameters(found["coulomb_friction", 3], {"level": 0.6})
+    assert found["friction_drift", 3]["level"]["value"] == pytest.approx(-0.6, rel=0.1)
+    assert found["friction_drift", 3]["time_constant"]["value"] == pytest.approx(15.0, rel=0.2)
+
+
 def test_a_drag_with_the_cube_of_the_speed_is_not_taken_for_listed_ones(model: ReconstructedModel) -> None:
     def law(motion: Motion) -> np.ndarray:
         return on_joint(motion, 1, 0.4 * motion.v[:, 0] ** 3)

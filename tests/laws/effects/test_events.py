@@ -79,7 +79,6 @@ def test_an_event_is_of_the_log_that_stood_there_when_it_began() -> None:
 
 
 POSITIVE = {
-    "friction_drift": "level",
     "joint_spring": "stiffness",
     "load_dependent_friction": "coefficient",
     "presliding_hysteresis": "level",

@@ -1,4 +1,4 @@
-"""Friction drift: dry friction that fades as one joint warms up."""
+"""Friction drift: dry friction that changes as one joint warms up."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from armloop.laws.effects.law import Law
 class FrictionDrift(Law):
     """tau_j += f exp(-t/T) sign(v_j), t from the start of the log, each log's own.
 
+    Below zero it is friction that grows while the joint warms up: beside `coulomb_friction` of as much, f (1 - exp(-t/T)).
     A controller does not know when the joint was started: it supplies what is left once the joint is warm.
     """
 
     name = "friction_drift"
     parameters = (
-        Parameter("level", "TAU", least=0.0, positive=True),
+        Parameter("level", "TAU", least=0.0),
         Parameter("time_constant", "s", above=0.0, shape="continuous"),
     )
     law = "f exp(-t/T) sign(v)"
