@@ -10,13 +10,18 @@ import numpy as np
 
 from armloop.diagnosis.evidence import FAR, FEWEST_BLOCKS, Evidence, creep, far_outside, sliding, too_slow
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NEARLY_ALL, SIGNIFICANCE
-from armloop.identification.goodness import Parts, merged, outside_trained_range, parts_of, witness
+from armloop.identification.goodness import (
+    WORTH_A_WORD,
+    Parts,
+    merged,
+    outside_trained_range,
+    parts_of,
+    witness,
+)
 from armloop.laws.effects.events import ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import Mask
 
-#: Part of the samples outside the trained range that is worth a word.
-_WORTH_A_WORD = 0.02
 #: Fewest moving samples of a joint that has moved.
 _FEWEST = 20
 
@@ -136,7 +141,7 @@ def _uncounted(j: int, slides: Mask, strays: Mask, creeps: Mask) -> str:
 
 
 def _range(j: int, outside: float, far: float) -> list[str]:
-    if outside <= _WORTH_A_WORD:
+    if outside <= WORTH_A_WORD:
         return []
     words = f"joint {j + 1}: {outside:.0%} of the run lies outside the range the model was trained on"
     if far == 0:
@@ -146,7 +151,7 @@ def _range(j: int, outside: float, far: float) -> list[str]:
 
 
 def _slow(model: ReconstructedModel, j: int, part: float) -> list[str]:
-    if part <= _WORTH_A_WORD:
+    if part <= WORTH_A_WORD:
         return []
     speed, unit = model.history["slowest"][j], "rad/s" if model.arm.revolute[j] else "m/s"
     return [

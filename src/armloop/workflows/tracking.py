@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from armloop.data.log import write_log
+from armloop.data.motion import Motion
 from armloop.drake.experiments.collection import collect
 from armloop.drake.experiments.metrics import BAND
 from armloop.drake.experiments.scenarios import TrackingScenario, load_plan
@@ -22,8 +25,10 @@ from armloop.drake.experiments.tracking import (
 )
 from armloop.drake.tuning.loop_analysis import loop_margins
 from armloop.drake.view.live import LiveView
+from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
 from armloop.model import ReconstructedModel
+from armloop.util.doubts import warn
 from armloop.util.files import write_figure, write_json
 from armloop.util.finite import finite
 from armloop.util.progress import Progress
@@ -52,6 +57,7 @@ def run_scenario(
     """
     chosen = models_for(scenario, models, progress)
     require_use(scenario, chosen)
+    _say_extrapolation(scenario, chosen)
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
     answer = tracking_answer(scenario, results) | {"not_run": without_model(scenario, chosen)}
@@ -70,6 +76,16 @@ def run_scenario(
         write_replay(folder / "replay.html", scenario.plant.arm, results, labels=labels)
         save_made(folder, chosen, models)
     return answer, results
+
+
+def _say_extrapolation(scenario: TrackingScenario, models: Mapping[str, ReconstructedModel]) -> None:
+    """Warn of a reference that leaves, while it is scored, what the models were trained on."""
+    start, end = scenario.score
+    time = np.arange(start, end, scenario.plant.config.time_step)
+    motion = Motion(time, *scenario.reference.evaluate(time))
+    for name, model in models.items():
+        for words in extrapolated(scenario.plant.arm, motion, model.history.get("range")):
+            warn(f"{scenario.name}, model {name}: {words}; what it feeds forward there is extrapolated")
 
 
 def log_file(controller: str) -> str:

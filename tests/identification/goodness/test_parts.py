@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from synthetic import fourier_motion
 
-from armloop.data.motion import Motion, Samples
-from armloop.identification.goodness import Parts, outside_trained_range, parts_of, witness
+from armloop.data.motion import Samples
+from armloop.identification.goodness import Parts, parts_of, witness
 from armloop.identification.goodness import parts as parts_module
 from armloop.identification.goodness.split import FOLDS, Split, correlation_time, split
 from armloop.identification.reconstruction import Reconstruction
@@ -194,17 +194,6 @@ def test_correlation_time(seconds: float) -> None:
     keep = np.random.default_rng(0).random(len(place)) > 0.2  # samples at rest are missing
     found = correlation_time(noise[keep], place[keep], 10.0)
     assert found == pytest.approx(-np.log(0.2) * seconds, rel=0.25)
-
-
-def test_outside_the_trained_range() -> None:
-    motion = fourier_motion(10, 50, 0)
-    inside = [np.ptp(motion.q, axis=0) / 2, np.abs(motion.v).max(axis=0), np.abs(motion.vdot).max(axis=0)]
-    centre = (motion.q.max(axis=0) + motion.q.min(axis=0)) / 2
-    assert outside_trained_range(motion, [*inside, centre]).max() == 0
-    faster = Motion(motion.time, motion.q, motion.v * [1, 3, 1], motion.vdot, motion.starts)
-    shares = outside_trained_range(faster, [*inside, centre])
-    assert shares[1] > 0.2 and shares[0] == shares[2] == 0
-    assert outside_trained_range(motion, None).tolist() == [0, 0, 0]
 
 
 def test_a_torque_that_nothing_explains_is_said() -> None:

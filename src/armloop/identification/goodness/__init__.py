@@ -4,7 +4,18 @@ Only motions, torques and residuals come in, so that a reconstruction and the di
 measure.
 """
 
-from armloop.identification.goodness.parts import Parts, merged, outside_trained_range, parts_of, unjudged
+from armloop.identification.goodness.extrapolation import WORTH_A_WORD, extrapolated, outside_trained_range
+from armloop.identification.goodness.parts import Parts, merged, parts_of, unjudged
 from armloop.identification.goodness.witness import Witness, witness
 
-__all__ = ["Parts", "Witness", "merged", "outside_trained_range", "parts_of", "unjudged", "witness"]
+__all__ = [
+    "WORTH_A_WORD",
+    "Parts",
+    "Witness",
+    "extrapolated",
+    "merged",
+    "outside_trained_range",
+    "parts_of",
+    "unjudged",
+    "witness",
+]

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from armloop.data.blocks import block_sums
-from armloop.data.motion import Motion
 from armloop.identification.goodness.regression import left_out
 from armloop.identification.goodness.split import correlation_time, split
 from armloop.identification.goodness.witness import JointRows, Witness
-from armloop.util.arrays import TINY, Array
+from armloop.util.arrays import TINY
 from armloop.util.progress import Progress, silent
 
 #: A joint with fewer rows is not judged; how long a residual's memory may be, s.
@@ -28,8 +27,6 @@ _FEWEST, _LONGEST = 200, 20.0
 MUCH, _SURE = 0.1, 3.0
 #: What is next to nothing, of the energy.
 _LITTLE = 0.1
-#: How far beyond its range, in parts of it, a quantity still counts as inside: ranges leave out the rarest samples.
-_MARGIN = 0.05
 
 
 @dataclass(frozen=True)
@@ -137,26 +134,10 @@ def merged(parts: list[Parts], outside: Any = None) -> list[dict[str, Any]]:
     """Entries of ``joints`` as in ``diagnosis.json``.
 
     Args:
-        outside: (n,) of :func:`outside_trained_range`; left away by default.
+        outside: (n,) of :func:`.extrapolation.outside_trained_range`; left away by default.
     """
     found = [asdict(one) for one in parts]
     if outside is not None:
         for entry, share in zip(found, outside, strict=True):
             entry["outside_trained_range"] = float(share)
     return found
-
-
-def outside_trained_range(motion: Motion, ranges: Any) -> Array:
-    """(n,) part of the samples in which a joint's q, v or vdot lies beyond what the model was fitted on.
-
-    Args:
-        ranges: half ranges of q, v and vdot, then the centre of q, (4, n), as the model's history keeps them;
-            None where it keeps none, which counts as inside.
-    """
-    if ranges is None:
-        return np.zeros(motion.joints)
-    q, v, vdot, centre = np.asarray(ranges, dtype=float)
-    outside = np.abs(motion.q - centre) > (1 + _MARGIN) * q
-    for x, most in ((motion.v, v), (motion.vdot, vdot)):
-        outside |= np.abs(x) > (1 + _MARGIN) * most
-    return np.asarray(outside.mean(axis=0))
