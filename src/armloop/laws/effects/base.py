@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -118,6 +119,12 @@ class Context:
     load: Array | None = None
     predict: Callable[[Motion], Array] | None = None
     predicted: Array | None = None
+
+    @cached_property
+    def unfaulty(self) -> Array:
+        """(N, n) the known model's torque on this motion, without sensor faults."""
+        assert self.predict is not None
+        return self.predict(self.motion)
 
 
 class Body(NamedTuple):

@@ -49,9 +49,9 @@ class EncoderOffset(Effect):
         return self._shifted(context, number(parameters["offset"])) - self._shifted(context, 0.0)
 
     def _shifted(self, context: Context, offset: float) -> Array:
-        assert context.predict is not None
         if offset == 0.0:
-            return context.predict(context.motion)
+            return context.unfaulty
+        assert context.predict is not None
         q = np.array(context.motion.q)
         q[:, self.index] -= offset
         return context.predict(replace(context.motion, q=q))
