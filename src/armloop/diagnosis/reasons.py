@@ -192,7 +192,8 @@ def _multiple(part: Parts, j: int, ratio: float) -> tuple[str, bool | None]:
         )
     if part.separated and left + error <= much:
         return (
-            f"{size}, but nothing in it can be predicted from the motion: noise, or what happened once",
+            f"{size}, but a regression on the motion predicts little of it on blocks left out: noise, what happened once, "
+            "or what this run shows too seldom",
             False,
         )
     return f"{size}; whether it can be predicted from the motion, this run does not tell", None
