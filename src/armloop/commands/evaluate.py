@@ -26,17 +26,13 @@ def run(options: Evaluate) -> None:
 
     model, logs = model_and_logs(options)
     # here, for it needs what takes longer to import than a fault of the input to be told
-    from armloop.identification.goodness import extrapolated
     from armloop.identification.validation.misrecorded import misrecorded
 
     require_different(logs)
     say_beyond_limits(model.arm, logs)
     samples = preprocess(logs, model.conditioning)
-    doubts = extrapolated(model.arm, samples.motion, model.history.get("range"))
     if wrong := misrecorded(model, samples):
-        doubts.insert(0, wrong)
-    for words in doubts:
-        warn(f"{', '.join(log.name for log in logs)}: {words}")
+        warn(f"{', '.join(log.name for log in logs)}: {wrong}")
     result = score(model, samples)
     if options.json:
         print_json(result.to_dict())
