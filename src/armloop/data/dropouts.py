@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
-from armloop.util.arrays import TINY, Array, Index, stretches
+from armloop.util.arrays import PER_MEDIAN, TINY, Array, Index, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
 _SPIKE, _BACK = 15.0, 0.3
@@ -219,7 +219,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
     # what a step is beside the steps around it: a joint that moves fast makes large ones
     trend = np.concatenate([steps[:_AWAY], 0.5 * (steps[: -2 * _AWAY] + steps[2 * _AWAY :]), steps[-_AWAY:]])
     size = np.abs(steps - trend)
-    usual = max(float(np.median(size)) / 0.6745, 0.5 * resolution)
+    usual = max(PER_MEDIAN * float(np.median(size)), 0.5 * resolution)
     large = np.flatnonzero(size > 0.5 * _SPIKE * usual)
     # a spike makes two large steps, and some three to either side
     if len(large) == 0 or len(large) > 8 * _RARE * len(x):
@@ -230,7 +230,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
         for k in large[np.isin(large + width, large)].tolist():
             near = np.r_[steps[max(0, k - _BESIDE) : k], steps[k + width + 1 : k + width + 1 + _BESIDE]]
             slope = float(np.median(near))
-            least = max(usual, float(np.median(np.abs(near - slope))) / 0.6745)
+            least = max(usual, PER_MEDIAN * float(np.median(np.abs(near - slope))))
             up, down = steps[k] - slope, steps[k + width] - slope
             height = min(abs(up), abs(down))
             away = abs(x[k + width + 1] - x[k] - (width + 1) * slope)
@@ -261,7 +261,7 @@ def _stuck(log: Recorded, j: int, cut: list[tuple[float, float]]) -> list[tuple[
     part = min(len(still) / float((~same).sum()), 1 - 1e-9)
     # so many equal steps one after the other come about by chance nowhere in the column
     fewest = max(_FEWEST, int(np.ceil(np.log(_CHANCE / len(x)) / np.log(part))))
-    jump = 0.0 if part < _NEVER else _JUMP * float(np.median(np.abs(steps[~same]))) / 0.6745
+    jump = 0.0 if part < _NEVER else _JUMP * PER_MEDIAN * float(np.median(np.abs(steps[~same])))
     found = []
     for first, last in still.tolist():
         if last - first < fewest:

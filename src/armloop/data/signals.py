@@ -20,7 +20,7 @@ from armloop.data.filters import INDEPENDENT, SMEAR, WIDER, LowPass, at_least, f
 from armloop.data.log import FEWEST_SAMPLES, MotionLog, recorded
 from armloop.data.motion import Motion, Samples
 from armloop.data.recorded import Recorded
-from armloop.util.arrays import Array, Mask
+from armloop.util.arrays import PER_MEDIAN, Array, Mask
 from armloop.util.errors import LogError
 
 #: A run lasts at least so many times as long as the filter reaches; two of them are cut off at its ends.
@@ -200,7 +200,7 @@ def velocity_noise(log: MotionLog, cutoff_hz: float) -> Array:
         octaves.append(np.where(binary_dilation(changes, np.ones((2 * reach + 1, 1))), octave, np.nan))
     moves = np.concatenate(octaves)
     moves[:, np.isnan(moves).all(axis=0)] = 0.0
-    rough = np.nanmedian(moves, axis=0) / 0.6745
+    rough = PER_MEDIAN * np.nanmedian(moves, axis=0)
     every = np.concatenate(steps)
     resolution = np.min(np.where(every > 1e-12, every, np.inf), axis=0)
     rounding = np.where(np.isfinite(resolution), resolution, 0.0) / np.sqrt(12)

@@ -148,8 +148,8 @@ def _found(
             _Part(
                 samples,
                 rows.T,
-                _columns(design, samples, rows.T)[0],
-                *_columns(design, replace(samples, motion=slower), rows.T),
+                _columns(design, samples, rows.T),
+                _columns(design, replace(samples, motion=slower), rows.T, rates=True),
                 np.broadcast_to(blocks, rows.T.shape)[rows.T],
             )
         )
@@ -160,32 +160,31 @@ def _found(
     return by_instruments if contradicted else plain
 
 
-def _columns(design: Design, samples: Samples, rows: Mask) -> tuple[Array, Array]:
-    """(R, p) columns of all coefficients in the rows (n, N) of each joint, and their rates."""
+def _columns(design: Design, samples: Samples, rows: Mask, rates: bool = False) -> Array:
+    """(R, p) columns of all coefficients in the rows (n, N) of each joint; with their rates (2, R, p)."""
     n, shared = design.arm.n, design.count
     found: list[list[Array]] = [[] for _ in range(n)]
     for part in design.walk(samples, [list(_FRICTION)] * n):
         now = slice(part.first, part.first + len(part.X))
         inside = rows[part.joint, now]
         where = np.where(part.where < shared, part.where, part.where + part.joint * len(_FRICTION))
-        own = np.zeros((2, int(inside.sum()), shared + n * len(_FRICTION)))
-        own[0][:, where] = part.X[inside]
-        own[1][:, where] = rate_along(stretch(samples, now.start, now.stop), part.X)[inside]
+        both = [part.X] + ([rate_along(stretch(samples, now.start, now.stop), part.X)] if rates else [])
+        own = np.zeros((len(both), int(inside.sum()), shared + n * len(_FRICTION)))
+        own[:, :, where] = np.stack(both)[:, inside]
         found[part.joint].append(own)
-    X, rate = np.concatenate([piece for pieces in found for piece in pieces], axis=1)
-    return X, rate
+    X = np.concatenate([piece for pieces in found for piece in pieces], axis=1)
+    return X if rates else np.asarray(X[0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A log's samples with those of each joint that are regressed (n, N), and of these columns (R, p), instruments (R, p)
-    with their rates, and blocks (R,)."""
+    """A log's samples with those of each joint that are regressed (n, N), and of these columns (R, p), instruments with
+    their rates (2, R, p), and blocks (R,)."""
 
     samples: Samples
     rows: Mask
     X: Array
     Z: Array
-    rate: Array
     blocks: Index
 
     def torque(self, lag: float) -> Array:
@@ -198,7 +197,9 @@ def _own(parts: Sequence[_Part], instruments: bool) -> TorqueLag:
     """Each joint's lag beside the coefficients of all, and their mean, by least squares or by instruments."""
     joint = np.concatenate([np.nonzero(part.rows)[0] for part in parts])
     block = np.concatenate([part.blocks for part in parts])
-    X, Z, along = (np.concatenate([getattr(part, name) for part in parts]) for name in ("X", "Z", "rate"))
+    X, (Z, along) = (
+        np.concatenate(x, axis=-2) for x in zip(*((part.X, part.Z) for part in parts), strict=True)
+    )
     p, of_joint = X.shape[1], joint[:, None] == np.arange(len(parts[0].rows))
     found = TorqueLag(0.0, np.inf, np.zeros(0))
     size = _sizes(np.concatenate([part.torque(0.0)[:, 0] for part in parts]), joint)
@@ -213,14 +214,15 @@ def _own(parts: Sequence[_Part], instruments: bool) -> TorqueLag:
             theta = determined_solution(W @ determined_solution(W, A[:, :p]), tau)
             W = np.hstack([W, of_joint * (along / unit @ theta)[:, None]])
             seen = W @ determined_solution(W, A)
-        rates = seen[:, p:] - seen[:, :p] @ determined_solution(seen[:, :p], seen[:, p:])
+        # The rates are freed of all else (Frisch-Waugh-Lovell).
+        theta = determined_solution(seen[:, :p], np.column_stack([tau, seen[:, p:]]))
+        rates = seen[:, p:] - seen[:, :p] @ theta[:, 1:]
         inverse = np.linalg.pinv(rates.T @ rates)
         steps = -inverse @ (rates.T @ tau)
-        late = tau + A[:, p:] @ steps
-        left = late - A[:, :p] @ determined_solution(seen[:, :p], tau + seen[:, p:] @ steps)
+        before = tau - A[:, :p] @ theta[:, 0]
+        left = before + (A[:, p:] - A[:, :p] @ theta[:, 1:]) @ steps
         scores = np.stack([block_sums(column * left, block) for column in rates.T])
         lags, errors = lag + steps, np.sqrt(np.diag(inverse @ scores @ scores.T @ inverse))
-        before = tau - A[:, :p] @ determined_solution(seen[:, :p], tau)
         size = np.maximum(size * _sizes(before, joint), LEAST)
         found = TorqueLag(*_mean(lags, errors), lags)
     return found
