@@ -95,3 +95,10 @@ def measured(motion: Motion, tau: Array, seed: int, noise: float = 0.01, name: s
     q = motion.q + 1e-5 * rng.normal(size=tau.shape)
     v = motion.v + 1e-3 * rng.normal(size=tau.shape)
     return MotionLog(motion.time, q, v, tau, name=name)
+
+
+def sines(time: np.ndarray, hz: tuple[float, ...] = (0.7, 2.0)) -> MotionLog:
+    """A log of one sine per joint, whose torque repeats the velocity; amplitude 1 rad."""
+    w = 2 * np.pi * np.array(hz)
+    phase = np.multiply.outer(time, w)
+    return MotionLog(time, np.sin(phase), w * np.cos(phase), w * np.cos(phase), name="sines")

@@ -368,38 +368,6 @@ class TestPieces:
         assert Bandwidth(5.0).suited(replace(TEN_HZ, cutoff_hz=4.0)).cutoff_hz == 4.0
         assert Bandwidth(5.0).notes() == []
 
-    def test_some_of_many_logs_are_looked_at_and_of_each_some_of_its_runs(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
-        nothing: Any = [SimpleNamespace(samples=0)] * 2
-        assert bandwidth.selected(nothing) == [0, 1]
-        for each, picked in (
-            (60, [0]),
-            (59, [0, 9]),
-            (30, [0, 9]),
-            (10, [0, 1, 3, 5, 7, 9]),
-            (6, list(range(10))),
-        ):
-            logs: Any = [SimpleNamespace(samples=each)] * 10
-            assert bandwidth.selected(logs) == picked
-        q = 0.01 * np.arange(100.0)[:, None]
-        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 30, 50.0, 0.0))
-        log = MotionLog(time, q, np.ones_like(q), q)
-        assert len(log.runs()) == 2
-        first, second = bandwidth.even_selection([log])
-        assert first.q.tolist() == q[:30].tolist() and second.q.tolist() == q[30:90].tolist()
-        monkeypatch.setattr(bandwidth, "_SAMPLES", 40)
-        (longest,) = bandwidth.even_selection([log])
-        assert longest.q.tolist() == q[30:70].tolist()
-        # what is too short for any filter is no run
-        monkeypatch.setattr(bandwidth, "_SAMPLES", 60)
-        time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 81, 50.0, 0.0))
-        early = MotionLog(time, q, log.v, q)
-        assert bandwidth.even_selection([early])[0].q.tolist() == q[:60].tolist()
-        several = bandwidth.placed_runs([log.select(slice(0, 60)), log.select(slice(0, 30))])
-        assert [(k, len(part.q)) for k, part in several] == [(0, 30), (1, 30)]
-
     def test_a_corner_stays_below_half_of_the_sample_rate(self) -> None:
         log = run(seconds=2.0)
         bandwidth.check_nyquist([log], 49.99)

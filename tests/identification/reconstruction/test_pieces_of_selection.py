@@ -409,22 +409,6 @@ class TestCorners:
         with pytest.raises(LogError, match=r"50 Hz is not below 50 Hz, half of the 100 samples a second"):
             bandwidth.check_nyquist([self.log(0.01)], 50.0)
 
-    @pytest.mark.parametrize(
-        ("count", "samples", "picked"),
-        [
-            (3, 10, [0, 1, 2]),
-            (5, 60_000, [0]),
-            (5, 20_000, [0, 2, 4]),
-            (1, 90_000, [0]),
-            (9, 15_000, [0, 2, 5, 8]),
-        ],
-    )
-    def test_some_logs_evenly(self, count: int, samples: int, picked: list[int]) -> None:
-        logs = [self.log(0.01, samples) for _ in range(count)]
-        assert bandwidth.selected(logs) == picked
-        each = bandwidth.even_selection(logs)
-        assert [log.rows for log in each] == [slice(0, min(samples, 60_000 // len(picked)))] * len(picked)
-
     def test_a_library_keeps_its_corner_where_it_is_lower(self) -> None:
         found = bandwidth.Bandwidth(5.0, ((10.0, 0.5), (5.0, 0.3)))
         assert found.suited(Conditioning(cutoff_hz=9.5)).cutoff_hz == 4.5  # a tenth below

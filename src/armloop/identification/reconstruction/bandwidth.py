@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.filters import filter_reach
-from armloop.data.log import FEWEST_SAMPLES, MotionLog
+from armloop.data.log import MotionLog
 from armloop.data.motion import Motion
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
@@ -25,6 +25,7 @@ from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.held_out import held_out_intervals, within
 from armloop.identification.reconstruction.options import Options
 from armloop.identification.reconstruction.projected import RIDGE
+from armloop.identification.reconstruction.systematic_sample import even_selection, placed_runs, selected
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
 from armloop.util.errors import LogError
@@ -38,8 +39,8 @@ _AS_GOOD = 1.02
 _BELOW = 0.9
 #: A corner is at most so many times the sample rate; the Nyquist rate is half of it.
 _OF_RATE = 0.4
-#: Samples read, rows regressed (one a joint and instant), length of the blocks, s, and rows from which on a joint counts.
-_SAMPLES, _ROWS, _BLOCK, _FEWEST = 60_000, 9_000, 1.0, 100
+#: Rows regressed (one a joint and instant), length of the blocks, s, and rows from which on a joint counts.
+_ROWS, _BLOCK, _FEWEST = 9_000, 1.0, 100
 #: A corner may leave out such a part of the samples more than the highest does.
 _MISSED = 0.05
 #: Part of a joint's largest speed from which on it is judged, and the speed at which Coulomb friction fades in.
@@ -142,37 +143,6 @@ def check_nyquist(logs: Sequence[LogSource], cutoff_hz: float) -> None:
                 f"log {log.name}: a cutoff of {cutoff_hz:g} Hz is not below {0.5 / log.period:.4g} Hz, half of the "
                 f"{1 / log.period:.4g} samples a second; give a lower one, or 0 for no filter"
             )
-
-
-def selected(logs: Sequence[LogSource]) -> list[int]:
-    """Some of the logs, evenly, that hold about so many samples as are looked at."""
-    total = sum(log.samples for log in logs)
-    count = max(1, min(len(logs), int(np.ceil(len(logs) * _SAMPLES / max(total, 1)))))
-    return [int(k) for k in np.linspace(0, len(logs) - 1, count)]
-
-
-def even_selection(logs: Sequence[LogSource]) -> list[MotionLog]:
-    """Runs of some of the logs, evenly, that hold about so many samples as are looked at; see :func:`placed_runs`."""
-    return [run for _, run in placed_runs(logs)]
-
-
-def placed_runs(logs: Sequence[LogSource]) -> list[tuple[int, MotionLog]]:
-    """The place of its log, and a run of it: of some logs, and of the lengths of their runs, evenly.
-
-    A log may hold as many recordings, of motion as different, as many logs do: its longest run alone may not tell links
-    apart.
-    """
-    picked, found = selected(logs), []
-    most = _SAMPLES // len(picked)
-    for k in picked:
-        log = logs[k].read()
-        runs = sorted(log.runs(), key=lambda run: run.start - run.stop)
-        runs = [run for run in runs if run.stop - run.start >= FEWEST_SAMPLES] or runs[:1]
-        count = max(1, min(len(runs), int(np.ceil(len(runs) * most / max(log.samples, 1)))))
-        some = [runs[int(place)] for place in np.linspace(0, len(runs) - 1, count)]
-        for run in sorted(some, key=lambda run: run.start):
-            found.append((k, log.select(slice(run.start, min(run.stop, run.start + most)))))
-    return found
 
 
 @dataclass(frozen=True, eq=False)

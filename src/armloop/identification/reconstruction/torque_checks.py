@@ -18,9 +18,10 @@ import numpy as np
 
 from armloop.data.pieces import LogSource
 from armloop.data.plausibility import is_time_series
-from armloop.identification.reconstruction.bandwidth import determined_solution, even_selection
+from armloop.identification.reconstruction.bandwidth import determined_solution
 from armloop.identification.reconstruction.plain_fits import FAR, GOOD, Fit, PlainFits
 from armloop.identification.reconstruction.readings import meant
+from armloop.identification.reconstruction.systematic_sample import even_selection
 from armloop.robot.arm import Arm
 from armloop.util.errors import LogError
 

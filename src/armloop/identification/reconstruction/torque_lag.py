@@ -43,11 +43,11 @@ from armloop.identification.reconstruction.bandwidth import (
     LEAST,
     SLIDES,
     determined_solution,
-    placed_runs,
 )
 from armloop.identification.reconstruction.design import Design
 from armloop.identification.reconstruction.held_out import within
 from armloop.identification.reconstruction.shared import FRICTION, sliding_rows
+from armloop.identification.reconstruction.systematic_sample import placed_runs
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array, Index, Mask
