@@ -38,7 +38,8 @@ def test_some_of_many_logs_are_looked_at_and_of_each_some_of_its_runs(
     monkeypatch.setattr(systematic_sample, "_SAMPLES", 60)
     time = 0.01 * (np.arange(100.0) + np.where(np.arange(100) >= 81, 50.0, 0.0))
     early = MotionLog(time, q, log.v, q)
-    assert systematic_sample.even_selection([early])[0].q.tolist() == q[:60].tolist()
+    (alone,) = systematic_sample.even_selection([early])
+    assert alone.q.tolist() == q[:60].tolist()
     several = systematic_sample.placed_runs([log.select(slice(0, 60)), log.select(slice(0, 30))])
     assert [(k, len(part.q)) for k, part in several] == [(0, 30), (1, 30)]
 
