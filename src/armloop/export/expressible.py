@@ -16,7 +16,7 @@ from armloop.dynamics import ModelEquations, coefficients, training_range, visco
 from armloop.dynamics.consistent import ConsistentInertia, consistent_inertia
 from armloop.features.rigid_body import full_columns
 from armloop.laws.effects.base import number
-from armloop.laws.effects.gravity_tilt import tilted_gravity
+from armloop.laws.effects.gravity_tilt import tilted_gravity, with_first_moment
 from armloop.laws.effects.payload import link_parameters
 from armloop.model import ReconstructedModel
 from armloop.model.components import RigidBody
@@ -100,6 +100,7 @@ def said(model: ReconstructedModel, *, nearest_friction: bool = True) -> Said:
             rotors[joint] += number(p["inertia"])
         elif name == "gravity_tilt":
             gravity = tilted_gravity(gravity, number(p["roll"]), number(p["pitch"]))
+            links = with_first_moment(links, p)
         elif name == "joint_spring":
             k, q0 = number(p["stiffness"]), number(p["rest"])
             total = stiffness[joint] + k

@@ -110,6 +110,14 @@ def test_gravity_tilt(arm, healthy):
     check(difference, change @ nominal_parameters(arm), v)
 
 
+def test_a_plant_has_the_first_moment_of_its_links_already(arm):
+    tilt = {"roll": 0.08, "pitch": -0.05}
+    given, nothing = ({**tilt, "first_moment": [x, 0.0, 0.0]} for x in (0.2, 0.0))
+    realise(arm, [UndeclaredEffect("gravity_tilt", None, nothing)])
+    with pytest.raises(ScenarioError, match="leave it out"):
+        realise(arm, [UndeclaredEffect("gravity_tilt", None, given)])
+
+
 def test_payload_mass_and_centre_are_exact(arm, healthy):
     mass, com = 0.6, np.array([0.03, 0.02, -0.04])
     difference, q, v, vdot = added_torque(

@@ -11,11 +11,12 @@ from synthetic import fourier_motion
 
 from armloop.data.motion import Motion
 from armloop.laws.effects import Context, Estimate, effect
+from armloop.laws.effects.gravity_tilt import unshown_axes
 from armloop.laws.effects.payload import Payload
 from armloop.regression.embedded import solve
 from armloop.regression.moments import Moments
 from armloop.robot.arm import Arm
-from armloop.robot.kinematics import link_motion
+from armloop.robot.kinematics import link_motion, regressor
 
 
 def potential_energy(
@@ -135,9 +136,44 @@ def test_a_tilt_is_found_from_its_columns(context):
     columns = tilt.columns(context, 0.0)
     moments = Moments.of(columns.reshape(-1, columns.shape[2]), tilt.torque(context, TILT).ravel())
     x = solve(moments, [tilt], [columns.shape[2]])[1][0]
-    found = tilt.estimates(context.arm, x, np.zeros((2, 2)), 0.0)
+    found = tilt.estimates(context.arm, x, np.zeros((4, 4)), 0.0)
     for key, value in TILT.items():
         assert found[key].value == pytest.approx(value, rel=1e-4)
+    assert found["first_moment"].value == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_on_a_vertical_axis_a_tilt_is_found_with_the_first_moment_that_a_level_arm_hides(context):
+    """The model, which knows a level arm alone, has another; its tilt is right nevertheless."""
+    tilt, moment = effect("gravity_tilt", None), np.array([0.3, -0.2, 0.0])
+    truly = {**TILT, "first_moment": (0.5 * moment).tolist()}
+    other = np.array(context.inertial)
+    other[1:4] -= 0.5 * moment
+    level = regressor(context.arm, context.motion.q, context.motion.v, context.motion.vdot)
+    np.testing.assert_allclose(level @ other, level @ context.inertial, atol=1e-9)
+    unknowing = replace(context, inertial=other)
+    columns = tilt.columns(unknowing, 0.0)
+    moments = Moments.of(columns.reshape(-1, columns.shape[2]), tilt.torque(context, truly).ravel())
+    x = solve(moments, [tilt], [columns.shape[2]])[1][0]
+    found = tilt.estimates(context.arm, x, np.eye(4), 0.0)
+    for key, value in TILT.items():
+        assert found[key].value == pytest.approx(value, rel=1e-4)
+    assert found["first_moment"].value == pytest.approx(moment.tolist(), abs=1e-4)
+    assert found["first_moment"].std_error == pytest.approx([1.0, 1.0, 0.0])
+    known = {key: e.value for key, e in found.items()}
+    np.testing.assert_allclose(tilt.torque(unknowing, known), tilt.torque(context, truly), atol=1e-5)
+
+
+@pytest.mark.parametrize("turned", ["lying", "sliding"])
+def test_gravity_shows_the_moment_about_any_other_first_axis(turned, context):
+    arm = context.arm
+    if turned == "lying":
+        arm = replace(arm, gravity=np.array([0.0, -9.81, 0.0]))
+    else:
+        first = replace(arm.joints[0], kind="prismatic")
+        arm = replace(arm, joints=(first, *arm.joints[1:]))
+    assert unshown_axes(context.arm).any() and not unshown_axes(arm).any()
+    found = effect("gravity_tilt", None).estimates(arm, np.zeros(4), np.zeros((4, 4)), 0.0)
+    assert set(found) == {"roll", "pitch"}
 
 
 def test_the_words_say_in_which_frame_the_centre_is():

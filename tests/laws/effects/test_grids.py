@@ -233,17 +233,23 @@ def test_a_loads_centre_is_within_reach_of_the_flange() -> None:
     assert farthest(replace(arm, com=stub, X_PF=frames)) == pytest.approx(0.15, abs=0.011)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_tilts_torque_is_its_columns_times_what_the_angles_make_of_gravity(seed: int) -> None:
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.81), (3.0, -5.0, -8.0), (-4.0, 0.0, 0.0)])
+def test_a_tilts_torque_is_its_columns_times_what_the_angles_make_of_gravity(
+    gravity: tuple[float, ...],
+) -> None:
+    """Gravity down, along all three axes, as of a base that hangs on a wall, and along a turned first axis."""
+    rng = np.random.default_rng(0)
     given = context(0.2)
     given.motion.q[:] = rng.uniform(-2, 2, given.motion.q.shape)
-    # gravity along all three axes: a base that hangs on a wall
-    arm = replace(an_arm(), gravity=np.array([3.0, -5.0, -8.0]))
+    arm = replace(an_arm(), gravity=np.array(gravity))
+    if not gravity[2]:
+        arm = replace(arm, axis=np.vstack([[1.0, 0.0, 0.0], arm.axis[1:]]))
     given = replace(given, arm=arm, inertial=nominal_parameters(arm))
-    tilt, angles = effect("gravity_tilt", None), rng.uniform(-0.5, 0.5, 2)
-    beta, J = tilt.embed(angles)
-    torque = tilt.torque(given, {"roll": float(angles[0]), "pitch": float(angles[1])})
+    tilt, x = effect("gravity_tilt", None), rng.uniform(-0.5, 0.5, 4)
+    beta, J = tilt.embed(x)
+    found = tilt.estimates(arm, x, np.zeros((4, 4)), 0.0)
+    assert ("first_moment" in found) == (np.count_nonzero(gravity) == 1)
+    torque = tilt.torque(given, {key: e.value for key, e in found.items()})
     np.testing.assert_allclose(tilt.columns(given, 0.0) @ beta, torque, atol=1e-9)
-    slopes = [(tilt.embed(angles + h)[0] - tilt.embed(angles - h)[0]) / 2e-6 for h in 1e-6 * np.eye(2)]
+    slopes = [(tilt.embed(x + h)[0] - tilt.embed(x - h)[0]) / 2e-6 for h in 1e-6 * np.eye(4)]
     np.testing.assert_allclose(J.T, slopes, atol=1e-8)

@@ -118,7 +118,7 @@ class Realisation:
 def realise(arm: Arm, effects: Effects) -> Realisation:
     """Turn effects into what the plant of `arm` must be given; equal effects add up.
 
-    Raises `ScenarioError` when a joint number is not one of the arm's.
+    Raises `ScenarioError` when a joint number is not one of the arm's, or an effect has what the plant has already.
     """
     made = Realisation(np.zeros(arm.n), np.zeros(arm.n))
     for given in sorted(effects, key=lambda each: effect_kind(each.name).fault_order):
@@ -133,6 +133,10 @@ def realise(arm: Arm, effects: Effects) -> Realisation:
             ball = p.get("own_inertia")
             made.payloads.append((float(p["mass"]), com, None if ball is None else float(ball)))
         elif isinstance(kind, GravityTilt):
+            if np.any(p.get("first_moment", 0.0)):
+                raise ScenarioError(
+                    "effect gravity_tilt: first_moment is what models lack; the plant's links have it: leave it out"
+                )
             made.R_WB = made.R_WB @ base_rotation(number(p["roll"]), number(p["pitch"]))
         elif isinstance(kind, ExternalContact):
             made.contacts.append((float(p["start"]), float(p["end"]), np.asarray(p["force"], dtype=float)))

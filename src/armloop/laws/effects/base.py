@@ -161,7 +161,8 @@ class Effect(ABC):
         rubs: whether it is friction of one joint and nothing else, as the friction selection of a reconstruction has it.
         periodic: whether its shape is a number of cycles per revolution of its joint.
         fault_order: of sensors: a record is falsified by the lower ones first.
-        nested: how many of its coefficients, the last, are all of another listed law: it is there if the others are.
+        nested: how many of its free parameters, the last, are all of another listed law, or nothing without the others: it
+            is there if the others are.
         alike: why another effect, by its name, can look the same on one motion, and which motion tells them apart.
         looks_like: the name of an effect whose likenesses it shares.
     """
