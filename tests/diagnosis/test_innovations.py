@@ -316,6 +316,8 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
     for load in (4.0, -8.0):
         assert level(terms, load=load) == pytest.approx(2 + 30 * CREEP + 0.5 + 0.25 * abs(load))
     assert level(terms[3:4]) == pytest.approx(0.5)
+    # at rest it holds the level that a direction fades in to, not what there is of it at a creep
+    assert level((FrictionTerm("smooth_sign", 3.0, 10 * CREEP),)) == pytest.approx(3.0)
     # what is known of it beside the model counts, too; what no direction changes does not
     stribeck = {"static_excess": Estimate(3.0, 0.1, "N*m"), "velocity": Estimate(0.2, 0.1, "rad/s")}
     spring = {"stiffness": Estimate(9.0, 0.1, "N*m/rad"), "rest": Estimate(0.5, 0.1, "rad")}

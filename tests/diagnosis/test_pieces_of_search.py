@@ -169,6 +169,7 @@ class TestOneForSeveral:
         errors: dict[str, float | None],
         found: int = 2,
         left: float = 100.0,
+        barred: tuple[Any, ...] = (),
     ) -> list[tuple[str, float]]:
         listed = [effect("payload", None), effect("transmission_coupling", 1, 2), effect("joint_spring", 3)]
         given: Any = [
@@ -189,7 +190,7 @@ class TestOneForSeveral:
         search: Any = object.__new__(searching._Search)
         search.evidence, search.progress = SimpleNamespace(model=SimpleNamespace(arm=None)), lambda text: None
         search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(1000.0)), trial=trial)
-        search.explainable = np.array([1000.0, 500.0])
+        search.explainable, search.barred = np.array([1000.0, 500.0]), barred
         monkeypatch.setattr(searching, "hypotheses", lambda arm: listed)
         monkeypatch.setattr(
             searching,
@@ -213,6 +214,15 @@ class TestOneForSeveral:
         assert self.instead(monkeypatch, {"payload": 101.0, "transmission_coupling": 10.0}) == pair
         assert self.instead(monkeypatch, {"payload": None}) == []
         assert self.instead(monkeypatch, {"payload": -9000.0}) == [("payload", 1.0)]
+
+    def test_what_is_barred_takes_nobodys_place(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """It was found not clear before: taken again, the search would bar it again, without end."""
+        payload = (effect("payload", None).place,)
+        assert self.instead(monkeypatch, {"payload": 100.0}, barred=payload) == []
+        pair = {"payload": 1.0, "transmission_coupling": 10.0}
+        assert self.instead(monkeypatch, pair, barred=payload) == [
+            ("transmission_coupling", pytest.approx(0.66))
+        ]
 
     def test_of_one_effect_nobody_asks(self, monkeypatch: pytest.MonkeyPatch) -> None:
         assert self.instead(monkeypatch, {"payload": 0.0}, found=1) == []

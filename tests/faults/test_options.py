@@ -73,6 +73,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "gains that are words": (f"{RECONSTRUCT} --drive-gains a,b,c", "--drive-gains 'a,b,c'"),
     "a gain of zero": (f"{RECONSTRUCT} --drive-gains 0,1,1", "every gain must be a positive"),
     "a gain of inf": (f"{RECONSTRUCT} --drive-gains inf,1,1", "every gain must be a positive"),
+    "a gain below zero": (f"{RECONSTRUCT} --drive-gains=-1,1,1", "turns against its joint .*armloop convert"),
     "ratios of two": (f"{RECONSTRUCT} --snr 60,40 --cutoff 0", "give three numbers in dB"),
     "a ratio of nan": (f"{RECONSTRUCT} --snr nan,40,20 --cutoff 0", "ratios in dB must be positive"),
     "ratios of a time series": (f"{RECONSTRUCT} --snr 60,40,20", "give --cutoff 0 with it"),

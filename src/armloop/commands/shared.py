@@ -88,8 +88,10 @@ def drive_gains(text: str | None) -> list[float] | None:
         return None
     gains = comma_numbers(text, "--drive-gains")
     if not all(GAINS[0] <= g <= GAINS[1] for g in gains):
+        against = "; of a drive that turns against its joint turn the column: `sign` in a mapping of armloop convert"
         raise InputError(
             f"--drive-gains {text!r:.60}: every gain must be a positive number of N·m/A, {GAINS[0]:g} to {GAINS[1]:g}"
+            + (against if any(g < 0 for g in gains) else "")
         )
     return gains
 

@@ -133,12 +133,15 @@ def contradiction(model: ReconstructedModel, motion: Motion) -> Array:
 
 
 def dry_level(evidence: Evidence, known: Sequence[AddedEffect] = ()) -> Array:
-    """(N, n) dry friction of the model and of known effects at creeping speed: half of what the direction changes."""
+    """(N, n) dry friction of the model and of known effects at creeping speed: half of what the direction changes.
+
+    Of a direction that fades in with the speed, all: what a joint at rest may hold is the level that it fades in to.
+    """
     motion, model = evidence.samples.motion, evidence.model
     try:
-        rubbing = Dynamics(model.with_effects(known)).friction
+        rubbing = Dynamics(model.with_effects(known), sharp=True).friction
     except ModelError:  # an effect of one's own that is no law of the state
-        rubbing = Dynamics(replace(model, effects=())).friction
+        rubbing = Dynamics(replace(model, effects=()), sharp=True).friction
     forth = np.full_like(motion.v, CREEP)
     one, other = (rubbing(v, evidence.context.load, motion.q, motion.elapsed) for v in (forth, -forth))
     return np.abs(one - other) / 2

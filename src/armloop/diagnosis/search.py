@@ -244,7 +244,9 @@ class _Search:
         several = _known(self.evidence, found).fit.score
         kinds = {f.effect.name for f in found}
         whole = [
-            e for e in hypotheses(self.evidence.model.arm) if e.joint is None or e.other_joint is not None
+            e
+            for e in hypotheses(self.evidence.model.arm)
+            if (e.joint is None or e.other_joint is not None) and e.place not in self.barred
         ]
         bare = self.nothing.fit.score
         for effect in whole if len(found) > 1 else []:

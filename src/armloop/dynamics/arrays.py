@@ -31,11 +31,16 @@ class Dynamics:
     ``InputError``.
     """
 
-    def __init__(self, model: ReconstructedModel, *, symmetric: bool = False) -> None:
-        """Take a model; ``symmetric`` replaces M by (M + M^T) / 2, as for sparse terms one may want."""
+    def __init__(self, model: ReconstructedModel, *, symmetric: bool = False, sharp: bool = False) -> None:
+        """Take a model.
+
+        Args:
+            symmetric: replace M by (M + M^T) / 2, as for sparse terms one may want.
+            sharp: take dry friction that fades in with the speed as all there, as a joint that sticks feels it.
+        """
         self.n = model.arm.n
-        self._one = ModelEquations(model, MATH, symmetric=symmetric)
-        self._many = ModelEquations(model, NUMPY, symmetric=symmetric)
+        self._one = ModelEquations(model, MATH, symmetric=symmetric, sharp=sharp)
+        self._many = ModelEquations(model, NUMPY, symmetric=symmetric, sharp=sharp)
 
     def mass_matrix(self, q: ArrayLike) -> Array:
         """M(q), (n, n) or (N, n, n), kg m² (kg m, kg).
