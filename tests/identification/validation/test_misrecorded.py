@@ -98,6 +98,15 @@ def test_a_reading_takes_signals_torques_and_what_slides_of_the_columns_it_is_of
     assert (made.tau == samples.tau[:, order]).all() and (made.moving == samples.moving[:, order]).all()
 
 
+def test_joints_that_an_exchange_leaves_alone_need_not_become_better() -> None:
+    left, usual = np.array([0.12, 0.52, 0.38, 0.03]), np.full(4, 0.06)
+    far_better = misrecorded_module._far_better
+    assert far_better(left, np.array([0.06, 0.02, 0.03, 0.03]), usual)
+    assert not far_better(left, np.array([0.06, 0.02, 0.03, 0.07]), usual)  # worse than on its own data
+    assert not far_better(left, np.array([0.06, 0.20, 0.03, 0.03]), usual)  # what was poor is hardly better
+    assert not far_better(left, np.array([0.06, 0.20, 0.03, 0.03]), np.full(4, 0.3))
+
+
 def test_of_currents_no_unit_of_torque_is_guessed(model: ReconstructedModel) -> None:
     log = run(5, 12.0)
     milli = replace(log, tau=1e3 * log.tau)

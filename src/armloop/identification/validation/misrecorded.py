@@ -19,9 +19,10 @@ from armloop.identification.reconstruction.readings import Reading, readings
 from armloop.identification.scoring import residual, score_errors
 from armloop.model import ReconstructedModel
 from armloop.robot.arm import Arm
-from armloop.util.arrays import Array
+from armloop.util.arrays import TINY, Array
 
-#: Mean relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must leave.
+#: A joint's relative error from which on a log is asked, and the part of each joint's, at most, that what it may mean must
+#: leave of it, but for what the model leaves on its own data as well: two columns that are exchanged leave others as good.
 _POOR, _BETTER = 0.5, 0.3
 #: A factor of all torques is far from one, or negative; one of minus one, to this ratio, is a sign.
 _SIGN = 1.3
@@ -44,14 +45,15 @@ def misrecorded(model: ReconstructedModel, samples: Samples) -> str:
         samples: preprocessed as the model's training logs were.
     """
     left = _relative(residual(model, samples), samples)
-    if not left.mean() >= _POOR:
+    if not left.max() >= _POOR:
         return ""
+    usual = _usual(model, samples)
     predicted = smooth(samples, model.predict(samples.motion))
     gain = _common_gain(samples, predicted)
-    if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples)):
+    if gain and _far_better(left, _relative(samples.tau - gain * predicted, samples), usual):
         return _factor(gain, "A" if model.in_amperes else "N·m (N)")
     for words, other in _read_otherwise(samples, model.arm):
-        if _far_better(left, _relative(residual(model, other), other)):
+        if _far_better(left, _relative(residual(model, other), other), _usual(model, other)):
             return words
     return ""
 
@@ -62,8 +64,17 @@ def _relative(error: Array, samples: Samples) -> Array:
     return np.array([x or 0.0 for x in nrmse])
 
 
-def _far_better(left: Array, other: Array) -> bool:
-    return bool((other <= _BETTER * left).all())
+def _usual(model: ReconstructedModel, samples: Samples) -> Array:
+    """(n,) what the model leaves on the worst tenth of its own baseline data, over torque; 0 where nobody knows."""
+    worst = np.resize([float(x or 0.0) for x in model.baseline.get("worst") or [0.0]], samples.motion.joints)
+    tau = np.sqrt(np.mean(samples.tau**2, axis=0, where=samples.moving | ~samples.moving.any(axis=0)))
+    return np.asarray(worst / np.maximum(tau, TINY))
+
+
+def _far_better(left: Array, other: Array, usual: Array) -> bool:
+    """Whether what was poor is explained far better, and all else as well as the model's own data if not far better."""
+    better = other <= _BETTER * left
+    return bool(better[left >= _POOR].all() and (better | (other <= usual)).all())
 
 
 def _common_gain(samples: Samples, predicted: Array) -> float:
