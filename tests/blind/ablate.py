@@ -99,14 +99,8 @@ RULES = [
     ),
     _rule("a joint that is shaken rests", lambda s, m: s.moving.copy(), (evidence, "_sliding")),
     _rule("listed effects before a law", lambda self, *_: self, (account.Account, "_or_listed")),
-    _rule("two at once", lambda self, beside: [], (search._Search, "_pair")),
-    _rule("effects are exchanged", lambda self, found: found, (search._Search, "_exchanged")),
-    _rule("one effect for several", lambda self, found: found, (search._Search, "_one_for_several")),
-    _rule(
-        "the simplest of equals",
-        lambda now, given: int(np.argmax([judgement.gain(now, x) for x in given])),
-        (search, "simplest_of_equals"),
-    ),
+    _rule("two at once", lambda self, found: iter(()), (search._Search, "_pairs")),
+    _rule("odds against every parameter", lambda e, effects: 0.0, (search, "log_prior")),
     _rule(
         "more than the worst tenth of the baseline",
         lambda e, score: np.full(len(score.rows), 1e-12),

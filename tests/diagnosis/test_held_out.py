@@ -120,24 +120,6 @@ def test_a_load_on_an_upright_slide_is_no_torque_offset(mass):
     assert found.added()[0].parameters["mass"].value == pytest.approx(mass, rel=0.05)
 
 
-def test_the_search_ends_where_what_is_added_is_taken_back(monkeypatch):
-    model = exact("three_axis")
-    motion = fourier_motion(40.0, 100.0, 3)
-    tau = rigid_torque(model.arm, motion.q, motion.v, motion.vdot) + 2 * motion.v
-    samples = preprocess([measured(motion, tau, 3)], model.conditioning)
-    evidence = Evidence.of(model, samples, hypotheses(model.arm))
-    asked = []
-
-    def taken_back(*of_search):
-        asked.append(of_search)
-        assert len(asked) < 3, "the search adds again and again what it has taken back"
-        return []
-
-    assert search(evidence, silent).found
-    monkeypatch.setattr("armloop.diagnosis.search._Search._exchanged", taken_back)
-    assert search(evidence, silent).found == []
-
-
 def test_a_search_dealt_over_processes_finds_the_same_to_the_bit(monkeypatch):
     """Of a part of the run, as events leave it: every process fits what is known for itself."""
     model = exact("three_axis")

@@ -196,7 +196,7 @@ def folder(model, tmp_path_factory):
     """A model, a run and what the command made of them, with narrower ranges than the model's."""
     folder = tmp_path_factory.mktemp("next")
     model.save(folder / "model.json")
-    write_log(folder / "run.csv", log(small_motion(3, 0.02), spring, 3))
+    write_log(folder / "run.csv", log(small_motion(3, 0.01), spring, 3))
     return folder
 
 

@@ -53,35 +53,6 @@ class TestJudgement:
         assert judgement.is_worth(nothing, nothing, nothing) is worth
         assert judgement.is_worth(nothing, nothing, nothing, 2) is False
 
-    def test_what_the_best_removes_soaks_up_a_part(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(judgement, "lead", lambda *scores: np.inf)
-        monkeypatch.setattr(judgement, "gain", lambda current, trial: 1.0)
-        current, best = (SimpleNamespace(energy=np.array([x]), rows=np.zeros(1)) for x in (100.0, 10.0))
-        for removed, behind in ((100.0, True), (89.0, False)):
-            energy = best.energy + judgement.NEARLY * removed
-            trial: Any = SimpleNamespace(energy=energy, rows=np.zeros(1))
-            assert judgement.is_behind(current, trial, best) is behind  # type: ignore[arg-type]
-
-    def test_one_joint_that_is_surely_worse_is_enough(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        leads: dict[Any, float] = {}
-        monkeypatch.setattr(judgement, "lead", lambda trial, best: leads[trial.of])
-        monkeypatch.setattr(judgement, "gain", lambda current, trial: 1.0)
-
-        def score(*energy: float, of: Any = "all") -> Any:
-            return SimpleNamespace(
-                energy=np.array(energy), rows=np.zeros(2), of=of, of_joint=lambda j: score(*energy, of=j)
-            )
-
-        sure = judgement.SIGNIFICANCE
-        for whole, first, second, behind in (
-            (judgement.CHANCE, sure, sure, False),
-            (judgement.CHANCE + 0.1, sure, sure, True),
-            (judgement.CHANCE, sure + 0.1, 0.0, True),
-            (judgement.CHANCE, 0.0, sure + 0.1, True),
-        ):
-            leads.update({"all": whole, 0: first, 1: second})
-            assert judgement.is_behind(score(9.0, 9.0), score(9.0, 9.0), score(1.0, 1.0)) is behind
-
     def test_one_row_counts_for_one_in_a_likelihood(self) -> None:
         seen = np.array([1.0])
         worse, better = (
@@ -99,29 +70,6 @@ class TestSearch:
         given: Any = None
         made = search._Search(given, given, given, given)
         assert made.explainable[0] == 5.0 and 0 < made.explainable[1] < 1e-6
-
-    @pytest.mark.parametrize("worth", [2, 9])
-    def test_effects_are_added_while_one_is_worth_it_up_to_the_most(
-        self, monkeypatch: pytest.MonkeyPatch, worth: int
-    ) -> None:
-        made: Any = search._Search.__new__(search._Search)
-        made.evidence, made.progress = None, lambda text: None
-        made.nothing = SimpleNamespace(fit="nothing", residual=None)
-
-        def best(found: list[Any]) -> Any:
-            k = len(found)
-            effect = SimpleNamespace(place=(str(k), 1, None), label=lambda: "")
-            return SimpleNamespace(effect=effect, share=0.5) if k < worth else None
-
-        made._pair = lambda found: []
-        made._best, made._exchanged, made._one_for_several = best, lambda found: found, lambda found: found
-        monkeypatch.setattr(search, "_known", lambda evidence, found: SimpleNamespace(fit=len(found)))
-        monkeypatch.setattr(search, "clear", lambda evidence, outcome: outcome)
-        outcome = made.outcome()
-        assert len(outcome.found) == outcome.after == min(worth, search.MOST_EFFECTS)
-        # what is added and taken back again is the end of it
-        made._exchanged = lambda found: found[:1]
-        assert len(made.outcome().found) == 1
 
     def test_a_body_acts_mainly_where_its_torque_is_largest_either_way(self) -> None:
         columns = np.zeros((3, 2, 1))

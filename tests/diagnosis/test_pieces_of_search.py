@@ -18,7 +18,7 @@ ANY_ARM: Any = SimpleNamespace(model=SimpleNamespace(arm=None))
 
 
 class Named(str):
-    """An effect that is no more than its name, and of one joint."""
+    """An effect that is no more than its name, which ends in the number of its parameters."""
 
     other_joint = None
 
@@ -26,45 +26,103 @@ class Named(str):
     def place(self) -> tuple[str, None, None]:
         return str(self), None, None
 
+    @property
+    def complexity(self) -> int:
+        return int(self[-1])
+
+    def label(self) -> str:
+        return str(self)
+
 
 class TestSearch:
+    """Of what any set of effects leaves of a hundred rows, in twenty blocks."""
+
     @staticmethod
-    def search(
-        trials: list[Any],
-        monkeypatch: pytest.MonkeyPatch,
-        explainable: tuple[float, float] = (1000.0, 10.0),
-        own: float = 50.0,
-    ) -> Any:
-        monkeypatch.setattr(searching, "is_worth", lambda evidence, now, trial, joints: trial.error < 1008)
-        monkeypatch.setattr(
-            searching, "simplest_of_equals", lambda current, trials: int(np.argmin([t.error for t in trials]))
+    def search(monkeypatch: pytest.MonkeyPatch, left: dict[str, float], barred: tuple[str, ...] = ()) -> Any:
+        """A search in which sets of effects, joined by blanks in the order of their names, leave so much."""
+        every = sorted({name for names in left for name in names.split()})
+
+        def of(names: Any) -> Any:
+            # what no set says, the best of the sets within it does
+            given = [x for key, x in left.items() if set(key.split()) <= set(names)]
+            return score(min(given), blocks=20)
+
+        def tried(known: Any, progress: Any) -> list[Any]:
+            return [
+                SimpleNamespace(effect=Named(name), shape=name.upper(), score=of([*known.names, name]))
+                for name in every
+                if name not in known.names
+            ]
+
+        def known(evidence: Any, found: Any) -> Any:
+            names = [str(f.effect) for f in found]
+            return SimpleNamespace(names=names, fit=SimpleNamespace(score=of(names)))
+
+        model = SimpleNamespace(arm=None, friction=FrictionLaw(((),)))
+        evidence: Any = SimpleNamespace(model=model, variation=np.array([1.0]))
+        monkeypatch.setattr(searching, "hypotheses", lambda arm: every)
+        monkeypatch.setattr(searching, "_known", known)
+        monkeypatch.setattr(searching, "_nested", lambda effect, law: False)
+        monkeypatch.setattr(searching.Known, "of", staticmethod(lambda evidence: known(evidence, [])))
+        monkeypatch.setattr(searching, "clear", lambda evidence, outcome: outcome)
+        panel: Any = SimpleNamespace(tried=tried)
+        return searching._Search(evidence, lambda text: None, panel, [Named(name).place for name in barred])
+
+    @staticmethod
+    def found(search: Any) -> list[str]:
+        return [str(f.effect) for f in search.outcome().found]
+
+    def test_a_posterior_is_the_likelihood_and_the_odds(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        search = self.search(monkeypatch, {"": 900.0, "a1": 300.0, "b2": 300.0})
+        of = searching.log_posterior
+        scores = [score(left, blocks=20) for left in (900.0, 300.0)]
+        none, one, two = (
+            of(search.evidence, scores[k], [Named(name) for name in names])
+            for k, names in ((0, ()), (1, ("a1",)), (1, ("b2",)))
         )
-        search: Any = object.__new__(searching._Search)
-        search.evidence, search.progress = None, lambda text: None
-        search.explainable, search.barred = np.array(explainable), [Named("barred").place]
-        monkeypatch.setattr(searching, "enough", lambda evidence, now: np.array([50.0, own]))
-        search.panel = SimpleNamespace(tried=lambda known, progress: iter(trials))
-        search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(1000.0, 10.0, rows=(100, 1))))
-        search._beside = {}
-        return search._best([])
+        # twenty blocks, what is left on top of a hundred rows, one of two hypotheses
+        assert one - none == pytest.approx(10 * np.log(1000 / 400) - np.log(2) - searching.LOG_ODDS)
+        assert one - two == pytest.approx(searching.LOG_ODDS)
 
-    @staticmethod
-    def trial(name: str, *energy: float) -> Any:
-        return SimpleNamespace(effect=Named(name), shape=name.upper(), score=score(*energy))
+    def test_effects_are_added_while_the_set_becomes_likelier(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        two = {"": 9000.0, "a1": 3000.0, "b1": 4000.0, "a1 b1": 100.0, "a1 b1 c1": 85.0}
+        assert self.found(self.search(monkeypatch, two)) == ["a1", "b1"]
+        assert self.found(self.search(monkeypatch, {"": 100.0, "a1": 80.0})) == []
+        # a run tells so many apart
+        names = [f"{name}1" for name in "abcdef"]
+        many = {" ".join(names[:k]): 10.0 ** (9 - k) for k in range(7)}
+        assert self.found(self.search(monkeypatch, many)) == names[: searching.MOST_EFFECTS]
 
-    def test_the_best_with_its_rivals_and_its_share_of_what_could_be_explained(
+    def test_the_simplest_of_equals_is_named_and_the_others_are_its_alternatives(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        trials = [
-            self.trial(name, energy, 10.0)
-            for name, energy in zip("abcd", (623.9, 600.0, 624.1, 999.0), strict=True)
-        ]
-        found = self.search(trials, monkeypatch)
-        assert (found.effect, found.shape, found.share) == ("b", "B", pytest.approx(400 / 1010))
-        assert found.rivals == [("a", pytest.approx(376.1 / 1010))]
-        assert self.search([self.trial("a", -1000.0, 0.0)], monkeypatch).share == 1.0
-        assert self.search([], monkeypatch) is None
-        assert self.search([self.trial("barred", 600.0, 10.0)], monkeypatch) is None
+        left = {"": 1000.0, "a2": 100.0, "b1": 101.0, "c1": 150.0, "d1": 240.0}
+        outcome = self.search(monkeypatch, left).outcome()
+        (found,) = outcome.found
+        assert (found.effect, found.shape, found.share) == ("b1", "B1", pytest.approx(899 / 900))
+        # twenty to one: ten times log(250 / 201) is less than log(20), of 340 / 201 it is more
+        assert [str(effect) for effect, _ in found.rivals] == ["a2", "c1"]
+        assert self.search(monkeypatch, {"": 1000.0, "a1": 50.0}).outcome().found[0].share == 1.0
+        assert self.found(self.search(monkeypatch, left, barred=("b1",))) == ["a2"]
+
+    def test_one_that_lies_between_two_makes_way_for_them(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        left = {"": 9000.0, "a1": 5000.0, "b1": 6000.0, "c1": 3000.0, "b1 c1": 1500.0, "a1 b1": 100.0}
+        assert sorted(self.found(self.search(monkeypatch, left))) == ["a1", "b1"]
+
+    def test_one_that_does_what_several_did_takes_their_place(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        left = {"": 9000.0, "a1": 3000.0, "a1 b1": 1000.0, "c5": 8000.0, "a1 b1 c5": 100.0, "b1 c5": 100.0}
+        left["c5"] = 3500.0
+        left |= {"a1 c5": 100.0}
+        assert self.found(self.search(monkeypatch, {**left, "c5": 110.0})) == ["c5"]
+
+    def test_two_that_hide_each_other_are_found_together(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Either leaves nearly as much as there was; where little is left, nobody looks for two at once."""
+        hidden = {"": 1000.0, "a1": 850.0, "b1": 860.0, "c1": 990.0, "a1 b1": 100.0}
+        assert sorted(self.found(self.search(monkeypatch, hidden))) == ["a1", "b1"]
+        assert self.found(self.search(monkeypatch, {**hidden, "a1 b1": 800.0})) == []
+        little = {"": 399.0, "a1": 380.0, "b1": 380.0, "a1 b1": 20.0}
+        assert self.found(self.search(monkeypatch, little)) == []
+        assert sorted(self.found(self.search(monkeypatch, {**little, "": 401.0}))) == ["a1", "b1"]
 
     def test_dry_friction_is_what_one_with_memory_may_be_where_the_joint_has_memory_in_the_model(
         self,
@@ -75,157 +133,31 @@ class TestSearch:
             model=SimpleNamespace(friction=FrictionLaw((memory, memory, memory[:1])))
         )
         best = effect("presliding_hysteresis", 2)
-        assert search._alike(effect("coulomb_friction", 2), best) == searching.MOST
+        assert search._remembered(effect("coulomb_friction", 2), best)
         others = (("coulomb_friction", 1), ("viscous_friction", 2), ("stribeck_friction", 2))
-        assert {search._alike(effect(*law), best) for law in others} == {searching.RIVAL_SHARE}
+        assert not any(search._remembered(effect(*law), best) for law in others)
         plain = effect("coulomb_friction", 3), effect("presliding_hysteresis", 3)
-        assert search._alike(*plain) == search._alike(best, plain[0]) == searching.RIVAL_SHARE
-
-    def test_it_must_remove_a_part_of_what_could_be_explained_of_some_joint(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        assert self.search([self.trial("a", 995.0, 10.0)], monkeypatch) is not None
-        assert self.search([self.trial("a", 995.1, 9.96)], monkeypatch) is None
-        assert self.search([self.trial("a", 995.1, 9.94)], monkeypatch) is not None
-
-    def test_or_nine_tenths_of_what_is_left_that_is_more_than_the_model_s_own(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """Of joint 2 ten are left, one of them the baseline's; at first a thousand could be explained of each."""
-        for left, own, much in ((1.8, 5.0, True), (2.0, 5.0, False), (1.8, 8.3, False)):
-            found = self.search([self.trial("a", 1000.0, left)], monkeypatch, (1e6, 1e6), own)
-            assert (found is not None) is much
-
-    def test_effects_are_chosen_anew_beside_the_others_until_none_changes(self) -> None:
-        def found(name: str, joint: int) -> Any:
-            return SimpleNamespace(effect=effect(name, joint), shape=0.0, share=1.0, rivals=[])
-
-        spring, offset, drag = (found(n, 1) for n in ("joint_spring", "torque_offset", "viscous_friction"))
-        asked: list[list[str]] = []
-
-        def chosen(answers: dict[str, Any], first: list[Any]) -> list[Any]:
-            search: Any = object.__new__(searching._Search)
-            search.progress = lambda text: None
-            asked.clear()
-
-            def best(others: list[Any]) -> Any:
-                asked.append([f.effect.name for f in others])
-                return answers[" ".join(asked[-1])]
-
-            search._best = best
-            return search._exchanged(first)
-
-        assert chosen({}, [spring]) == [spring] and asked == []
-        same = {"joint_spring": offset, "torque_offset": spring}
-        assert chosen(same, [spring, offset]) == [spring, offset] and len(asked) == 2
-        better = {"joint_spring": drag, "viscous_friction": spring}
-        assert chosen(better, [spring, offset]) == [spring, drag] and len(asked) == 4
-        # the last first; one that explains nothing beside the others goes
-        assert chosen({"joint_spring": None}, [spring, offset]) == [spring] and len(asked) == 1
-        assert chosen({"joint_spring": offset, "torque_offset": None}, [spring, offset]) == [offset]
-        # no more than two rounds
-        swaps = {"joint_spring": drag, "viscous_friction": offset, "torque_offset": spring}
-        chosen(swaps, [spring, offset])
-        assert len(asked) == 4
+        assert not search._remembered(*plain) and not search._remembered(best, plain[0])
 
     def test_what_is_not_clear_of_its_error_makes_way_for_what_it_stood_in_the_way_of(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Dry friction with memory, level and change of it alike, is not clear; the dry friction beside which it is, is."""
-
-        def found(name: str) -> Any:
-            return SimpleNamespace(effect=effect(name, 2), shape=0.0, share=1.0, rivals=[])
-
-        best_first = [found("presliding_hysteresis"), found("coulomb_friction")]
-        search: Any = object.__new__(searching._Search)
-        search.evidence, search.progress, search.barred = None, lambda text: None, ()
-        search.nothing = SimpleNamespace(fit=None, residual=None)
-
-        def best(beside: list[Any]) -> Any:
-            left = [f for f in best_first if f.effect.place not in search.barred]
-            return None if beside or not left else left[0]
+        unclear: set[str] = set()
 
         def clear(evidence: Any, outcome: Any) -> Any:
-            return replace(outcome, found=[f for f in outcome.found if f.effect.name not in unclear])
+            return replace(outcome, found=[f for f in outcome.found if f.effect not in unclear])
 
-        search._best, search._pair, search._one_for_several = best, lambda beside: [], lambda found: found
-        monkeypatch.setattr(searching, "clear", clear)
-        monkeypatch.setattr(searching, "_known", lambda evidence, found: SimpleNamespace(fit=None))
-        unclear: set[str] = set()
-        assert search.outcome().found == best_first[:1]
-        unclear.add("presliding_hysteresis")
-        assert search.outcome().found == best_first[1:]
-        search.barred = ()
-        unclear.add("coulomb_friction")
-        assert search.outcome().found == []
-
-
-class TestOneForSeveral:
-    """Two effects of joints found; one of the whole arm, or of a pair of joints, in their stead."""
-
-    def instead(
-        self,
-        monkeypatch: pytest.MonkeyPatch,
-        errors: dict[str, float | None],
-        found: int = 2,
-        left: float = 100.0,
-        barred: tuple[Any, ...] = (),
-    ) -> list[tuple[str, float]]:
-        listed = [effect("payload", None), effect("transmission_coupling", 1, 2), effect("joint_spring", 3)]
-        given: Any = [
-            SimpleNamespace(effect=effect(name, 1), shape=0.0, share=1.0)
-            for name in ("torque_offset", "viscous_friction")[:found]
-        ]
-        asked: list[str] = []
-
-        def trial(effect: Any) -> Any:
-            asked.append(effect.name)
-            error = errors.get(effect.name)
-            return (
-                None
-                if error is None
-                else SimpleNamespace(shapes=["first", "second", "its"], score=score(error))
-            )
-
-        search: Any = object.__new__(searching._Search)
-        search.evidence, search.progress = SimpleNamespace(model=SimpleNamespace(arm=None)), lambda text: None
-        search.nothing = SimpleNamespace(fit=SimpleNamespace(score=score(1000.0)), trial=trial)
-        search.explainable, search.barred = np.array([1000.0, 500.0]), barred
-        monkeypatch.setattr(searching, "hypotheses", lambda arm: listed)
-        monkeypatch.setattr(
-            searching,
-            "_known",
-            lambda evidence, found: SimpleNamespace(fit=SimpleNamespace(score=score(left))),
-        )
-        monkeypatch.setattr(searching, "is_behind", lambda bare, trial, best: trial.error > best.error)
-        made = search._one_for_several(given)
-        assert "joint_spring" not in asked and (found > 1 or asked == [])
-        if made is given:
-            return []
-        assert made[0].shape == "its" and made[0].rivals == []
-        return [(f.effect.name, f.share) for f in made]
-
-    def test_one_effect_that_does_what_several_did_takes_their_place(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        assert self.instead(monkeypatch, {"payload": 100.0}) == [("payload", pytest.approx(0.6))]
-        assert self.instead(monkeypatch, {"payload": 101.0}) == []
-        pair = [("transmission_coupling", pytest.approx(0.66))]
-        assert self.instead(monkeypatch, {"payload": 101.0, "transmission_coupling": 10.0}) == pair
-        assert self.instead(monkeypatch, {"payload": None}) == []
-        assert self.instead(monkeypatch, {"payload": -9000.0}) == [("payload", 1.0)]
-
-    def test_what_is_barred_takes_nobodys_place(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """It was found not clear before: taken again, the search would bar it again, without end."""
-        payload = (effect("payload", None).place,)
-        assert self.instead(monkeypatch, {"payload": 100.0}, barred=payload) == []
-        pair = {"payload": 1.0, "transmission_coupling": 10.0}
-        assert self.instead(monkeypatch, pair, barred=payload) == [
-            ("transmission_coupling", pytest.approx(0.66))
-        ]
-
-    def test_of_one_effect_nobody_asks(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        assert self.instead(monkeypatch, {"payload": 0.0}, found=1) == []
+        left = {"": 1000.0, "memory3": 100.0, "level1": 300.0}
+        for gone, named in (
+            ((), ["memory3"]),
+            (("memory3",), ["level1"]),
+            (("memory3", "level1"), []),
+        ):
+            search = self.search(monkeypatch, left)
+            monkeypatch.setattr(searching, "clear", clear)
+            unclear.update(gone)
+            assert self.found(search) == named
 
 
 class TestOutcomes:

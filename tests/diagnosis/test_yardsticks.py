@@ -17,11 +17,9 @@ from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.judgement import (
     enough,
     gain,
-    is_behind,
     is_worth,
     lead,
     lead_of,
-    simplest_of_equals,
     times_enough,
 )
 
@@ -226,37 +224,6 @@ def test_a_gain_must_be_significant_and_more_than_the_model_itself_is_wrong_by()
     once[0] = 9.0
     chance: Any = SimpleNamespace(variation=np.array([0.01]))
     assert not is_worth(chance, left(once, BLOCK[:20]), left(spread(1.0)[:20], BLOCK[:20]))
-
-
-def test_the_simplest_of_equals_removes_most_of_what_the_best_does() -> None:
-    now = left(spread(5.0), BLOCK)
-    best = left(spread(1.0), BLOCK, complexity=4)
-    alike = left(spread(1.1), BLOCK, complexity=2)
-    behind = left(spread(1.6), BLOCK, complexity=1)
-    assert not is_behind(now, alike, best) and is_behind(now, behind, best)
-    assert simplest_of_equals(now, [behind, best, alike]) == 2
-    assert simplest_of_equals(now, [behind, best]) == 1
-    twin = left(spread(1.05), BLOCK, complexity=2)
-    assert simplest_of_equals(now, [alike, best, twin]) == 2
-    # within chance of the best, yet little of what it removes: none
-    now = left(spread(1.2), BLOCK)
-    little = left(spread(1.14), BLOCK)
-    assert is_behind(now, little, left(spread(1.0), BLOCK))
-    assert not is_behind(now, left(spread(1.04), BLOCK), left(spread(1.0), BLOCK))
-
-
-def test_each_joint_alone_must_be_as_good_as_the_best() -> None:
-    block, joint = np.tile(BLOCK, 2), np.repeat([0, 1], 200)
-
-    def both(first: float, second: float) -> Any:
-        return left(np.concatenate([spread(first), spread(second, 1)]), block, joint)
-
-    now, best = both(9.0, 9.0), both(1.0, 1.0)
-    assert not is_behind(now, both(1.15, 1.15), best)
-    assert is_behind(now, both(1.0, 1.4), best)
-    # of what the best removes by far, three parts in a thousand are nothing
-    now = both(40.0, 40.0)
-    assert not is_behind(now, both(2.3, 2.3), best) and is_behind(now, both(2.6, 1.0), best)
 
 
 def test_what_the_filter_brings_of_a_standstill_is_a_cell_of_its_own() -> None:

@@ -1,8 +1,6 @@
-"""Judging trials: is a further effect worth it, and which is the simplest of those that do equally well?"""
+"""Judging trials: is an effect worth it, and does one do worse than another?"""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,12 +12,12 @@ from armloop.util.arrays import Array, Mask
 #: over its joints together, by the energy that the model leaves on the worst tenth of its own baseline: a run may be all
 #: of such motion, and a law that fits a model's shortcomings is easily found.
 SIGNIFICANCE = 3.0
-#: A simpler effect is as good as the best if it is behind by no more than this many standard errors …
+#: What is behind by no more than this many standard errors is as good …
 CHANCE = 2.0
 #: … or on every joint by no more than this part of the baseline's energy, or of what the best removes there: no law is
-#: met exactly, and a richer one soaks up both …
+#: met exactly, and a richer one soaks up both.
 ALIKE, NEARLY = 0.4, 0.003
-#: … while it removes at least this part of what the best removes.
+#: What removes at least this part of what another does removes most of it.
 MOST = 0.75
 #: So many times the baseline is no baseline any more.
 MULTIPLE = 2.0
@@ -55,29 +53,6 @@ def times_enough(evidence: Evidence, current: Score, trial: Score) -> float:
 def enough(evidence: Evidence, score: Score) -> Array:
     """(n,) squared error, weighted, of each joint that is more than the model's own shortcomings."""
     return np.asarray(evidence.variation * np.maximum(score.rows, 1))
-
-
-def simplest_of_equals(current: Score, trials: Sequence[Score]) -> int:
-    """Which of the trials that are as good as the best has the fewest parameters.
-
-    As good is one that removes most of what the best removes and is behind it by no more than chance over
-    blocks, and on no joint surely, or, on every joint, by no more than the model's own shortcomings there.
-    """
-    best = max(range(len(trials)), key=lambda k: gain(current, trials[k]))
-    equals = [k for k, trial in enumerate(trials) if k == best or not is_behind(current, trial, trials[best])]
-    return min(equals, key=lambda k: (trials[k].complexity, -gain(current, trials[k])))
-
-
-def is_behind(current: Score, trial: Score, best: Score) -> bool:
-    """Whether a trial does worse than the best by more than chance and the model's own shortcomings.
-
-    What it does better on one joint is no excuse for what it surely leaves on another.
-    """
-    worse = np.flatnonzero(trial.energy - best.energy > soaked(current, best)).tolist()
-    chance = lead(trial, best) <= CHANCE and all(
-        lead(trial.of_joint(j), best.of_joint(j)) <= SIGNIFICANCE for j in worse
-    )
-    return not (chance or not worse) or gain(current, trial) < MOST * gain(current, best)
 
 
 def much_is_left(score: Score) -> Mask:
@@ -118,14 +93,26 @@ def lead_of(worse: Array, better: Array, rows: Array) -> float:
 
 
 def _likelier(worse: Score, better: Score) -> float:
-    """Likelihood ratio of two fits' held-out errors as standard errors: sqrt(2 log L), each block one observation.
+    """Likelihood ratio of two fits' held-out errors as standard errors: sqrt(2 log L).
 
-    Errors are normal with a variance of each joint's own, and count on top of the baseline's. A law that bites in few
-    blocks, hard, is no chance, though neither the sum's spread nor the number of blocks that agree says so.
+    They count on top of the baseline's. A law that bites in few blocks, hard, is no chance, though neither the sum's spread
+    nor the number of blocks that agree says so.
     """
-    rows = np.maximum(worse.rows, 1)
-    log_likelihood = 0.5 * float((worse.seen * np.log((worse.energy + rows) / (better.energy + rows))).sum())
-    return float(np.sign(log_likelihood) * np.sqrt(2 * abs(log_likelihood)))
+    own = np.maximum(worse.rows, 1)
+    ratio = float((log_likelihood(better, own) - log_likelihood(worse, own)).sum())
+    return float(np.sign(ratio) * np.sqrt(2 * abs(ratio)))
+
+
+def log_likelihood(score: Score, own: Array, most: float = np.inf) -> Array:
+    """(n,) log likelihood of each joint's held-out errors, but for a constant of the run.
+
+    They are normal with a variance of each joint's own, and every block of a joint is one observation.
+
+    Args:
+        own: (n,) squared error, weighted, on top of which they count: the model's own.
+        most: so many observations at most.
+    """
+    return np.asarray(-0.5 * np.minimum(score.seen, most) * np.log(score.energy + own))
 
 
 def _standard_errors(differences: Array) -> float:

@@ -29,7 +29,7 @@ from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE, NOTICEABLE, SIGNIFICANCE
 from armloop.diagnosis.score import mean_by_joint
-from armloop.diagnosis.search import RIVAL_SHARE, Found, Outcome, clear
+from armloop.diagnosis.search import Found, Outcome, clear
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Effect, hypotheses
 from armloop.robot.arm import Arm
@@ -44,8 +44,9 @@ PLAIN = 1 - 1 / MULTIPLE**2
 #: others, of errors beside the least noticeable one, so that none does at which there is nothing to remove; by Student's
 #: t, for they may be few.
 _CHANCE = float(norm.sf(SIGNIFICANCE))
-#: A simpler effect that leaves no more of the squared error than this part of it is as good.
-ALIKE = 0.1
+#: A simpler effect that leaves no more of the squared error than this part of it is as good; others that remove this part
+#: of what it removes are its alternatives.
+ALIKE, _ALTERNATIVE = 0.1, 0.94
 #: Fewest blocks with a reversal of a joint that tell anything of it.
 _FEWEST = 4
 
@@ -257,7 +258,7 @@ class _Gains:
         there = {effect: own[joint] for effect, own in shares.items() if joint in own}
         equals = [effect for effect, share in there.items() if share >= largest - ALIKE]
         best = min(equals, key=lambda effect: (effect.complexity, -there[effect]))
-        enough = RIVAL_SHARE * there[best]
+        enough = _ALTERNATIVE * there[best]
         rivals = [(e, share) for e, share in there.items() if e is not best and share >= enough]
         return Found(best, Shape.fixed(0.0), there[best], rivals, self.by_effect[best][joint].always)
 

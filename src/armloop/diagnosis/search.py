@@ -1,12 +1,12 @@
-"""Forward selection of effects: add what explains most on data not fitted, the simplest of equals, until none is left.
+"""Bayesian model selection of effects: the set with the largest posterior, by adding, dropping and exchanging.
 
-Every time one is added, those found before are asked again whether, beside the others, they are still the
-simplest of those that do equally well: the first effect named may have stood for two.
+The likelihood of a set of effects is that of blocks of data that were not fitted, so that what merely bends to the data
+gains nothing; before the run every hypothesis is as likely as any other, and there are odds against every parameter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,16 +14,14 @@ import numpy as np
 from armloop.diagnosis.evidence import Evidence
 from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
-    CHANCE,
     MOST,
     SIGNIFICANCE,
     enough,
     gain,
-    is_behind,
     is_worth,
     lead,
+    log_likelihood,
     much_is_left,
-    simplest_of_equals,
     times_enough,
 )
 from armloop.diagnosis.score import Score
@@ -34,14 +32,19 @@ from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced
 
-#: A further effect must remove at least this part of what could be explained at first, on some joint: what a large
-#: effect leaves because its law is never met exactly (a load also changes friction, a sensor drifts) would pass for
-#: small ones. But what is left of that is of many kinds, and one law explains not this part of it.
-LEAST_SHARE, MOST_OF_REST = 0.005, 0.9
-#: Effects that explain this much of what the chosen one explains are listed as its alternatives.
-RIVAL_SHARE = 0.94
+#: Log prior odds against every parameter of an effect, beside its being one of many hypotheses.
+LOG_ODDS = 1.5
+#: So many blocks of a joint tell of it at most: what a model gets wrong comes back with the motion, and more of the same
+#: motion tells no more of that.
+TELLING = 20
+#: An effect of which at least this posterior odds are left, beside the one named in its place, is its alternative.
+ALTERNATIVE = 0.05
 #: A run tells so many effects apart, or terms of a law, at most.
 MOST_EFFECTS = 4
+#: Log posteriors that differ by less are the same: the same effects, one a little better shaped beside the others.
+_LEAST = 0.1
+#: Of so many effects, the likeliest, is each asked with a second one beside it.
+_FIRST = 3
 #: What depends on one another is found, or designed, in turn so many times.
 ROUNDS = 2
 
@@ -99,13 +102,28 @@ def search(
     panel: Hypotheses | None = None,
     barred: Collection[Place] = (),
 ) -> Outcome:
-    """Greedy forward search; all effects are re-estimated together, and exchanged where another does better.
+    """The set of effects with the largest posterior that adding, dropping and exchanging reaches from none.
 
     Args:
         panel: who tries the hypotheses; in this process by default.
         barred: effects that are not asked about.
     """
     return _Search(evidence, progress, panel or Hypotheses(evidence, jobs=1), barred).outcome()
+
+
+def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
+    """Log posterior of a set of effects, but for a constant of the run.
+
+    What a set leaves counts on top of what the model leaves on the worst tenth of its baseline.
+    """
+    own = enough(evidence, score)
+    return log_prior(evidence, effects) + float(log_likelihood(score, own, TELLING).sum())
+
+
+def log_prior(evidence: Evidence, effects: Sequence[Effect]) -> float:
+    """Log prior odds of a set of effects against none."""
+    odds = np.log(len(hypotheses(evidence.model.arm)))
+    return -float(sum(odds + LOG_ODDS * effect.complexity for effect in effects))
 
 
 class _Search:
@@ -120,27 +138,20 @@ class _Search:
         self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
-        """Effects added one by one until none is worth it."""
+        """The set from which no step leads to a better one, without what is not clear of its error."""
         found: list[Found] = []
-        known = self.nothing
-        seen: set[frozenset[Place]] = {frozenset()}
-        while len(found) < MOST_EFFECTS:
-            best = self._best(found)
-            more = self._pair(found) if best is None else [best]
-            if not more:
+        value = log_posterior(self.evidence, self.nothing.fit.score, [])
+        while True:
+            best, others = max(self._steps(found), key=lambda step: step[0], default=(value, found))
+            if best <= value + _LEAST:
+                best, others = max(self._pairs(found), key=lambda step: step[0], default=(value, found))
+            if best <= value + _LEAST:
                 break
-            found += more
-            for each in more:
-                words = f"found {each.effect.label()}: removes {each.share:.0%} of what can be explained"
-                self.progress(words)
-            found = self._one_for_several(self._exchanged(found))
-            known = _known(self.evidence, found)
-            # What is added may be taken back by an exchange: the same effects a second time are the end of it.
-            places = frozenset(f.effect.place for f in found)
-            if places in seen:
-                break
-            seen.add(places)
-        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, known.fit))
+            found, value = others, best
+            self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
+        after = _known(self.evidence, found).fit
+        found = [self._stated(found, k, after.score) for k in range(len(found))]
+        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, after))
         unclear = [f.effect for f in found if f not in outcome.found]
         if not unclear:
             return outcome
@@ -149,40 +160,30 @@ class _Search:
         self.barred = [*self.barred, *(effect.place for effect in unclear)]
         return self.outcome()
 
-    def _best(self, beside: Sequence[Found]) -> Found | None:
-        """The simplest of the best further effects, with its rivals; None where none is worth it."""
-        current, trials = self._asked(beside)
-        worth = [
-            trial
-            for trial in trials
-            if is_worth(self.evidence, current, trial.score, _tied(trial.effect))
-            and self._is_much(current, trial.score)
-        ]
-        return self._found(current, worth) if worth else None
+    def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with one effect more, one less, or another in the place of one, with their log posteriors."""
+        yield from self._additions(found)
+        for k in range(len(found)):
+            others = _others(found, k)
+            current, _ = self._asked(others)
+            yield log_posterior(self.evidence, current, [f.effect for f in others]), others
+            yield from self._additions(others)
 
-    def _pair(self, beside: Sequence[Found]) -> list[Found]:
-        """Two further effects of which none is sure without the other; empty where there are none.
+    def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+        """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
+        current, _ = self._asked(found)
+        if len(found) + 2 > MOST_EFFECTS or not much_is_left(current).any():
+            return
+        more = sorted(self._additions(found), key=lambda step: -step[0])
+        for _, first in more[:_FIRST]:
+            yield from self._additions(first)
 
-        What either leaves of a large residual is as large as what it removes, and hides it. Each must be worth it
-        beside the other.
-        """
-        current, trials = self._asked(beside)
-        if not much_is_left(current).any() or len(beside) + 2 > MOST_EFFECTS:
-            return []
-        doubtful = [
-            trial
-            for trial in trials
-            if lead(current, trial.score) > CHANCE
-            and times_enough(self.evidence, current, trial.score) > _tied(trial.effect)
-        ]
-        if not doubtful:
-            return []
-        first = self._found(current, doubtful)
-        second = self._best([*beside, first])
-        if second is None:
-            return []
-        alone, both = (_known(self.evidence, [*beside, *f]).fit.score for f in ([second], [first, second]))
-        return [first, second] if is_worth(self.evidence, alone, both, _tied(first.effect)) else []
+    def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
+        """Sets with one effect more, with their log posteriors."""
+        there = [f.effect for f in found]
+        for trial in self._asked(found)[1] if len(found) < MOST_EFFECTS else []:
+            value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
+            yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
 
     def _asked(self, beside: Sequence[Found]) -> tuple[Score, list[Tried]]:
         """How these effects do, and every further one beside them; tried once."""
@@ -194,68 +195,34 @@ class _Search:
         current, trials = self._beside[key]
         return current, [t for t in trials if t.effect.place not in self.barred]
 
-    def _found(self, current: Score, trials: Sequence[Tried]) -> Found:
-        """The simplest of the best of some trials, with its rivals."""
-        best = trials[simplest_of_equals(current, [trial.score for trial in trials])]
-        most, whole = gain(current, best.score), float(self.explainable.sum())
+    def _stated(self, found: Sequence[Found], k: int, after: Score) -> Found:
+        """One of the effects found, with the share that it removes beside the others, and its alternatives.
+
+        Args:
+            after: what all of them leave.
+        """
+        effect, (current, trials) = found[k].effect, self._asked(_others(found, k))
+        most, whole = gain(current, after), float(self.explainable.sum())
+        least = log_posterior(self.evidence, after, [effect]) + np.log(ALTERNATIVE)
         rivals = [
             (trial.effect, gain(current, trial.score) / whole)
             for trial in trials
-            if trial is not best
-            and gain(current, trial.score) >= self._alike(trial.effect, best.effect) * most
+            if trial.effect.place != effect.place
+            and (
+                log_posterior(self.evidence, trial.score, [trial.effect]) >= least
+                or (self._remembered(trial.effect, effect) and gain(current, trial.score) >= MOST * most)
+            )
         ]
-        return Found(best.effect, best.shape, min(most / whole, 1.0), rivals)
+        return Found(effect, found[k].shape, min(most / whole, 1.0), rivals)
 
-    def _alike(self, effect: Effect, best: Effect) -> float:
-        """The part of what the best removes from which another is its alternative.
+    def _remembered(self, effect: Effect, best: Effect) -> bool:
+        """Whether the best has an effect in it, and memory, in a joint whose friction has memory in the model.
 
-        Dry friction that rises in a joint whose friction has memory in the model has it, too, which its law lacks.
+        Dry friction that rises there has it, too, which its law lacks.
         """
         if not (_nested(effect, best) and best.rubs and best.memory and best.joint is not None):
-            return RIVAL_SHARE
-        return MOST if self.evidence.model.friction.remembers(best.joint - 1) else RIVAL_SHARE
-
-    def _is_much(self, current: Score, trial: Score) -> bool:
-        """Whether a further effect removes, on some joint, more than what a large one may leave for its law's sake."""
-        removed = current.energy - trial.energy
-        of_the_rest = (removed >= MOST_OF_REST * current.excess) & (removed > enough(self.evidence, current))
-        return bool(((removed >= LEAST_SHARE * self.explainable) | of_the_rest).any())
-
-    def _exchanged(self, found: list[Found]) -> list[Found]:
-        """Each effect chosen anew beside the others, until none changes; those that are worth nothing there go."""
-        for _ in range(ROUNDS if len(found) > 1 else 0):
-            changed = False
-            for k in range(len(found) - 1, -1, -1):
-                others = _others(found, k)
-                best, label = self._best(others), found[k].effect.label()
-                if best is None:
-                    self.progress(f"beside the others {label} explains nothing")
-                    return self._exchanged(others)
-                if best.effect.place != found[k].effect.place:
-                    self.progress(f"beside the others {best.effect.label()} does better than {label}")
-                    changed = True
-                found = [best if i == k else f for i, f in enumerate(found)]
-            if not changed:
-                break
-        return found
-
-    def _one_for_several(self, found: list[Found]) -> list[Found]:
-        """One effect of the whole arm where it does all that several did: a load shows on every joint."""
-        several = _known(self.evidence, found).fit.score
-        kinds = {f.effect.name for f in found}
-        whole = [
-            e
-            for e in hypotheses(self.evidence.model.arm)
-            if (e.joint is None or e.other_joint is not None) and e.place not in self.barred
-        ]
-        bare = self.nothing.fit.score
-        for effect in whole if len(found) > 1 else []:
-            trial = self.nothing.trial(effect) if effect.name not in kinds else None
-            if trial is not None and not is_behind(bare, trial.score, several):
-                self.progress(f"{effect.label()} explains alone what {len(found)} effects did")
-                share = min(gain(bare, trial.score) / float(self.explainable.sum()), 1.0)
-                return [Found(effect, trial.shapes[-1], share)]
-        return found
+            return False
+        return self.evidence.model.friction.remembers(best.joint - 1)
 
 
 def _known(evidence: Evidence, found: Sequence[Found]) -> Known:

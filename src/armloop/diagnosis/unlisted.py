@@ -16,9 +16,26 @@ import numpy as np
 from armloop.data.blocks import block_sums
 from armloop.diagnosis.evidence import FOLDS, Evidence
 from armloop.diagnosis.fit import Fit, covariance
-from armloop.diagnosis.judgement import CHANCE, MOSTLY, MULTIPLE, SIGNIFICANCE, enough, gain, lead
+from armloop.diagnosis.judgement import (
+    CHANCE,
+    MOSTLY,
+    MULTIPLE,
+    SIGNIFICANCE,
+    enough,
+    gain,
+    lead,
+    log_likelihood,
+)
 from armloop.diagnosis.score import Score
-from armloop.diagnosis.search import MOST_EFFECTS, Outcome, pruned, without_effects_at
+from armloop.diagnosis.search import (
+    LOG_ODDS,
+    MOST_EFFECTS,
+    TELLING,
+    Outcome,
+    log_prior,
+    pruned,
+    without_effects_at,
+)
 from armloop.diagnosis.trials import Known
 from armloop.features.angle_sums import AngleSums
 from armloop.laws.effects import Effect, Estimate, FoundLaw, found_law
@@ -113,7 +130,7 @@ def find_law(evidence: Evidence, outcome: Outcome, progress: Progress) -> tuple[
     law = _law(evidence, outcome.after, j)
     if len(bare.found) < len(outcome.found):
         simpler = _law(evidence, bare.after, j)
-        if _is_simpler(simpler, outcome, bare, j):
+        if _is_simpler(evidence, simpler, outcome, bare, j):
             law, outcome = simpler, bare
         elif outcome.after.score.energy[j] > FORCED * bare.after.score.energy[j]:
             return find_law(evidence, bare, progress)
@@ -128,11 +145,11 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         rows = outcome.after.score.rows[j]
         if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:
             continue
-        if outcome.after.score.energy[j] <= rows:
+        if outcome.after.score.energy[j] <= rows and len(there) == 1:
             continue  # no more than the baseline's
         progress(f"joint {j + 1}: whether a law that is not listed does better than what was found there")
         law = _law(evidence, bare.after, j)
-        if law.is_listed(j) or not _is_simpler(law, outcome, bare, j):
+        if not _is_simpler(evidence, law, outcome, bare, j):
             continue
         if len(there) > 1 or not _does_as_well(evidence, bare, there[0].rivals, law, j):
             return _stated(evidence, bare, law, j), pruned(evidence, bare)
@@ -148,19 +165,31 @@ def _does_as_well(
     return any(trial is not None and lead(trial.score.of_joint(j), mine) <= CHANCE for trial in trials)
 
 
-def _is_simpler(law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
+def _is_simpler(evidence: Evidence, law: _Law, outcome: Outcome, bare: Outcome, j: int) -> bool:
     """Whether a law has no more parameters than the effects in whose place it is put, and surely leaves far less.
 
-    With fewer parameters it need not be far less.
+    With fewer parameters it need but be likelier. A law of listed effects was the search's to find.
     """
-    parameters = outcome.after.score.complexity - bare.after.score.complexity
-    if not 0 < len(law.terms) <= parameters:
+    there = [f.effect for f in outcome.found if f not in bare.found]
+    parameters = sum(effect.complexity for effect in there)
+    if law.is_listed(j) or not 0 < len(law.terms) <= parameters:
         return False
     named = outcome.after.score.of_joint(j)
     # what the model leaves on its baseline is left by either
     own = float(named.rows.sum())
     far_less = gain(named, law.score) >= max(MOSTLY * (named.error - own), own)
-    return lead(named, law.score) > SIGNIFICANCE and (far_less or len(law.terms) < parameters)
+    if far_less and lead(named, law.score) > SIGNIFICANCE:
+        return True
+    return len(law.terms) < parameters and _is_likelier(evidence, law, outcome.after.score, there, j)
+
+
+def _is_likelier(evidence: Evidence, law: _Law, named: Score, there: Sequence[Effect], j: int) -> bool:
+    """Whether a law has the larger posterior: each term is one of many functions, as each effect is one of many."""
+    own, mine = enough(evidence, named)[[j]], named.of_joint(j)
+    of_law, of_effects = (float(log_likelihood(s, own, TELLING).sum()) for s in (law.score, mine))
+    functions = np.log(len(_names(_library(tuple(evidence.model.arm.revolute.tolist())), j)))
+    prior = -len(law.terms) * (functions + LOG_ODDS)
+    return bool(of_law + prior > of_effects + log_prior(evidence, there))
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:
