@@ -14,6 +14,9 @@ from armloop.diagnosis import account as accounts
 from armloop.diagnosis.account import Account
 from armloop.diagnosis.evidence import Evidence
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.joint_spring import JointSpring
+from armloop.laws.effects.time_delay import TimeDelay
+from armloop.laws.effects.torque_delay import TorqueDelay
 
 
 def test_the_part_of_bursts_that_effects_and_law_explain() -> None:
@@ -91,16 +94,19 @@ def test_what_remains_is_beside_effects_and_the_law_whatever_its_range() -> None
         assert seen.pop() == expected
 
 
-def test_delays_add_up() -> None:
-    def effect(name: str, seconds: float) -> Any:
-        parameters = {"seconds": SimpleNamespace(value=seconds)}
-        return SimpleNamespace(effect=SimpleNamespace(name=name), parameters=parameters)
+def test_delays_of_all_joints_and_of_one_add_up() -> None:
+    def late(*given: tuple[Any, float]) -> float:
+        added = [
+            SimpleNamespace(effect=effect, parameters={"seconds": SimpleNamespace(value=seconds)})
+            for effect, seconds in given
+        ]
+        outcome: Any = SimpleNamespace(added=lambda: added)
+        return accounts._delay(outcome)
 
-    def outcome(*added: Any) -> Any:
-        return SimpleNamespace(added=lambda: list(added))
-
-    assert accounts._delay(outcome()) == accounts._delay(outcome(effect("joint_spring", 3.0))) == 0.0
-    assert accounts._delay(outcome(effect("time_delay", 0.25), effect("time_delay", 0.5))) == 0.75
+    assert late() == late((JointSpring(1), 3.0)) == 0.0
+    assert late((TimeDelay(None), 0.25)) == late((TorqueDelay(2), 0.25)) == 0.25
+    assert late((TimeDelay(None), 0.25), (TorqueDelay(2), 0.5), (TorqueDelay(1), 0.125)) == 0.75
+    assert late((TimeDelay(None), -0.5), (TorqueDelay(2), 0.25)) == -0.5
 
 
 @pytest.mark.parametrize(

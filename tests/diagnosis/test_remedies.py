@@ -16,6 +16,7 @@ FAULTS = {
     ),
     "torque_drift": (2, "rate", 0.01, "N*m/s", ["Let the sensor of joint 2 warm up"]),
     "time_delay": (None, "seconds", 0.03, "s", ["Shift the torque record by 30 ms back"]),
+    "torque_delay": (2, "seconds", 0.03, "s", ["Shift the torque record of joint 2 by 30 ms back"]),
 }
 
 

@@ -23,7 +23,9 @@ from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import Outcome, search, without_effects_at
 from armloop.diagnosis.trials import Hypotheses
 from armloop.diagnosis.unlisted import Unlisted, find_law
+from armloop.laws.effects.base import number
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.time_delay import TimeDelay
 from armloop.util.arrays import TINY, Array, Mask
 from armloop.util.progress import Progress
 
@@ -180,9 +182,14 @@ def _resting_late(evidence: Evidence, seconds: float) -> Evidence:
 
 
 def _delay(outcome: Outcome) -> float:
-    """Seconds by which the torque is recorded late, zero if it is not."""
-    late = [a.parameters["seconds"].value for a in outcome.added() if a.effect.name == "time_delay"]
-    return float(np.sum(late)) if late else 0.0
+    """Seconds by which the torque of a joint is recorded late, at most: with all others and by itself; zero if none is."""
+    late = {
+        a.effect.joint: number(a.parameters["seconds"].value)
+        for a in outcome.added()
+        if isinstance(a.effect, TimeDelay)
+    }
+    of_all = late.pop(None, 0.0)
+    return max((of_all + own for own in [0.0, *late.values()]), key=abs)
 
 
 def best_account(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armloop.diagnosis.whereabouts import whereabouts
+from armloop.laws.effects.time_delay import TimeDelay
 from armloop.reports.prose import Prose
 from armloop.reports.words import counted, effect_label, listed, percent, place, unit
 
@@ -80,7 +81,7 @@ def blame(diagnosis: Diagnosis) -> list[str]:
     say = Prose(
         "findings",
         who=who[:1].upper() + who[1:],
-        what="recording" if all(a.effect.name == "time_delay" for a in faulty) else "sensor",
+        what="recording" if all(isinstance(a.effect, TimeDelay) for a in faulty) else "sensor",
         arm=[effect_label(a.effect) for a in added if not a.effect.sensor],
         remedies=[a.effect.remedy(a.parameters) for a in faulty],
     )

@@ -146,7 +146,7 @@ def test_torque_is_columns_times_coefficients(name, context):
         beta *= 1e-3
     elif name in NONLINEAR:
         beta[1] *= 1e-2  # to first order in the shape
-    elif name == "time_delay":
+    elif name in ("time_delay", "torque_delay"):
         beta[:] = shape  # exact where the delay is that of the column
     x = kind.start(beta)
     beta = kind.embed(x)[0]

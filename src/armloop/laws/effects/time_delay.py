@@ -46,17 +46,21 @@ class TimeDelay(Effect):
 
     def _late(self, context: Context, delay: float) -> Array:
         """tau(t - d) - tau(t), run by run."""
-        assert context.predicted is not None
-        motion, tau = context.motion, context.predicted
+        motion, tau = context.motion, self.recorded(context)
         late = np.empty_like(tau)
         for run in motion.runs():
-            late[run] = _later(motion.time[run], tau[run], delay)
+            late[run] = later(motion.time[run], tau[run], delay)
         return late - tau
+
+    def recorded(self, context: Context) -> Array:
+        """(N, k) torques, as the known model says, of the joints whose record is late."""
+        assert context.predicted is not None
+        return context.predicted
 
     def falsified(
         self, time: Array, q: Array, tau: Array, parameters: Mapping[str, Value]
     ) -> tuple[Array, Array]:
-        return q, _later(time, tau, number(parameters["seconds"]))
+        return q, later(time, tau, number(parameters["seconds"]))
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         return abs(number(parameters["seconds"].value)) < 0.3
@@ -77,6 +81,6 @@ class TimeDelay(Effect):
         )
 
 
-def _later(time: Array, tau: Array, delay: float) -> Array:
+def later(time: Array, tau: Array, delay: float) -> Array:
     """tau(t - d) of one run; what was before it is taken to be as at its start."""
     return np.column_stack([np.interp(time - delay, time, column) for column in tau.T])
