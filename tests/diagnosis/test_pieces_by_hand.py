@@ -23,6 +23,7 @@ from armloop.diagnosis import (
     unlisted,
 )
 from armloop.diagnosis.evidence import Evidence
+from armloop.diagnosis.lasting import lasting
 from armloop.laws.effects import Context, Estimate
 from armloop.robot.arm import load_arm
 
@@ -136,7 +137,7 @@ class TestUnlisted:
         given = motion(len(residual), time=time)
         samples = SimpleNamespace(cutoff_hz=cutoff, motion=given, period=0.1)
         own: Any = SimpleNamespace(samples=samples, rows=np.ones((len(residual), 2), dtype=bool))
-        return unlisted._lasting(own, np.asarray(residual), 1)
+        return lasting(own, np.asarray(residual), 1)
 
     def test_what_lasts_is_still_there_a_period_of_the_corner_later(self) -> None:
         rng = np.random.default_rng(2)

@@ -11,6 +11,7 @@ import pytest
 from scores import score
 
 from armloop.diagnosis import search as searching
+from armloop.diagnosis.judgement import much_is_left
 from armloop.laws.effects import effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 
@@ -65,6 +66,7 @@ class TestSearch:
         monkeypatch.setattr(searching, "_nested", lambda effect, law: False)
         monkeypatch.setattr(searching.Known, "of", staticmethod(lambda evidence: known(evidence, [])))
         monkeypatch.setattr(searching, "clear", lambda evidence, outcome: outcome)
+        monkeypatch.setattr(searching, "much_lasts", lambda evidence, fit: much_is_left(fit.score))
         panel: Any = SimpleNamespace(tried=tried)
         return searching._Search(evidence, lambda text: None, panel, [Named(name).place for name in barred])
 

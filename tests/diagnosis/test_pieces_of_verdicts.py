@@ -11,6 +11,7 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import reasons, unlisted, whereabouts
+from armloop.diagnosis.lasting import lasting, much_lasts
 from armloop.diagnosis.score import Score
 from armloop.identification.goodness import Parts
 
@@ -224,25 +225,44 @@ class TestWhatIsLeft:
 
     def test_its_memory_is_the_autocorrelation_a_period_of_the_corner_later(self) -> None:
         wave = np.tile([1.0, 1.0, -1.0, -1.0, 2.0], 40)
-        assert unlisted._lasting(self.evidence(), wave, 0) == pytest.approx(1.0)  # ten samples: two periods
-        assert unlisted._lasting(self.evidence(100 / 11), wave, 0) == pytest.approx(
+        assert lasting(self.evidence(), wave, 0) == pytest.approx(1.0)  # ten samples: two periods
+        assert lasting(self.evidence(100 / 11), wave, 0) == pytest.approx(
             np.mean(wave[:-11] * wave[11:]) / np.mean(wave[:-11] ** 2)
         )
         turned = np.tile(np.repeat([1.0, -1.0], 10), 10)
-        assert unlisted._lasting(self.evidence(), turned, 0) == 0.0
-        assert unlisted._lasting(self.evidence(0.0), turned, 0) == 1.0
+        assert lasting(self.evidence(), turned, 0) == 0.0
+        assert lasting(self.evidence(0.0), turned, 0) == 1.0
         # fewer than fifty pairs tell nothing
-        assert unlisted._lasting(self.evidence(N=60), turned[:60], 0) == 0.0
-        assert unlisted._lasting(self.evidence(N=59), turned[:59], 0) == 1.0
+        assert lasting(self.evidence(N=60), turned[:60], 0) == 0.0
+        assert lasting(self.evidence(N=59), turned[:59], 0) == 1.0
         # nor do samples with a gap between them
         gaps = self.evidence()
         gaps.rows[:, 0] = np.arange(200) % 20 < 4
-        assert unlisted._lasting(gaps, turned[gaps.rows[:, 0]], 0) == 1.0
+        assert lasting(gaps, turned[gaps.rows[:, 0]], 0) == 1.0
+
+    def test_much_of_it_lasts_where_a_multiple_of_the_baseline_is_no_noise(self) -> None:
+        """Of 200 rows a joint, one alternates sample by sample, one by halves of the time, one is still."""
+        noise, law = np.tile([1.0, -1.0], 100), np.repeat([1.0, -1.0], 100)
+        rows = np.ones((200, 3), dtype=bool)
+        samples = SimpleNamespace(motion=motion((200,)), period=0.01, cutoff_hz=100 / 11)
+        evidence: Any = SimpleNamespace(samples=samples, rows=rows)
+        joint = np.nonzero(rows)[1]
+        kept = np.mean(law[:-11] * law[11:])  # what it is eleven samples later
+
+        def lasts(size: tuple[float, float, float]) -> list[bool]:
+            held_out = np.stack([noise, law, np.zeros(200)], axis=1).ravel() * np.tile(size, 200)
+            scored = Score.of(0, held_out, joint, np.zeros(600, dtype=np.intp), 3)
+            fit: Any = SimpleNamespace(held_out=held_out, stacked=SimpleNamespace(joint=joint), score=scored)
+            return much_lasts(evidence, fit).tolist()
+
+        least = 2 / np.sqrt(kept)
+        assert lasts((9.0, 1.01 * least, 9.0)) == [False, True, False]
+        assert lasts((9.0, 0.99 * least, 9.0)) == [False, False, False]
 
     def test_it_is_real_beyond_twice_the_baselines_spread_without_its_two_worst_blocks(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(unlisted, "_lasting", lambda *_: 1.0)
+        monkeypatch.setattr(unlisted, "lasting", lambda *_: 1.0)
         monkeypatch.setattr(unlisted, "_follows_a_law", lambda *_: False)
         evidence: Any = SimpleNamespace(
             samples=SimpleNamespace(motion=motion((1,), 2)), variation=np.array([1.0, 1.0])
@@ -272,10 +292,10 @@ class TestWhatIsLeft:
         assert left(fit(np.full(50, 4.1), np.full(50, 1.41)), 5.0) == 0
         evidence.variation[:] = 1.0
         # what has no memory is noise
-        monkeypatch.setattr(unlisted, "_lasting", lambda *_: 0.5)
+        monkeypatch.setattr(unlisted, "lasting", lambda *_: 0.5)
         assert left(fit(np.full(50, 2.7), np.full(50, 2.7))) is None
         assert left(fit(np.full(50, 2.9), np.full(50, 2.7))) == 0
-        monkeypatch.setattr(unlisted, "_lasting", lambda *_: 1.0)
+        monkeypatch.setattr(unlisted, "lasting", lambda *_: 1.0)
         assert left(fit(np.full(49, 3.0), np.full(50, 1.0))) is None
         # less than three hundredths of what there was is what effects leave
         assert left(fit(np.full(50, 3.0), np.full(50, 1.0)), np.sqrt(9 / 0.031)) == 0

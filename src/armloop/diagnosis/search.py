@@ -21,9 +21,9 @@ from armloop.diagnosis.judgement import (
     is_worth,
     lead,
     log_likelihood,
-    much_is_left,
     times_enough,
 )
+from armloop.diagnosis.lasting import much_lasts
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.trials import Hypotheses, Known, Tried
 from armloop.laws.effects import Effect, hypotheses
@@ -149,7 +149,7 @@ class _Search:
                 break
             found, value = others, best
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
-        after = _known(self.evidence, found).fit
+        after = self._known(found).fit
         found = [self._stated(found, k, after.score) for k in range(len(found))]
         outcome = clear(self.evidence, Outcome(found, self.nothing.fit, after))
         unclear = [f.effect for f in found if f not in outcome.found]
@@ -171,8 +171,7 @@ class _Search:
 
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
-        current, _ = self._asked(found)
-        if len(found) + 2 > MOST_EFFECTS or not much_is_left(current).any():
+        if len(found) + 2 > MOST_EFFECTS or not much_lasts(self.evidence, self._known(found).fit).any():
             return
         more = sorted(self._additions(found), key=lambda step: -step[0])
         for _, first in more[:_FIRST]:
@@ -189,11 +188,14 @@ class _Search:
         """How these effects do, and every further one beside them; tried once."""
         key = tuple((f.effect.place, f.shape) for f in beside)
         if key not in self._beside:
-            known = _known(self.evidence, beside) if beside else self.nothing
+            known = self._known(beside)
             trials = self.panel.tried(known, paced(self.progress))
             self._beside[key] = known.fit.score, trials
         current, trials = self._beside[key]
         return current, [t for t in trials if t.effect.place not in self.barred]
+
+    def _known(self, found: Sequence[Found]) -> Known:
+        return _known(self.evidence, found) if found else self.nothing
 
     def _stated(self, found: Sequence[Found], k: int, after: Score) -> Found:
         """One of the effects found, with the share that it removes beside the others, and its alternatives.

@@ -26,6 +26,7 @@ from armloop.diagnosis.judgement import (
     lead,
     log_likelihood,
 )
+from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import (
     LOG_ODDS,
@@ -43,7 +44,7 @@ from armloop.laws.effects.found import RANGE
 from armloop.model import AddedEffect
 from armloop.regression.moments import Moments, total
 from armloop.regression.sparse import Sparse
-from armloop.util.arrays import TINY, Array, Index
+from armloop.util.arrays import Array, Index
 from armloop.util.progress import Progress
 
 #: A residual is real if a law found on one half of the run explains as much of the other as a listed effect must, or if
@@ -56,8 +57,6 @@ REMAINDER = 0.03
 #: Effects that leave more than this part of a joint's energy as a real residual are not what is there; nor are those of
 #: whose remainder, beyond the baseline's, a law of no more parameters in their place removes most.
 FORCED = 0.3
-#: Fewest rows of a joint that tell of a law.
-_FEWEST = 50
 #: Most candidates of a library, and those that are tried: the order of its waves, and of how many angles one may be.
 _MOST_CANDIDATES = 1500
 _RICHEST_FIRST = ((3, None), (3, 2), (3, 1), (2, 1))
@@ -143,7 +142,7 @@ def _one_instead(evidence: Evidence, outcome: Outcome, progress: Progress) -> tu
         there = [f for f in outcome.found if f.effect.indices == (j,)]
         bare = without_effects_at(evidence, outcome, j)
         rows = outcome.after.score.rows[j]
-        if not there or len(there) != len(outcome.found) - len(bare.found) or rows < _FEWEST:
+        if not there or len(there) != len(outcome.found) - len(bare.found) or rows < FEWEST:
             continue
         if outcome.after.score.energy[j] <= rows and len(there) == 1:
             continue  # no more than the baseline's
@@ -215,10 +214,10 @@ def _left_over(evidence: Evidence, outcome: Outcome) -> int | None:
     ratios = np.zeros(n)
     for j in range(n):
         mine = after.stacked.joint == j
-        if mine.sum() < _FEWEST or after.score.energy[j] < REMAINDER * before.score.energy[j]:
+        if mine.sum() < FEWEST or after.score.energy[j] < REMAINDER * before.score.energy[j]:
             continue
         # Noise has energy, too, but no memory: only what lasts can be a law.
-        error = after.held_out[mine] ** 2 * _lasting(evidence, after.held_out[mine], j)
+        error = after.held_out[mine] ** 2 * lasting(evidence, after.held_out[mine], j)
         sums = block_sums(error - MULTIPLE**2 * evidence.variation[j], after.stacked.block[mine])
         if np.sort(sums)[:-EVENTS].sum() > 0 or _follows_a_law(evidence, after, j):
             ratios[j] = np.sqrt((after.held_out[mine] ** 2).mean())
@@ -232,21 +231,6 @@ def _follows_a_law(evidence: Evidence, after: Fit, j: int) -> bool:
         return False  # even all of it would not be
     law = _law(evidence, after, j).score
     return gain(own, law) > least and lead(own, law) > SIGNIFICANCE
-
-
-def _lasting(evidence: Evidence, residual: Array, j: int) -> float:
-    """Part of a joint's residual that is still there a period of the filter's corner later: its autocorrelation."""
-    samples = evidence.samples
-    if samples.cutoff_hz <= 0:
-        return 1.0  # samples that are no time series tell nothing of memory
-    time = samples.motion.time[evidence.rows[:, j]]
-    later = np.searchsorted(time, time + 1 / samples.cutoff_hz - 0.5 * samples.period)
-    there = later < len(time)
-    there[there] = np.abs(time[later[there]] - time[there] - 1 / samples.cutoff_hz) < 0.3 / samples.cutoff_hz
-    if there.sum() < _FEWEST:
-        return 1.0
-    now, then = residual[there], residual[later[there]]
-    return float(np.clip(np.mean(now * then) / max(float(np.mean(now**2)), TINY), 0.0, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
