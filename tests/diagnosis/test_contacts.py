@@ -107,6 +107,51 @@ def test_an_event_is_seen_to_begin_and_to_end_in_its_run(start: float, end: floa
         assert contacts._seen_whole(replace(given, time=given.time + later), contact) == whole
 
 
+class TestTwoBetweenWhichNothingTells:
+    """Joint 1 shows an event from 2 s to 3 s, joint 2 one from 4 s to 5 s; edges are sharp to a quarter of a second."""
+
+    given = motion((100, 100))
+
+    def found(self, start: float, end: float, joint: int, **known: Any) -> Any:
+        rows = (self.given.time >= start) & (self.given.time <= end)
+        return SimpleNamespace(added=event(start, end), rows=rows, shown=frozenset({joint}), **known)
+
+    def evidence(self) -> Any:
+        return SimpleNamespace(
+            samples=SimpleNamespace(motion=self.given, reach=0.25), scale=np.array([1.0, 2.0])
+        )
+
+    def between(
+        self, telling: list[tuple[float, int]], then: tuple[float, float] = (4.0, 5.0)
+    ) -> Burst | None:
+        tells = np.zeros((200, 2), dtype=bool)
+        tells[20:31] = tells[40:51] = True
+        for time, joint in telling:
+            tells[int(np.argmin(np.abs(self.given.time - time))), joint] = True
+        events = self.found(2.0, 3.0, 0), self.found(*then, 1)
+        return contacts._with_what_is_between(self.evidence(), tells, *events)
+
+    def test_may_be_one(self) -> None:
+        both = self.between([])
+        assert both is not None and both.joints == {0, 1} and not both.beside
+        np.testing.assert_allclose(self.given.time[both.rows][[0, -1]], [2.0, 5.0])
+        # what lies within the edges may be either's
+        assert self.between([(3.2, 0), (3.8, 1)]) is not None
+        assert self.between([(3.3, 0)]) is None and self.between([(3.7, 1)]) is None
+        # without a pause there is nothing between, and a run ends what it began
+        assert self.between([], (3.4, 5.0)) is None
+        assert self.between([], (16.0, 17.0)) is None
+
+    def test_are_one_if_that_explains_both_but_for_what_freedom_explains(self) -> None:
+        """Weighted by energy: 4 over two seconds with a share of 0.9, and 1 over one second with a share of 0.6."""
+        first = self.found(2.0, 4.0, 0, before=np.array([2.0, 0.0]), share=0.9)
+        then = self.found(5.0, 6.0, 1, before=np.array([0.0, 2.0]), share=0.6)
+        least = (8 * 0.9 + 0.6) / 9 - contacts.FREEDOM
+        for share, one in ((least + 1e-6, True), (least - 1e-6, False)):
+            joined: Any = SimpleNamespace(share=share)
+            assert contacts._explains_both(self.evidence(), joined, first, then) == one
+
+
 @pytest.mark.parametrize(
     ("events", "kept"),
     [
@@ -163,9 +208,10 @@ class TestFinding:
         innovation = np.zeros((100, 2))
         innovation[:, 1] = 1.0  # joint 1 tells nothing but where it slides
 
-        def push(evidence: Any, residual: Any, rows: slice, counted: Any, own: list[int]) -> None:
+        def push(evidence: Any, residual: Any, rows: slice, counted: Any, own: list[int]) -> Any:
             asked.append((rows.start, rows.stop, own, counted.sum(axis=0).tolist()))
             self.left.append(float(residual[0, 0]))
+            return of["push"](rows, own) if "push" in of else None
 
         self.left: list[float] = []
         by_joint = [[slice(a, z) for a, z, j in bursts if j == k] for k in (0, 1)]
@@ -217,7 +263,8 @@ class TestFinding:
         monkeypatch.setattr(
             contacts, "_strays", lambda far, b: far.shape == (100, 2) and b.rows.start in of.get("strays", ())
         )
-        assert contacts.find_contacts(evidence, np.zeros((100, 2)), friction) == []
+        events = contacts.find_contacts(evidence, np.zeros((100, 2)), friction)
+        self.events = [event.share for event in events]
         return asked
 
     def test_each_is_explained_with_the_samples_that_tell_of_it(
@@ -232,6 +279,34 @@ class TestFinding:
         assert self.pushed(monkeypatch, (20, 30, 0), (60, 70, 1)) == apart
         near = [(20, 30, [0], [60, 0]), (31, 40, [1], [0, 100])]
         assert self.pushed(monkeypatch, (20, 30, 0), (31, 40, 1)) == near
+
+    def test_two_that_one_explains_are_one(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Events by how many samples they hold; a third one is asked with what the first two have become."""
+
+        def push(rows: slice, own: list[int]) -> Any:
+            time, inside = motion().time, np.zeros(100, dtype=bool)
+            inside[rows] = True
+            added = event(time[rows.start], time[rows.stop - 1])
+            return SimpleNamespace(added=added, rows=inside, share=int(inside.sum()), shown=frozenset(own))
+
+        def between(evidence: Any, tells: Any, first: Any, then: Any) -> Burst | None:
+            rows = np.flatnonzero(first.rows | then.rows)
+            return Burst(slice(int(rows[0]), int(rows[-1]) + 1), first.shown | then.shown)
+
+        monkeypatch.setattr(contacts, "_with_what_is_between", between)
+        monkeypatch.setattr(contacts, "_explains_both", lambda evidence, one, first, then: one.share < 30)
+        bursts = [(20, 25, 0), (30, 35, 1), (50, 55, 0)]
+        asked = self.pushed(monkeypatch, *bursts, push=push)
+        assert self.events == [15, 5] and [a[:3] for a in asked[3:]] == [(20, 35, [0, 1]), (20, 55, [0, 1])]
+        monkeypatch.setattr(contacts, "_explains_both", lambda evidence, one, first, then: False)
+        self.pushed(monkeypatch, *bursts, push=push)
+        assert self.events == [5, 5, 5]
+        # too long to be one: more than two fifths of what the joints do
+        monkeypatch.setattr(contacts, "_explains_both", lambda evidence, one, first, then: True)
+        self.pushed(monkeypatch, (20, 25, 0), (56, 61, 0), push=push)
+        assert self.events == [5, 5]
+        self.pushed(monkeypatch, (20, 25, 0), (55, 60, 0), push=push)
+        assert self.events == [40]
 
     def test_what_comes_back_or_sticks_or_strays_is_none(self, monkeypatch: pytest.MonkeyPatch) -> None:
         bursts = [(20, 30, 0), (40, 50, 0), (60, 70, 0)]

@@ -19,7 +19,7 @@ from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innova
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
 from armloop.diagnosis.outliers import STANDS_OUT, outlying
-from armloop.diagnosis.pushes import PAUSE, SHORTEST, Contact, around, push
+from armloop.diagnosis.pushes import FREEDOM, PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import TINY, Array, Index, Mask
@@ -81,18 +81,59 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     holds = turning(motion, evidence.samples.moving) | at_rest(evidence.samples)
-    contacts, bursts = [], _rare(evidence.rows, bursts)
-    for burst in bursts:
-        # What happens to another joint at the same time, but not together with this, is an event of its own.
-        others = {j for b in bursts if _meet(motion, b, burst) for j in b.joints} - burst.joints
+    bursts = _rare(evidence.rows, bursts)
+
+    def counted(burst: Burst, others: Sequence[Burst]) -> Mask:
+        rows, own = tells.copy(), sorted(burst.joints)
         # A joint that rests or turns round meanwhile leaves there what friction may do, and that may be far more than the
         # event.
-        counted, own = tells.copy(), sorted(burst.joints)
-        counted[:, own] |= ~holds[:, own]
-        counted[:, sorted(others)] = False
+        rows[:, own] |= ~holds[:, own]
+        # What happens to another joint at the same time, but not together with this, is an event of its own.
+        beyond = {j for b in others if _meet(motion, b, burst) for j in b.joints} - burst.joints
+        rows[:, sorted(beyond)] = False
+        return rows
+
+    contacts = []
+    for burst in bursts:
         left = beside(evidence.samples, residual, burst.rows) if burst.beside else residual
-        contacts.append(push(evidence, left, burst.rows, counted, own))
-    return _distinct(motion, [contact for contact in contacts if contact and _seen_whole(motion, contact)])
+        contacts.append(push(evidence, left, burst.rows, counted(burst, bursts), sorted(burst.joints)))
+    events: list[Contact] = []
+    for contact in _distinct(motion, [c for c in contacts if c and _seen_whole(motion, c)]):
+        both = _with_what_is_between(evidence, tells | ~holds, events[-1], contact) if events else None
+        if both and _rare(evidence.rows, [both]):
+            beyond = [b for b in bursts if not b.joints <= both.joints]
+            one = push(evidence, residual, both.rows, counted(both, beyond), sorted(both.joints))
+            if one and _explains_both(evidence, one, events[-1], contact):
+                events[-1] = one
+                continue
+        events.append(contact)
+    return events
+
+
+def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then: Contact) -> Burst | None:
+    """Two events of one run and what is between them, if no sample (N, n) of their joints there tells of either."""
+    motion, joints = evidence.samples.motion, first.shown | then.shown
+    run = motion.run_of(int(np.argmax(first.rows)))
+    if not then.rows[run].any():
+        return None
+    (start, end), (again, stop) = (ends(event.added.parameters) for event in (first, then))
+    # Edges are as sharp as the filter has left them.
+    edge, time = evidence.samples.reach, motion.time[run]
+    between = (time > end + edge) & (time < again - edge)
+    if not between.any() or tells[run][between][:, sorted(joints)].any():
+        return None
+    inside = run.start + np.flatnonzero((time >= start) & (time <= stop))
+    return Burst(slice(int(inside[0]), int(inside[-1]) + 1), joints)
+
+
+def _explains_both(evidence: Evidence, one: Contact, first: Contact, then: Contact) -> bool:
+    """Whether one event explains as much as two in its place, but for what freedom explains."""
+    two = (first, then)
+    energy = [
+        float(((each.before / evidence.scale) ** 2).sum()) * float(np.ptp(ends(each.added.parameters)))
+        for each in two
+    ]
+    return one.share >= float(np.average([each.share for each in two], weights=energy)) - FREEDOM
 
 
 def _unlike(

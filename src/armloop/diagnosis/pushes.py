@@ -23,7 +23,7 @@ PAUSE = 0.3
 SHORTEST = 0.1
 #: What was there must explain most of the event's energy, and a torque on one joint, or a force on the tool, is it if
 #: nothing with more freedom explains so much more.
-_MORE = 0.05
+FREEDOM = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 _FEW = 3
 
@@ -40,6 +40,7 @@ class Contact:
         share: part of the event's energy that it removes on samples it was not fitted on.
         own: the same of the joints that the event was noticed at; the others leave what they always do.
         rivals: what explains the samples as well, with its share.
+        shown: joints (0-based) that it was noticed at.
         contradicted: whether it surely leaves more than there was, by more than the model's own shortcomings, of joints
             that the event was not noticed at.
     """
@@ -52,6 +53,7 @@ class Contact:
     own: float
     rivals: list[tuple[Effect, float]] = field(default_factory=list)
     contradicted: bool = False
+    shown: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def push(
     if not tried:
         return None
     most = max(trial.share for trial, _ in tried)
-    equals = [(trial, kind) for trial, kind in tried if trial.share >= most - _MORE]
+    equals = [(trial, kind) for trial, kind in tried if trial.share >= most - FREEDOM]
     # What pushes an arm is a force far more often than a torque on one joint; two or three joints cannot tell.
     forceful = n > _FEW
 
@@ -122,7 +124,7 @@ def push(
         return best
     halves = (_Kind(chosen.effect, k / 2) for k in range(1, 2 * n + 1))
     points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in halves]
-    return _somewhere(best, [p for p in points if p and p.share >= most - _MORE and not p.contradicted])
+    return _somewhere(best, [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted])
 
 
 def _somewhere(found: Contact, points: list[Contact]) -> Contact:
@@ -181,6 +183,7 @@ def _trial(
         share,
         own,
         contradicted=leaves_more(would_be, was, enough(evidence, was)),
+        shown=frozenset(shown),
     )
 
 
