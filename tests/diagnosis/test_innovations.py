@@ -101,6 +101,7 @@ class TestInnovations:
         known = of.get("known", ())
         level = 1.0 + len(known)
         monkeypatch.setattr(innovations, "dry_level", lambda e, known: np.full((len(v), 1), level))
+        monkeypatch.setattr(innovations, "shared_dry", lambda e, known, slow: of.get("shared", 0.0))
         monkeypatch.setattr(innovations, "at_rest", lambda samples: np.array(rest)[:, None])
         monkeypatch.setattr(innovations, "deviations", lambda evidence, residual: 0 * residual + 2.0)
         values, rests = innovations.innovations(evidence, np.array(residual)[:, None], known)
@@ -122,6 +123,18 @@ class TestInnovations:
             monkeypatch, [5.0, 0.01], [3.0, 3.0], [False] * 2, held=[0.0] * 2, rows=[False, False]
         )
         np.testing.assert_allclose(found, [1.5, near])
+        # along a direction that it shares it may rest, though it slides
+        found = self.found(
+            monkeypatch,
+            v,
+            residual,
+            [False] * 5,
+            held=[0.0] * 5,
+            history=history,
+            rows=np.eye(5)[4] > 0,
+            shared=1.2,
+        )
+        np.testing.assert_allclose(found, [0.9, 0.9, near - 0.6, near - 0.6, 0.0])
         # a joint that never moved had no speed
         history["range"][1] = [0.0]
         found = self.found(
@@ -314,7 +327,7 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
         return float(found[1, 0])
 
     for load in (4.0, -8.0):
-        assert level(terms, load=load) == pytest.approx(2 + 30 * CREEP + 0.5 + 0.25 * abs(load))
+        assert level(terms, load=load) == pytest.approx(2 + 0.5 + 0.25 * abs(load))
     assert level(terms[3:4]) == pytest.approx(0.5)
     # at rest it holds the level that a direction fades in to, not what there is of it at a creep
     assert level((FrictionTerm("smooth_sign", 3.0, 10 * CREEP),)) == pytest.approx(3.0)
@@ -330,6 +343,37 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
     fading = {"level": Estimate(3.0, 0.1, "N*m"), "time_constant": Estimate(0.4, 0.1, "s")}
     drift = AddedEffect(effect("friction_drift", 1), fading)
     assert level(terms[3:4], drift) == pytest.approx(0.5 + 3 * np.exp(-0.1 / 0.4))
+
+
+def test_joints_that_slide_may_hold_friction_of_a_direction_that_they_share_and_in_which_neither_slides() -> (
+    None
+):
+    """Of gears that rub 0.3 N·m at the difference of speeds 1 and 2, and of others that do at the sum of speeds 2 and 3."""
+    arm, v = load_arm("three_axis"), np.array([[0.5, 0.5, -0.5], [0.5, 0.7, -0.7], [0.0, 0.0, 0.0]])
+    motion = Motion(np.array([0.0, 0.1, 0.2]), 0 * v, v, 0 * v, np.array([0]))
+
+    def geared(joint: int, other: int, ratio: float, level: float) -> AddedEffect:
+        sizes = {"inertia": 0.1, "viscous": 0.2, "coulomb": level, "ratio": ratio}
+        return AddedEffect(
+            effect("transmission_coupling", joint, other),
+            {k: Estimate(x, 0.1, "1") for k, x in sizes.items()},
+        )
+
+    model = ReconstructedModel(arm, (), FrictionLaw(((FrictionTerm("sign", 2.0),), (), ())))
+    model = model.with_effects([geared(1, 2, -1.0, 0.3)])
+    evidence: Any = SimpleNamespace(
+        samples=SimpleNamespace(motion=motion), model=model, context=SimpleNamespace(load=0 * v)
+    )
+    slow = np.array([0.1, 0.1, 0.3])
+    near = 0.3 * np.exp(-1.0)  # a difference of 0.2 rad/s is that of two joints that creep
+    expected = [[0.3, 0.3, 0.0], [near, near, 0.0], [0.3, 0.3, 0.0]]
+    np.testing.assert_allclose(innovations.shared_dry(evidence, [], slow), expected)
+    known = [geared(2, 3, 1.0, 0.4)]
+    np.testing.assert_allclose(
+        innovations.shared_dry(evidence, known, slow), expected + np.array([0.0, 0.4, 0.4])
+    )
+    # whichever way two joints share it, at rest either may hold it
+    np.testing.assert_allclose(innovations.dry_level(evidence, known)[0], [2.3, 0.7, 0.4])
 
 
 def test_a_window_is_a_fifth_of_a_second_and_at_least_a_sample() -> None:

@@ -19,10 +19,12 @@ from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
 from armloop.diagnosis.evidence import Evidence, too_slow
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
-from armloop.dynamics import Dynamics
+from armloop.dynamics import Dynamics, ModelEquations
+from armloop.laws.friction import Direction
 from armloop.model import AddedEffect, ReconstructedModel
 from armloop.util.arrays import PER_MEDIAN, Array, Mask
 from armloop.util.errors import ModelError
+from armloop.util.functions import NUMPY
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2
@@ -60,6 +62,7 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
     creeping = np.where(too_slow(model, motion), _UNSURE * dry, creeping)
+    creeping = creeping + shared_dry(evidence, known, slow)
     # The filter averages what friction may hold with what it may not: a joint that turns round fast rests but a moment.
     unsure = np.maximum(smooth(samples, np.where(rest, dry, creeping)), 0.0)
     # Of a joint at rest the model's friction follows the noise of its speed: what is left without it counts, too.
@@ -133,15 +136,43 @@ def contradiction(model: ReconstructedModel, motion: Motion) -> Array:
 
 
 def dry_level(evidence: Evidence, known: Sequence[AddedEffect] = ()) -> Array:
-    """(N, n) dry friction of the model and of known effects at creeping speed: half of what the direction changes.
+    """(N, n) dry friction of the model and of known effects at creeping speed, along all directions that a joint is part of.
 
     Of a direction that fades in with the speed, all: what a joint at rest may hold is the level that it fades in to.
     """
+    each = [_on_joints(along, level, evidence) for along, level in _dry(evidence, known)]
+    return np.asarray(np.sum(each, axis=0))
+
+
+def _dry(evidence: Evidence, known: Sequence[AddedEffect]) -> list[tuple[Direction, Array]]:
+    """(N,) level of dry friction at creeping speed along each direction."""
     motion, model = evidence.samples.motion, evidence.model
     try:
-        rubbing = Dynamics(model.with_effects(known), sharp=True).friction
+        rubbing = ModelEquations(model.with_effects(known), NUMPY, sharp=True)
     except ModelError:  # an effect of one's own that is no law of the state
-        rubbing = Dynamics(replace(model, effects=()), sharp=True).friction
-    forth = np.full_like(motion.v, CREEP)
-    one, other = (rubbing(v, evidence.context.load, motion.q, motion.elapsed) for v in (forth, -forth))
-    return np.abs(one - other) / 2
+        rubbing = ModelEquations(replace(model, effects=()), NUMPY, sharp=True)
+    creep = list(np.full_like(motion.v, CREEP).T)
+    load = np.zeros_like(motion.v) if evidence.context.load is None else evidence.context.load
+    found = rubbing.dry_and_smooth(list(motion.q.T), creep, list(load.T), motion.elapsed)
+    return [(along, np.abs(level) + np.zeros(len(motion.v))) for along, level, _ in found]
+
+
+def _on_joints(along: Direction, level: Array, evidence: Evidence) -> Array:
+    """(N, n) what the joints of a direction feel at most of dry friction (N,) along it."""
+    each = [np.zeros_like(level) for _ in range(evidence.samples.motion.joints)]
+    along.add(each, level)
+    return np.abs(np.stack(each, axis=1))
+
+
+def shared_dry(evidence: Evidence, known: Sequence[AddedEffect], slow: Array) -> Array:
+    """(N, n) what joints that slide may hold of dry friction along a direction that two share and in which neither slides.
+
+    Args:
+        slow: (n,) speed of each joint below which it creeps, rad/s (m/s).
+    """
+    v, held = evidence.samples.motion.v, np.zeros_like(evidence.samples.motion.v)
+    for along, level in _dry(evidence, known):
+        if along.ratio:
+            creep = max(slow[along.joint] + abs(along.ratio) * slow[along.other], 1e-9)
+            held += _on_joints(along, level * np.exp(-((along.of(v.T) / creep) ** 2)), evidence)
+    return held
