@@ -276,7 +276,7 @@ class TestWhatIsKnownOfARun:
             (1e3, 0.25),
             (0.0, 0.25),
         ):
-            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, unknown=None)
+            samples: Any = SimpleNamespace(motion=given, tau=tau, cutoff_hz=cutoff, reach=0.0, unknown=None)
             made = Evidence.of(model, samples, [])
             assert made.context.period == pytest.approx(max(period, 0.25))
             # of a model without a baseline a hundredth of the torque; of no torque at all not nothing

@@ -28,6 +28,8 @@ from armloop.util.arrays import Array, Index, Mask, stretches
 
 #: Shortest block, s, and number of folds.
 SHORTEST_BLOCK, FOLDS = 1.0, 2
+#: So many times the filter's reach from a run's start, the samples' first, nothing is judged.
+_STARTING = 2.0
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
@@ -105,6 +107,7 @@ class Evidence:
             context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
+        rows &= ~starting(samples)[:, None]
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
 
@@ -226,6 +229,18 @@ def creep(model: ReconstructedModel) -> Array:
     """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
     ranges = model.history.get("range")
     return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
+
+
+def starting(samples: Samples) -> Mask:
+    """(N,) samples so near a run's start that the filter still shows how the arm began to move.
+
+    A controller that is switched on, or a reference that begins at speed, makes it jump.
+    """
+    motion = samples.motion
+    near = np.zeros(motion.samples, dtype=bool)
+    for run in motion.runs():
+        near[run] = motion.time[run] - motion.time[run.start] < _STARTING * samples.reach
+    return near
 
 
 def far_outside(motion: Motion, ranges: Any) -> Mask:
