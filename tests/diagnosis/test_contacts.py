@@ -138,8 +138,8 @@ class TestTwoBetweenWhichNothingTells:
         # what lies within the edges may be either's
         assert self.between([(3.2, 0), (3.8, 1)]) is not None
         assert self.between([(3.3, 0)]) is None and self.between([(3.7, 1)]) is None
-        # without a pause there is nothing between, and a run ends what it began
-        assert self.between([], (3.4, 5.0)) is None
+        # nothing is between those that touch; a run ends what it began
+        assert self.between([(3.2, 0)], (3.1, 5.0)) is not None
         assert self.between([], (16.0, 17.0)) is None
 
     def test_are_one_if_that_explains_both_but_for_what_freedom_explains(self) -> None:

@@ -111,7 +111,10 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
 
 
 def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then: Contact) -> Burst | None:
-    """Two events of one run and what is between them, if no sample (N, n) of their joints there tells of either."""
+    """Two events of one run and what is between them, if anything, where no sample (N, n) of their joints may tell of either.
+
+    One event may show with one sign first and then the other, and be seen as two, as the arm turns in it.
+    """
     motion, joints = evidence.samples.motion, first.shown | then.shown
     run = motion.run_of(int(np.argmax(first.rows)))
     if not then.rows[run].any():
@@ -120,7 +123,7 @@ def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then:
     # Edges are as sharp as the filter has left them.
     edge, time = evidence.samples.reach, motion.time[run]
     between = (time > end + edge) & (time < again - edge)
-    if not between.any() or tells[run][between][:, sorted(joints)].any():
+    if tells[run][between][:, sorted(joints)].any():
         return None
     inside = run.start + np.flatnonzero((time >= start) & (time <= stop))
     return Burst(slice(int(inside[0]), int(inside[-1]) + 1), joints)
