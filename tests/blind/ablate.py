@@ -73,12 +73,29 @@ RULES = [
     _rule("what differs from before and after is an event", lambda *_: [], (contacts, "pulses")),
     _rule("of events that overlap one is listed", lambda motion, found: found, (contacts, "_distinct")),
     _rule(
+        "two events between which nothing tells may be one",
+        lambda *_: None,
+        (contacts, "_with_what_is_between"),
+    ),
+    _rule(
+        "joints that slide hold the friction of gears that they share",
+        lambda e, known, slow: np.zeros_like(e.samples.tau),
+        (innovations, "shared_dry"),
+    ),
+    _rule(
+        "how a run begins is not judged",
+        lambda s: np.zeros(len(s.tau), dtype=bool),
+        (evidence, "starting"),
+    ),
+    _rule(
         "joints that turn round tell nothing of an event",
         lambda m, x: np.zeros_like(x),
         (contacts, "turning"),
     ),
     _rule(
-        "friction may hold what it can", lambda e: np.zeros_like(e.samples.tau), (innovations, "dry_level")
+        "friction may hold what it can",
+        lambda e, known=(): np.zeros_like(e.samples.tau),
+        (innovations, "dry_level"),
     ),
     _rule(
         "a model that contradicts itself is unsure",
