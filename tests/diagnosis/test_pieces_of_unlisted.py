@@ -67,8 +67,8 @@ class TestLawThatIsNotListed:
     def test_of_fewer_parameters_a_law_need_only_have_the_larger_posterior(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        arm, rows, own, left = three_axis(), 100, 50.0, 200.0
-        evidence: Any = SimpleNamespace(model=SimpleNamespace(arm=arm), variation=np.full(3, own / rows))
+        arm, rows, left = three_axis(), 100, 200.0
+        evidence: Any = SimpleNamespace(model=SimpleNamespace(arm=arm))
         effects = [SimpleNamespace(effect=SimpleNamespace(complexity=c)) for c in (1, 2)]
         block = np.arange(rows) // 5
 
@@ -87,8 +87,8 @@ class TestLawThatIsNotListed:
         functions = len(unlisted._names(unlisted._library((True, True, True)), 1))
         for terms in (1, 2):
             # against two effects of three parameters, each one of many; ten half blocks tell of a joint
-            needed = terms * (np.log(functions) + LOG_ODDS) - 2 * np.log(len(hypotheses(arm))) - 3 * LOG_ODDS
-            same = (left + own) / np.exp(needed / 10) - own
+            needed = terms * np.log(functions) - 2 * np.log(len(hypotheses(arm))) - LOG_ODDS
+            same = (left + rows) / np.exp(needed / 10) - rows
             assert simpler(same - 1, terms) and not simpler(same + 1, terms)
         assert not simpler(0.0, 3)  # not fewer
         assert simpler(0.0, 1) and not simpler(0.0, 1, "sign(v2)")  # dry friction is listed

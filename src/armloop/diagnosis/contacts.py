@@ -111,7 +111,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
 
 
 def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then: Contact) -> Burst | None:
-    """Two events of one run and what is between them, if anything, where no sample (N, n) of their joints may tell of either.
+    """Two events of one run and what is between them, where no sample (N, n) of their joints may tell of either.
 
     One event may show with one sign first and then the other, and be seen as two, as the arm turns in it.
     """

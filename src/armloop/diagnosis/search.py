@@ -16,7 +16,6 @@ from armloop.diagnosis.fit import Fit, Shape, deviate
 from armloop.diagnosis.judgement import (
     MOST,
     SIGNIFICANCE,
-    enough,
     gain,
     is_worth,
     lead,
@@ -32,7 +31,7 @@ from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Mask
 from armloop.util.progress import Progress, paced
 
-#: Log prior odds against every parameter of an effect, beside its being one of many hypotheses.
+#: Log prior odds against every further parameter of an effect, beside its being one of many hypotheses.
 LOG_ODDS = 1.5
 #: So many blocks of a joint tell of it at most: what a model gets wrong comes back with the motion, and more of the same
 #: motion tells no more of that.
@@ -112,18 +111,19 @@ def search(
 
 
 def log_posterior(evidence: Evidence, score: Score, effects: Sequence[Effect]) -> float:
-    """Log posterior of a set of effects, but for a constant of the run.
+    """Log posterior of a set of effects, but for a constant of the run."""
+    return log_prior(evidence, effects) + told(score)
 
-    What a set leaves counts on top of what the model leaves on the worst tenth of its baseline.
-    """
-    own = enough(evidence, score)
-    return log_prior(evidence, effects) + float(log_likelihood(score, own, TELLING).sum())
+
+def told(score: Score) -> float:
+    """Log likelihood of what is left, on top of what the model leaves on its baseline, but for a constant of the run."""
+    return float(log_likelihood(score, np.maximum(score.rows, 1), TELLING).sum())
 
 
 def log_prior(evidence: Evidence, effects: Sequence[Effect]) -> float:
     """Log prior odds of a set of effects against none."""
     odds = np.log(len(hypotheses(evidence.model.arm)))
-    return -float(sum(odds + LOG_ODDS * effect.complexity for effect in effects))
+    return -float(sum(odds + LOG_ODDS * (effect.complexity - 1) for effect in effects))
 
 
 class _Search:
@@ -138,7 +138,7 @@ class _Search:
         self._beside: dict[tuple[tuple[Place, Shape], ...], tuple[Score, list[Tried]]] = {}
 
     def outcome(self) -> Outcome:
-        """The set from which no step leads to a better one, without what is not clear of its error."""
+        """The set from which no step leads to a better one, without what is not worth it or not clear of its error."""
         found: list[Found] = []
         value = log_posterior(self.evidence, self.nothing.fit.score, [])
         while True:
@@ -151,23 +151,28 @@ class _Search:
             self.progress(f"likeliest: {', '.join(f.effect.label() for f in found) or 'nothing'}")
         after = self._known(found).fit
         found = [self._stated(found, k, after.score) for k in range(len(found))]
-        outcome = clear(self.evidence, Outcome(found, self.nothing.fit, after))
+        outcome = clear(self.evidence, pruned(self.evidence, Outcome(found, self.nothing.fit, after)))
         unclear = [f.effect for f in found if f not in outcome.found]
         if not unclear:
             return outcome
         # What is not clear may have stood in the way of a simpler law that is: columns nearly alike share one torque.
-        self.progress(f"not clear of its error: {', '.join(e.label() for e in unclear)}; searching without")
+        self.progress(f"not sure: {', '.join(e.label() for e in unclear)}; searching without")
         self.barred = [*self.barred, *(effect.place for effect in unclear)]
         return self.outcome()
 
     def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with one effect more, one less, or another in the place of one, with their log posteriors."""
+        """Sets with one effect more, one less, or another in the place of one, of all of a kind, or of all."""
         yield from self._additions(found)
         for k in range(len(found)):
             others = _others(found, k)
             current, _ = self._asked(others)
             yield log_posterior(self.evidence, current, [f.effect for f in others]), others
             yield from self._additions(others)
+        kinds = [f.effect.name for f in found]
+        for kind in sorted({kind for kind in kinds if kinds.count(kind) > 1}):
+            yield from self._additions([f for f in found if f.effect.name != kind])
+        if len(found) > 1:
+            yield from self._additions([])
 
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""

@@ -24,17 +24,15 @@ from armloop.diagnosis.judgement import (
     enough,
     gain,
     lead,
-    log_likelihood,
 )
 from armloop.diagnosis.lasting import FEWEST, lasting
 from armloop.diagnosis.score import Score
 from armloop.diagnosis.search import (
-    LOG_ODDS,
     MOST_EFFECTS,
-    TELLING,
     Outcome,
     log_prior,
     pruned,
+    told,
     without_effects_at,
 )
 from armloop.diagnosis.trials import Known
@@ -184,11 +182,9 @@ def _is_simpler(evidence: Evidence, law: _Law, outcome: Outcome, bare: Outcome, 
 
 def _is_likelier(evidence: Evidence, law: _Law, named: Score, there: Sequence[Effect], j: int) -> bool:
     """Whether a law has the larger posterior: each term is one of many functions, as each effect is one of many."""
-    own, mine = enough(evidence, named)[[j]], named.of_joint(j)
-    of_law, of_effects = (float(log_likelihood(s, own, TELLING).sum()) for s in (law.score, mine))
     functions = np.log(len(_names(_library(tuple(evidence.model.arm.revolute.tolist())), j)))
-    prior = -len(law.terms) * (functions + LOG_ODDS)
-    return bool(of_law + prior > of_effects + log_prior(evidence, there))
+    of_law = told(law.score) - len(law.terms) * functions
+    return bool(of_law > told(named.of_joint(j)) + log_prior(evidence, there))
 
 
 def _stated(evidence: Evidence, outcome: Outcome, law: _Law, j: int) -> Unlisted:
