@@ -143,13 +143,19 @@ class TestTwoBetweenWhichNothingTells:
         assert self.between([], (16.0, 17.0)) is None
 
     def test_are_one_if_that_explains_both_but_for_what_freedom_explains(self) -> None:
-        """Weighted by energy: 4 over two seconds with a share of 0.9, and 1 over one second with a share of 0.6."""
+        """Energies of 4 over two seconds, with a share of 0.9, and of 1 over one second, with a share of 0.6."""
         first = self.found(2.0, 4.0, 0, before=np.array([2.0, 0.0]), share=0.9)
         then = self.found(5.0, 6.0, 1, before=np.array([0.0, 2.0]), share=0.6)
-        least = (8 * 0.9 + 0.6) / 9 - contacts.FREEDOM
-        for share, one in ((least + 1e-6, True), (least - 1e-6, False)):
-            joined: Any = SimpleNamespace(share=share)
-            assert contacts._explains_both(self.evidence(), joined, first, then) == one
+        least = 8 * (0.9 - contacts.FREEDOM) + (0.6 - contacts.FREEDOM)
+
+        def one(removed: float, start: float = 2.0, end: float = 6.0) -> bool:
+            before = np.array([1.0, 2.0])  # an energy of 2
+            event = self.found(start, end, 0, before=before, share=removed / (2 * (end - start)))
+            return contacts._explains_both(self.evidence(), event, first, then)
+
+        assert one(least + 1e-6) and not one(least - 1e-6)
+        # in a part of each of them, and in no other place
+        assert one(8.0, 3.9, 5.1) and not one(8.0, 4.1, 6.0) and not one(8.0, 2.0, 4.9)
 
 
 @pytest.mark.parametrize(

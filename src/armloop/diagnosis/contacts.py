@@ -130,13 +130,14 @@ def _with_what_is_between(evidence: Evidence, tells: Mask, first: Contact, then:
 
 
 def _explains_both(evidence: Evidence, one: Contact, first: Contact, then: Contact) -> bool:
-    """Whether one event explains as much as two in its place, but for what freedom explains."""
-    two = (first, then)
-    energy = [
-        float(((each.before / evidence.scale) ** 2).sum()) * float(np.ptp(ends(each.added.parameters)))
-        for each in two
-    ]
-    return one.share >= float(np.average([each.share for each in two], weights=energy)) - FREEDOM
+    """Whether one event explains as much of the residual as two in its place, but for what freedom explains."""
+
+    def energy(event: Contact) -> float:
+        return float(((event.before / evidence.scale) ** 2).sum() * np.ptp(ends(event.added.parameters)))
+
+    (start, end), (_, before), (after, _) = (ends(event.added.parameters) for event in (one, first, then))
+    apart = sum((event.share - FREEDOM) * energy(event) for event in (first, then))
+    return start < before and after < end and one.share * energy(one) >= apart
 
 
 def _unlike(
