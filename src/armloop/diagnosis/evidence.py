@@ -28,8 +28,6 @@ from armloop.util.arrays import Array, Index, Mask, stretches
 
 #: Shortest block, s, and number of folds.
 SHORTEST_BLOCK, FOLDS = 1.0, 2
-#: So many times the filter's reach from a run's start, the samples' first, nothing is judged.
-_STARTING = 2.0
 #: A joint that travels less than this part of half its range (rad or m, where that is unknown) has not slid.
 _TRAVEL = 2e-3
 #: Below this part of its largest speed a joint may be at rest, pushed about within its friction.
@@ -239,7 +237,7 @@ def starting(samples: Samples) -> Mask:
     motion = samples.motion
     near = np.zeros(motion.samples, dtype=bool)
     for run in motion.runs():
-        near[run] = motion.time[run] - motion.time[run.start] < _STARTING * samples.reach
+        near[run] = motion.time[run] - motion.time[run.start] < samples.reach
     return near
 
 
