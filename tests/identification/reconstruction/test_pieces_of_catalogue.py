@@ -77,7 +77,7 @@ def test_laws_that_an_arm_may_have_had_all_along() -> None:
     names = {law.name for law in permanent(load_arm("scara"))}
     assert names == {
         *("encoder_offset", "gravity_tilt", "joint_spring", "rotor_inertia", "time_delay"),
-        *("torque_gain", "torque_offset", "torque_ripple", "transmission_coupling"),
+        *("torque_delay", "torque_gain", "torque_offset", "torque_ripple", "transmission_coupling"),
     }
 
 
