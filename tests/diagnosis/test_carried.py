@@ -51,7 +51,7 @@ def evidence(model: ReconstructedModel, *logs: MotionLog) -> Evidence:
     return Evidence.of(model, preprocess(list(logs), model.conditioning), hypotheses(model.arm))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long), 3])
 def test_a_load_carried_at_times_is_found_with_its_mass_and_when(
     model: ReconstructedModel, seed: int
 ) -> None:
@@ -92,7 +92,7 @@ def test_no_next_run_would_tell_more_of_what_was_carried(model: ReconstructedMod
     assert next_run(diagnose(model, [run(1, TIMES)], jobs=1)) is None
 
 
-@pytest.mark.parametrize(("seed", "level"), [(4, 0.5), (6, 1.5)])
+@pytest.mark.parametrize(("seed", "level"), [(4, 0.5), pytest.param(6, 1.5, marks=pytest.mark.long)])
 def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int, level: float) -> None:
     """The load that is found first has soaked up some of it, and seems to be there at other times."""
     log, motion = run(seed, TIMES), motion_of(seed, 30.0)
@@ -113,7 +113,7 @@ def test_a_load_of_moments_alone_is_none(model: ReconstructedModel, monkeypatch:
     assert find_carried(given) is None
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long), 3])
 def test_a_load_that_is_there_all_the_time_or_never_is_not_carried(
     model: ReconstructedModel, seed: int
 ) -> None:
