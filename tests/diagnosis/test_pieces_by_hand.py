@@ -282,3 +282,7 @@ class TestWhatIsKnownOfARun:
             # of a model without a baseline a hundredth of the torque; of no torque at all not nothing
             assert made.scale[0] > 0
             assert_allclose(made.scale[1:], [0.03, 0.04], rtol=1e-6)
+        # where a run begins nothing counts
+        assert made.rows.all()
+        monkeypatch.setattr(evidence, "starting", lambda samples: np.arange(40) < 3)
+        assert Evidence.of(model, samples, []).rows.all(axis=1).tolist() == [False] * 3 + [True] * 37

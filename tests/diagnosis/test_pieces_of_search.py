@@ -90,6 +90,9 @@ class TestSearch:
         # twenty blocks, what is left on top of a hundred rows, one of ten hypotheses
         assert one - none == pytest.approx(10 * np.log(1000 / 400) - np.log(10))
         assert one - two == pytest.approx(searching.LOG_ODDS)
+        # more blocks tell no more, fewer less
+        many, few = (searching.told(score(300.0, blocks=blocks)) for blocks in (50, 10))
+        assert many == searching.told(scores[1]) == pytest.approx(2 * few)
 
     def test_effects_are_added_while_the_set_becomes_likelier(self, monkeypatch: pytest.MonkeyPatch) -> None:
         two = {"": 9000.0, "a1": 3000.0, "b1": 4000.0, "a1 b1": 100.0, "a1 b1 c1": 85.0}
@@ -122,7 +125,7 @@ class TestSearch:
         left |= {"a1 c5": 100.0}
         assert self.found(self.search(monkeypatch, {**left, "c5": 110.0})) == ["c5"]
 
-    def test_one_that_does_what_all_of_a_kind_do_takes_their_place(
+    def test_one_that_is_nothing_beside_one_of_several_takes_the_place_of_all(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """Three drives seem late, beside a friction; it is the record of all, which is nothing beside one of them."""

@@ -161,16 +161,13 @@ class _Search:
         return self.outcome()
 
     def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with one effect more, one less, or another in the place of one, of all of a kind, or of all."""
+        """Sets with one effect more, one less, or another in the place of one, or of all."""
         yield from self._additions(found)
         for k in range(len(found)):
             others = _others(found, k)
             current, _ = self._asked(others)
             yield log_posterior(self.evidence, current, [f.effect for f in others]), others
             yield from self._additions(others)
-        kinds = [f.effect.name for f in found]
-        for kind in sorted({kind for kind in kinds if kinds.count(kind) > 1}):
-            yield from self._additions([f for f in found if f.effect.name != kind])
         if len(found) > 1:
             yield from self._additions([])
 
