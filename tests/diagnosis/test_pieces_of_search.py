@@ -125,32 +125,6 @@ class TestSearch:
         left |= {"a1 c5": 100.0}
         assert self.found(self.search(monkeypatch, {**left, "c5": 110.0})) == ["c5"]
 
-    def test_one_that_is_nothing_beside_one_of_several_takes_the_place_of_all(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """Three drives seem late, beside a friction; it is the record of all, which is nothing beside one of them."""
-        late = {
-            "": 9e4,
-            "l1": 4e4,
-            "l1 la1": 1e4,
-            "f1": 3e4,
-            "f1 l1": 8e3,
-            "f1 l1 la1": 2e3,
-            "f1 l1 la1 lb1": 400.0,
-        }
-        assert sorted(self.found(self.search(monkeypatch, late))) == ["f1", "l1", "la1", "lb1"]
-        whole = {**late, "t1": 5e4, "f1 t1": 300.0, "f1 l1 la1 t1": 1900.0}
-        of_all = self.search(monkeypatch, whole)
-        asked = of_all._asked
-        monkeypatch.setattr(of_all, "_asked", lambda found: self.without_t_beside_l(asked(found), found))
-        assert sorted(self.found(of_all)) == ["f1", "t1"]
-
-    @staticmethod
-    def without_t_beside_l(given: Any, found: Any) -> Any:
-        current, trials = given
-        kinds = {f.effect.name for f in found}
-        return current, [t for t in trials if not ("l" in kinds and t.effect == "t1")]
-
     def test_two_that_hide_each_other_are_found_together(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Either leaves nearly as much as there was; where little is left, nobody looks for two at once."""
         hidden = {"": 1000.0, "a1": 850.0, "b1": 860.0, "c1": 990.0, "a1 b1": 100.0}

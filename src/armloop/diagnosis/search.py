@@ -161,15 +161,13 @@ class _Search:
         return self.outcome()
 
     def _steps(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
-        """Sets with one effect more, one less, or another in the place of one, or of all."""
+        """Sets with one effect more, one less, or another in the place of one."""
         yield from self._additions(found)
         for k in range(len(found)):
             others = _others(found, k)
             current, _ = self._asked(others)
             yield log_posterior(self.evidence, current, [f.effect for f in others]), others
             yield from self._additions(others)
-        if len(found) > 1:
-            yield from self._additions([])
 
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
