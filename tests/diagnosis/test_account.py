@@ -24,7 +24,7 @@ def test_the_part_of_bursts_that_effects_and_law_explain() -> None:
     rows = np.array([[True, True], [True, True], [True, False], [True, True]])
     stacked = SimpleNamespace(joint=np.nonzero(rows)[1])
     outcome = SimpleNamespace(after=SimpleNamespace(stacked=stacked, held_out=np.arange(1.0, 8.0)))
-    evidence = SimpleNamespace(rows=rows, scale=np.array([1.0, 0.5]), row_samples=np.nonzero(rows)[0])
+    evidence = SimpleNamespace(rows=rows, scale=np.array([1.0, 0.5]), stacking=np.nonzero(rows))
     law = SimpleNamespace(joint=2, left=np.array([0.1, 0.2, 0.3]))
     whole: Any = None
     bursts: Any = [

@@ -49,7 +49,7 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     evidence: Any = Rows()
     y = np.array([6.0, 6.0, 12.0, 12.0]) if without is not None else np.full(4, 6.0)
     doubling = fit._Problem(evidence, y, [shaped(lambda x, value: 2 * value)])
-    rows, beta, _, J, values = fit._solved(doubling, [1.0], without)
+    rows, (beta, _, J, values) = fit._solved(doubling, [1.0], without)
     last = 2.0**fit.REFINEMENTS
     # what is returned belongs to the rows that are returned
     assert values == [last] and (rows.X == last).all() and J.shape == (1, 1)
@@ -57,7 +57,7 @@ def test_a_nonlinear_parameter_is_refined_some_times_or_until_it_stays(without: 
     assert evidence.asked == [1.0, 2.0, 4.0, 8.0]
     evidence = Rows()
     staying = fit._Problem(evidence, y, [shaped(lambda x, value: 3.0)])
-    assert fit._solved(staying, [1.0], without)[-1] == [3.0]
+    assert fit._solved(staying, [1.0], without)[1].values == [3.0]
     assert evidence.asked == [1.0, 3.0]
 
 
@@ -74,7 +74,7 @@ def test_what_is_judged_is_the_law_at_some_nonlinear_parameter() -> None:
             ),
         )
         y = X @ [2.0, 2.0 * ratio]
-        _, beta, _, J, _ = fit._solved(fit._Problem(evidence, y, [drift]), [1.0], None)
+        _, (beta, _, J, _) = fit._solved(fit._Problem(evidence, y, [drift]), [1.0], None)
         law = X @ [1.0, nearest]
         level = law @ y / (law @ law)  # least squares of what the law can be
         assert_allclose(beta, [level, nearest * level], rtol=1e-6)

@@ -14,7 +14,7 @@ from armloop.data.motion import Motion
 from armloop.diagnosis import unlisted
 from armloop.diagnosis.contacts import _seen_whole
 from armloop.diagnosis.evidence import FOLDS, Evidence, Stacked
-from armloop.diagnosis.fit import Fit
+from armloop.diagnosis.fit import NOTHING, Fit
 from armloop.diagnosis.judgement import SIGNIFICANCE, is_worth, lead, lead_of
 from armloop.laws.effects import Estimate, effect
 from armloop.regression.embedded import solve
@@ -27,7 +27,7 @@ def left(held_out: np.ndarray, block: np.ndarray, joint: np.ndarray | None = Non
     joint = np.zeros(rows, dtype=np.intp) if joint is None else joint
     none = np.zeros((rows, 0))
     stacked = Stacked(none, held_out, block, block % 2, joint, int(joint.max()) + 1, joint, none)
-    return Fit((), (), (), (), (), np.tile(held_out, (FOLDS, 1)), stacked)
+    return Fit(cast(Any, None), (), (), NOTHING, np.tile(held_out, (FOLDS, 1)), stacked)
 
 
 def test_a_gain_that_lies_in_few_blocks_is_no_chance() -> None:

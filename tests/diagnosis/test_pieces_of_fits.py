@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from scipy.stats import norm
 from armloop.diagnosis import compensation, fit, next_run, trials
 from armloop.diagnosis.compensation import FeedforwardChange
 from armloop.diagnosis.evidence import Stacked
-from armloop.diagnosis.fit import Shape, _wald, deviate
+from armloop.diagnosis.fit import Fit, Shape, Solution, _wald, deviate
 from armloop.diagnosis.trials import Known
 from armloop.laws.effects import Estimate
 from armloop.regression.clustered import clustered_covariance
@@ -118,12 +118,16 @@ class TestTrials:
             shapes=lambda context: of.get("shapes", [5.0]),
             plausible=lambda arm, parameters: of.get("plausible", True),
             resolved=lambda parameters, shapes: of.get("resolved", True),
+            estimates=lambda arm, free, spread, value: {},
         )
         asked: list[Any] = []
 
         def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
             asked.append((effects, shapes))
-            return SimpleNamespace(effects=effects, parameters=[{}] * len(effects))
+            solution = Solution(np.zeros(2), [np.zeros(1)] * 2, np.eye(2), [0.0] * 2)
+            return Fit(
+                cast(Any, None), tuple(effects), tuple(shapes), solution, np.zeros((2, 0)), cast(Any, None)
+            )
 
         monkeypatch.setattr(trials, "fit", fitted)
         chosen = Shape(2.0, (1.0, 2.0))

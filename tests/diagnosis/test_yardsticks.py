@@ -13,7 +13,7 @@ from armloop.data.blocks import halves
 from armloop.data.motion import Motion, Samples
 from armloop.diagnosis import evidence as evidences
 from armloop.diagnosis.evidence import Evidence, Stacked
-from armloop.diagnosis.fit import Fit, Shape
+from armloop.diagnosis.fit import NOTHING, Fit, Shape
 from armloop.diagnosis.judgement import (
     enough,
     gain,
@@ -124,7 +124,7 @@ def an_evidence() -> Evidence:
 def test_rows_are_weighed_by_what_the_model_leaves_of_each_joint() -> None:
     given = an_evidence()
     assert given.kept.tolist() == [0, 1, 2, 3, 4]
-    assert given.row_samples.tolist() == [0, 1, 1, 2, 3, 4]
+    assert given.stacking[0].tolist() == [0, 1, 1, 2, 3, 4]
     assert (given.fold == halves(given.blocks)).all()
     residual = np.arange(12.0).reshape(6, 2)
     columns = 100 + np.arange(10.0).reshape(5, 2, 1)
@@ -175,7 +175,7 @@ def left(held_out: Any, block: Any, joint: Any = None, complexity: int = 1, wron
     outside = np.full((2, len(block)), wrong)
     outside[block % 2, np.arange(len(block))] = held_out
     effects = tuple(SimpleNamespace(complexity=1) for _ in range(complexity))
-    return Fit(cast(Any, effects), (), (), (), (), outside, stacked).score
+    return Fit(cast(Any, None), cast(Any, effects), (), NOTHING, outside, stacked).score
 
 
 def test_only_what_was_held_out_judges() -> None:

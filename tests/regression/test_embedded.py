@@ -156,9 +156,19 @@ def test_it_ends_where_a_step_removes_less_than_a_ten_thousand_millionth():
 
 
 def test_what_equal_columns_do_not_tell_apart_is_followed_for_thirty_steps():
-    # each of (ones + ε I) x = b with b = (1, -1)/10⁶, as the start
-    beta, _, _ = solve(Moments(np.ones((2, 2)), np.array([1e-6, -1e-6]), 1.0, 9.0), [Linear()], [2])
-    np.testing.assert_allclose(beta, 31 * 1e-6 / 1e-8 * np.array([1.0, -1.0]), rtol=1e-4)
+    class Other(Linear):
+        """The same with the free parameters in another unit."""
+
+        def start(self, beta):
+            return beta / 2
+
+        def embed(self, x):
+            return 2 * x, 2 * np.eye(2)
+
+    # each of (ones + ε I) x = b with b = (1, -1)/10⁶, as the start; where coefficients are free there are no steps
+    for effect, steps in ((Other(), 31), (Linear(), 1)):
+        beta, _, _ = solve(Moments(np.ones((2, 2)), np.array([1e-6, -1e-6]), 1.0, 9.0), [effect], [2])
+        np.testing.assert_allclose(beta, steps * 1e-6 / 1e-8 * np.array([1.0, -1.0]), rtol=1e-4)
 
 
 def test_columns_of_round_off_have_no_scale_and_no_coefficient():

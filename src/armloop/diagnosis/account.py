@@ -154,7 +154,7 @@ class Account:
         evidence, held_out = self.evidence, self._held_out()
         bursts = np.logical_or.reduce([contact.rows for contact in contacts])
         before = (residual / evidence.scale)[evidence.rows & bursts[:, None]]
-        after = held_out[bursts[evidence.row_samples]]
+        after = held_out[bursts[evidence.stacking[0]]]
         return 1 - float((after**2).sum()) / max(float((before**2).sum()), TINY)
 
 

@@ -116,7 +116,7 @@ class Evidence:
         context = model.context(self.samples.motion, every)
         return replace(self, context=replace(context, period=self.context.period), _of_model=_Columns())
 
-    @property
+    @cached_property
     def fold(self) -> Index:
         """(N,) fold of each sample."""
         return halves(self.blocks)
@@ -162,7 +162,7 @@ class Evidence:
             0.0,
             lambda: torque_errors(self.model, self.samples)[self.independent],
         )
-        places, joints = np.nonzero(self.rows[self.kept])
+        _, places, joints = self.stacking
         return np.asarray(errors[self._places[places], joints] / self.scale[joints, None])
 
     @cached_property
@@ -171,9 +171,10 @@ class Evidence:
         return np.flatnonzero(self.rows.any(axis=1))
 
     @cached_property
-    def row_samples(self) -> Index:
-        """(R,) sample of every stacked row."""
-        return np.nonzero(self.rows)[0]
+    def stacking(self) -> tuple[Index, Index, Index]:
+        """Sample of every stacked row, its place among those kept, and its joint (0-based), (R,) each."""
+        samples, joints = np.nonzero(self.rows)
+        return samples, np.searchsorted(self.kept, samples), joints
 
     @cached_property
     def independent(self) -> Index:
@@ -208,19 +209,20 @@ class Evidence:
     def stack(self, residual: Array, columns: list[Array]) -> Stacked:
         """The weighted regression problem of all joints, one row per joint and counted sample."""
         X = np.concatenate(columns, axis=2) if columns else np.zeros((len(self.kept), residual.shape[1], 0))
-        places, joints = np.nonzero(self.rows[self.kept])
-        samples = self.kept[places]
+        samples, places, joints = self.stacking
         weight = 1 / self.scale[joints]
         return Stacked(
             X[places, joints] * weight[:, None],
             residual[samples, joints] * weight,
-            self.blocks[samples],
-            self.fold[samples],
-            joints,
-            residual.shape[1],
-            self._cells[samples, joints],
-            self._model_errors,
+            *self._stacked_alike,
         )
+
+    @cached_property
+    def _stacked_alike(self) -> tuple[Index, Index, Index, int, Index, Array]:
+        """What all stacked problems of these rows have in common."""
+        samples, _, joints = self.stacking
+        cells = self._cells[samples, joints]
+        return self.blocks[samples], self.fold[samples], joints, self.rows.shape[1], cells, self._model_errors
 
 
 def creep(model: ReconstructedModel) -> Array:

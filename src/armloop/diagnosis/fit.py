@@ -17,6 +17,7 @@ from armloop.model import AddedEffect
 from armloop.regression.clustered import clustered_covariance
 from armloop.regression.embedded import RIDGE, solve, unit_scale
 from armloop.regression.moments import Moments
+from armloop.robot.arm import Arm
 from armloop.util.arrays import TINY, Array
 
 #: Coefficients and a nonlinear parameter are found in turn so many times more.
@@ -38,26 +39,38 @@ class Shape(NamedTuple):
         return Shape(value, (value,) * FOLDS)
 
 
+class Solution(NamedTuple):
+    """Least-squares coefficients beta (p,), the free parameters of each effect that they are functions of, their derivative
+    J (p, k), and each effect's nonlinear parameter.
+    """
+
+    beta: Array
+    free: Sequence[Array]
+    J: Array
+    values: Sequence[float]
+
+
+#: The solution of no effects.
+NOTHING = Solution(np.zeros(0), (), np.zeros((0, 0)), ())
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Several effects fitted together to one residual.
 
+    What is stated of the parameters is computed when it is asked for: a search asks most of its fits what they leave alone.
+
     Attributes:
-        effects, shapes: what was fitted.
-        parameters: one dict of estimates per effect, from all blocks.
-        clear: per effect, how many standard errors the clearest of its coefficients is from zero; what would be another
-            law by itself does not count.
-        wald: per effect, chi-square and degrees of freedom of all its coefficients together: where columns are alike each
-            coefficient may be anything, though what they do together is plain.
+        effects, shapes: what was fitted, on ``arm``.
+        solution: the fit on all blocks.
         outside: (FOLDS, R) residual of every weighted row after parameters fitted outside each fold.
         stacked: the rows.
     """
 
+    arm: Arm
     effects: tuple[Effect, ...]
     shapes: tuple[Shape, ...]
-    parameters: tuple[dict[str, Estimate], ...]
-    clear: tuple[float, ...]
-    wald: tuple[tuple[float, int], ...]
+    solution: Solution
     outside: Array
     stacked: Stacked
 
@@ -65,6 +78,53 @@ class Fit:
         """The effects with their parameters, ready to be composed with the model."""
         pairs = zip(self.effects, self.parameters, strict=True)
         return [AddedEffect(effect, parameters) for effect, parameters in pairs]
+
+    @cached_property
+    def parameters(self) -> tuple[dict[str, Estimate], ...]:
+        """One dict of estimates per effect, from all blocks."""
+        return tuple(
+            effect.estimates(self.arm, free, spread, value)
+            for effect, free, spread, value in zip(
+                self.effects, self.solution.free, self._spread, self.solution.values, strict=True
+            )
+        )
+
+    def is_possible(self, k: int, tried: Sequence[float]) -> bool:
+        """Whether an effect's parameters are physically possible, and what a run can show.
+
+        Args:
+            tried: the values of its nonlinear parameter that were tried.
+        """
+        free, value = self.solution.free[k], self.solution.values[k]
+        mine = self.effects[k].estimates(self.arm, free, np.zeros((len(free), len(free))), value)
+        return self.effects[k].plausible(self.arm, mine) and self.effects[k].resolved(mine, tried)
+
+    @cached_property
+    def clear(self) -> tuple[float, ...]:
+        """Per effect, how many standard errors the clearest of its coefficients is from zero.
+
+        What would be another law by itself does not count.
+        """
+        each = zip(self.effects, self.solution.free, self._spread, strict=True)
+        errors = ((effect, np.abs(free) / np.sqrt(np.diag(spread) + TINY)) for effect, free, spread in each)
+        return tuple(float(np.max(own[: len(own) - e.nested], initial=0.0)) for e, own in errors)
+
+    @cached_property
+    def wald(self) -> tuple[tuple[float, int], ...]:
+        """Per effect, chi-square and degrees of freedom of all its coefficients together.
+
+        Where columns are alike each coefficient may be anything, though what they do together is plain.
+        """
+        return tuple(_wald(*each) for each in zip(self.solution.free, self._spread, strict=True))
+
+    @cached_property
+    def _spread(self) -> list[Array]:
+        """Covariance of each effect's free parameters."""
+        rows, (beta, free, J, _) = self.stacked, self.solution
+        whole = covariance(rows.X @ J, rows.y - rows.X @ beta, rows)
+        ends = np.cumsum([len(own) for own in free])
+        blocks = (slice(end - len(own), end) for own, end in zip(free, ends, strict=True))
+        return [whole[block, block] for block in blocks]
 
     @cached_property
     def held_out(self) -> Array:
@@ -84,20 +144,11 @@ def fit(evidence: Evidence, residual: Array, effects: Sequence[Effect], shapes: 
     outside = []
     problem = _Problem(evidence, residual, effects)
     for k in range(FOLDS):
-        judged, beta, _, _, _ = _solved(problem, [s.without[k] for s in shapes], k)
-        outside.append(judged.y - judged.X @ beta)
-    stacked, beta, x, J, values = _solved(problem, [s.final for s in shapes], None)
-    spread = covariance(stacked.X @ J, stacked.y - stacked.X @ beta, stacked)
-    parameters, clear, wald, start = [], [], [], 0
-    for effect, value, free in zip(effects, values, x, strict=True):
-        block = slice(start, start + len(free))
-        parameters.append(effect.estimates(evidence.model.arm, free, spread[block, block], value))
-        errors = np.abs(free) / np.sqrt(np.diag(spread)[block] + TINY)
-        clear.append(float(np.max(errors[: len(free) - effect.nested], initial=0.0)))
-        wald.append(_wald(free, spread[block, block]))
-        start += len(free)
-    said = tuple(parameters), tuple(clear), tuple(wald)
-    return Fit(tuple(effects), tuple(shapes), *said, np.array(outside), stacked)
+        judged, without = _solved(problem, [s.without[k] for s in shapes], k)
+        outside.append(judged.y - judged.X @ without.beta)
+    stacked, solution = _solved(problem, [s.final for s in shapes], None)
+    arm = evidence.model.arm
+    return Fit(arm, tuple(effects), tuple(shapes), solution, np.array(outside), stacked)
 
 
 def _wald(x: Array, spread: Array) -> tuple[float, int]:
@@ -151,14 +202,8 @@ class _Problem:
         return self._last[1:]
 
 
-def _solved(
-    problem: _Problem, values: Sequence[float], without: int | None
-) -> tuple[Stacked, Array, list[Array], Array, list[float]]:
-    """Fit on all rows, or on those outside a fold, with nonlinear parameters refined from where they start.
-
-    Returns:
-        The rows, coefficients, free parameters per effect, derivative, and the refined nonlinear parameters.
-    """
+def _solved(problem: _Problem, values: Sequence[float], without: int | None) -> tuple[Stacked, Solution]:
+    """Rows, and the fit on all or on those outside a fold, with nonlinear parameters refined from where they start."""
     values, effects, evidence = list(values), problem.effects, problem.evidence
     for attempt in range(REFINEMENTS + 1):
         stacked, sizes = problem.rows(values)
@@ -166,13 +211,13 @@ def _solved(
         moments = Moments.of(stacked.X[rows], stacked.y[rows])
         beta, x, J = solve(moments, [_Judged(effect) for effect in effects], sizes)
         better = [
-            _bounded(e, evidence, e.refined(free, value))
+            _bounded(e, evidence, refined) if (refined := e.refined(free, value)) != value else value
             for e, free, value in zip(effects, x, values, strict=True)
         ]
-        if attempt == REFINEMENTS or np.allclose(better, values, rtol=1e-3):
+        if attempt == REFINEMENTS or better == values or np.allclose(better, values, rtol=1e-3):
             break
         values = better
-    return stacked, beta, x, J, values
+    return stacked, Solution(beta, x, J, values)
 
 
 def _bounded(effect: Effect, evidence: Evidence, value: float) -> float:

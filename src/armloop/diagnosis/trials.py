@@ -71,9 +71,7 @@ class Known:
         shape = Shape.fixed(shapes[0]) if one else _best_shape(self, effect, shapes)
         trial = fit(evidence, self.residual, [*current.effects, effect], [*current.shapes, shape])
         # What is known may be nothing beside it, and of either sign: it is asked again beside this one.
-        mine = trial.parameters[-1]
-        there = effect.plausible(evidence.model.arm, mine) and effect.resolved(mine, shapes)
-        return trial if there else None
+        return trial if trial.is_possible(-1, shapes) else None
 
 
 class Tried(NamedTuple):

@@ -50,22 +50,24 @@ def solve(
     """
     if not effects:
         return np.zeros(0), [], np.zeros((0, 0))
-    edges, found = np.cumsum(sizes)[:-1], []
+    edges, found, free = np.cumsum(sizes)[:-1], [], np.eye(len(moments.b))
     # What the motion hardly shows of a body may start anywhere; a stronger ridge starts it near nothing.
     for part in (RIDGE, _STRONG_RIDGE):
-        free = np.split(ridge(moments.G, moments.b, part), edges)
-        x = [effect.start(own) for effect, own in zip(effects, free, strict=True)]
-        found.append(_gauss_newton(moments, effects, x))
-        if np.array_equal(found[0][3], np.eye(len(moments.b))):
-            break  # coefficients are the free parameters themselves, and there is but one minimum
+        least = ridge(moments.G, moments.b, part)
+        x = [effect.start(own) for effect, own in zip(effects, np.split(least, edges), strict=True)]
+        beta, J = _embed(effects, x)
+        if np.array_equal(beta, least) and np.array_equal(J, free):
+            return beta, x, J  # coefficients are the free parameters themselves, and this is the minimum
+        found.append(_gauss_newton(moments, effects, x, beta, J))
+        if np.array_equal(found[0][3], free):
+            break  # so they are where it ended, and there is but one minimum
     return min(found, key=lambda answer: answer[0])[1:]
 
 
 def _gauss_newton(
-    moments: Moments, effects: Sequence[Embedding], x: list[Array]
+    moments: Moments, effects: Sequence[Embedding], x: list[Array], beta: Array, J: Array
 ) -> tuple[float, Array, list[Array], Array]:
-    """Squared error, coefficients, free parameters and derivative at the minimum reached from x."""
-    beta, J = _embed(effects, x)
+    """Squared error, coefficients, free parameters and derivative at the minimum reached from x, beta and J."""
     error, edges = moments.squared_error(beta), np.cumsum([len(part) for part in x])[:-1]
     for _ in range(ITERATIONS):
         step = ridge(J.T @ moments.G @ J, J.T @ (moments.b - moments.G @ beta))
