@@ -52,6 +52,15 @@ class Blocks:
         """Whether the data are too short for blocks that say something new."""
         return self.margin < self.correlation
 
+    def notes(self) -> list[str]:
+        """What the user should know of them."""
+        if not self.too_short:
+            return []
+        return [
+            f"the residual remembers for {self.correlation:.2g} s, and the logs are too short for held-out blocks of more "
+            f"than {self.seconds:.2g} s: the held-out error may be too good"
+        ]
+
 
 def independent_blocks(
     arm: Arm, logs: Sequence[LogSource], how: Conditioning, seconds: float, folds: int

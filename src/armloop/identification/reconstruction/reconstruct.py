@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from armloop.data.log import MotionLog
 from armloop.data.pieces import IN_MEMORY, LogSource
 from armloop.data.repeats import require_different
-from armloop.data.signals import Conditioning, too_short
+from armloop.data.signals import Conditioning
 from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
 from armloop.identification.goodness.witness import MOST, Witness
 from armloop.identification.reconstruction.bandwidth import (
-    Bandwidth,
     check_nyquist,
-    choose_bandwidth,
-    highest_corner,
 )
-from armloop.identification.reconstruction.block_length import FEWEST_BLOCKS, Blocks, independent_blocks
 from armloop.identification.reconstruction.data import Chunk, Data
-from armloop.identification.reconstruction.encoder_zeros import encoder_zeros
 from armloop.identification.reconstruction.excitation import check_recorded, determined
 from armloop.identification.reconstruction.fitted import uncertainty
 from armloop.identification.reconstruction.friction_selection import check_laws
-from armloop.identification.reconstruction.held_out import held_out_intervals
 from armloop.identification.reconstruction.libraries import (
     Attempt,
     Contender,
@@ -42,12 +35,12 @@ from armloop.identification.reconstruction.libraries import (
 )
 from armloop.identification.reconstruction.library import METHODS, REFERENCE, Library
 from armloop.identification.reconstruction.options import Options, StepReport
+from armloop.identification.reconstruction.preparation import Prepared, prepared
 from armloop.identification.reconstruction.ripple import find_ripple
 from armloop.identification.reconstruction.ripple import notes as ripple_notes
 from armloop.identification.reconstruction.shared import motion_range, slowest_sliding
 from armloop.identification.reconstruction.tally import Part, Tally, at_least
 from armloop.identification.reconstruction.torque_checks import check_torques
-from armloop.identification.reconstruction.torque_lag import torque_lag
 from armloop.identification.scoring import Score, residual
 from armloop.identification.uncertainty.between_logs import notes as between_logs_notes
 from armloop.model import ReconstructedModel
@@ -156,8 +149,7 @@ def reconstruct(
     for log in logs:
         if log.joints != arm.n:
             raise InputError(f"{log.name}: {log.joints} joints, but {arm.name} has {arm.n}")
-    large = sum(log.samples for log in logs) > in_memory
-    streamed = large and method != REFERENCE
+    streamed = sum(log.samples for log in logs) > in_memory and method != REFERENCE
     kept = [] if streamed else [log.read() for log in logs]
     require_different(kept)
     say_beyond_limits(arm, kept)
@@ -165,162 +157,76 @@ def reconstruct(
         check_nyquist(kept or logs, conditioning.cutoff_hz)
         # samples that are no time series show the first library alone what it needs
         wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
-    usual = [conditioning or one.conditioning for one in wanted]
-    late, lag, corners = None, 0.0, set[float]()
-    while True:
-        bandwidth, blocks = filter_and_blocks(
-            kept or logs, arm, usual, settings, conditioning is None, progress, lag
-        )
-        dealt = replace(settings, block_seconds=blocks.seconds, correlation_seconds=blocks.correlation)
-        filters = sorted({conditioning or bandwidth.suited(one.conditioning) for one in wanted}, key=astuple)
-        aside = held_out_intervals(kept or logs, filters, dealt) if bandwidth.cutoff_hz > 0 else []
-        if bandwidth.cutoff_hz in {0.0, *corners} or method == REFERENCE:
-            break
-        corners.add(bandwidth.cutoff_hz)
-        progress("whether the torque is in step with the motion")
-        found = torque_lag(kept or logs, arm, filters[0], aside, blocks.seconds)
-        if not found.seconds:
-            break
-        # what is out of step asks for a low corner, and a lag is known best at a high one
-        late, lag = found, found.seconds
-    settings, zeros = dealt, None
-    if kept and bandwidth.cutoff_hz > 0 and method != REFERENCE:
-        zeros = encoder_zeros(kept, arm, bandwidth.cutoff_hz, aside, blocks.correlation)
-        logs = kept = zeros.corrected(kept)
-    check_torques(kept or logs, arm, bandwidth.cutoff_hz)
-
-    refused = {one: one.undetermined(arm, kept or logs, bandwidth.cutoff_hz) for one in wanted}
-    refused = {} if library is not None else {one: why for one, why in refused.items() if why}
-    left = [one for one in wanted if one not in refused]
-    # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
-    few = len(left) > 1 and bool(kept) and settings.folds > 2
-    if few:
-        held_out = held_out_intervals(kept, [bandwidth.suited(usual[0])], settings)
-        few = sum(map(len, held_out)) < 2 * FEWEST_BLOCKS
+    usual = [one.conditioning for one in wanted]
+    ready = prepared(logs, kept, arm, usual, conditioning, settings, progress, corrected=method != REFERENCE)
+    check_torques(ready.kept or ready.logs, arm, ready.bandwidth.cutoff_hz)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
-        how = conditioning or bandwidth.suited(library.conditioning)
-        how = replace(how, torque_lag=lag)
+        how = ready.conditioning(library.conditioning)
         progress(f"{library.name}: conditioning {len(logs)} log(s), low-pass {how.cutoff_hz:g} Hz")
         if streamed:
-            data = Data.streamed(logs, how, settings, workers, progress)
+            data = Data.streamed(ready.logs, how, ready.options, workers, progress)
         else:
-            data = Data.kept(kept, how, settings)
+            data = Data.kept(ready.kept, how, ready.options)
             data = data.nested() if nested else data
         check_recorded(arm, data.reference.samples)
-        found = library.methods[method](arm, data, settings, progress)
-        if bandwidth.trials:
-            found.history["bandwidth"] = bandwidth.to_dict()
-        found.notes += bandwidth.notes() + _too_short(kept, how)
-        if zeros is not None and zeros.found:
-            found.history["encoder_zeros"] = zeros.to_dict(kept)
-            found.notes += zeros.notes(arm)
-        if late is not None:
-            found.history["torque_lag"] = late.to_dict()
-            found.notes += late.notes()
-        return Attempt(library, how, data, found, blocks.margin)
+        found = library.methods[method](arm, data, ready.options, progress)
+        found.history |= ready.history()
+        found.notes += ready.notes(arm, how)
+        return Attempt(library, how, data, found, ready.blocks.margin)
 
+    refused = {} if library is not None else _refused(arm, wanted, ready)
+    tried, part = _compared(wanted, refused, attempt, ready)
+    return _finished(tried, part, method, ready, progress, recorded)
+
+
+def _refused(arm: Arm, wanted: Sequence[Library], ready: Prepared) -> dict[Library, str]:
+    """Libraries whose terms the logs do not determine, and why."""
+    logs, cutoff_hz = ready.kept or ready.logs, ready.bandwidth.cutoff_hz
+    reasons = {one: one.undetermined(arm, logs, cutoff_hz) for one in wanted}
+    return {one: why for one, why in reasons.items() if why}
+
+
+def _compared(
+    wanted: Sequence[Library], refused: dict[Library, str], attempt: Callable[..., Attempt], ready: Prepared
+) -> tuple[list[Contender], Part]:
+    """What each library comes to, one of them chosen, and the part of the held-out blocks that judges it."""
+    left = [one for one in wanted if one not in refused]
     tried = [Contender(one, refused=why) for one, why in refused.items()]
     if len(left) == 1:
         tried += [Contender(one, attempt(one), chosen=True) for one in left]
-    else:
-        tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
+        return sorted(tried, key=lambda one: wanted.index(one.library)), "all"
+    # half of the held-out blocks may be too few to judge by; a fold of the others then chooses the library
+    few = len(left) > 1 and ready.few_held_out(wanted[0].conditioning)
+    tried = choose([*tried, *(contender(one, partial(attempt, nested=few)) for one in left)])
     tried.sort(key=lambda one: wanted.index(one.library))
     if few:
         tried = [replace(one, attempt=attempt(one.library)) if one.chosen else one for one in tried]
-    part: Part = "all" if few or len(left) == 1 else "test"
-    return _finished(tried, part, method, logs, settings, progress, recorded, blocks)
-
-
-def _too_short(logs: Sequence[MotionLog], how: Conditioning) -> list[str]:
-    """A line on runs that are too short for the filter: what only they show, the model does not know."""
-    lost = {log.name: count for log in logs if (count := too_short(log, how))}
-    if not lost:
-        return []
-    part = sum(lost.values()) / sum(log.samples for log in logs)
-    return [
-        f"{part:.0%} of the samples lie in runs of less than {how.shortest:.3g} s, too short for a low-pass of "
-        f"{how.cutoff_hz:.3g} Hz, and are left out ({', '.join(lost)}); a higher --cutoff would use them"
-    ]
-
-
-def filter_and_blocks(
-    logs: Sequence[LogSource],
-    arm: Arm,
-    usual: Sequence[Conditioning],
-    options: Options,
-    choosing: bool,
-    progress: Progress,
-    torque_lag: float = 0.0,
-) -> tuple[Bandwidth, Blocks]:
-    """The low-pass, and the blocks that are held out: from it, too.
-
-    How long blocks must be depends on the low-pass, and they are held out from its choice: where a lower corner asks for
-    longer ones, it is chosen anew.
-
-    Args:
-        usual: filters of the libraries that are going to be regressed.
-        choosing: whether the corner is chosen; else it is the usual one.
-        torque_lag: of the logs, s.
-    """
-    highest = Conditioning(torque_lag=torque_lag)
-
-    def blocks_at(bandwidth: Bandwidth) -> Blocks:
-        how = replace(bandwidth.suited(usual[0]), torque_lag=torque_lag)
-        return independent_blocks(arm, logs, how, options.block_seconds, options.folds)
-
-    if not choosing:
-        bandwidth = Bandwidth(usual[0].cutoff_hz)
-        return bandwidth, blocks_at(bandwidth)
-    progress("choosing the low-pass on blocks that judge nothing else")
-    bandwidth = Bandwidth(highest_corner(logs, highest))
-    seconds, blocks = 0.0, blocks_at(bandwidth)
-    while blocks.seconds > seconds:
-        seconds, before = blocks.seconds, bandwidth.cutoff_hz
-        dealt = replace(options, block_seconds=seconds)
-        bandwidth = choose_bandwidth(logs, arm, highest, dealt, usual)
-        if bandwidth.cutoff_hz != before:
-            blocks = blocks_at(bandwidth)
-    return bandwidth, blocks.within(seconds)
+    return tried, "all" if few else "test"
 
 
 def _finished(
     libraries: list[Contender],
     part: Part,
     method: str,
-    logs: Sequence[LogSource],
-    options: Options,
+    ready: Prepared,
     progress: Progress,
     recorded: dict[str, Any] | None,
-    blocks: Blocks,
 ) -> Reconstruction:
     """The model with its history, its baseline on held-out data and its standard errors."""
     (tried,) = [one.attempt for one in libraries if one.chosen]
     assert tried is not None
     found, data, compared = tried.found, tried.data, len(libraries) > 1
     if method != REFERENCE:
-        bare = found.model(conditioning=tried.conditioning)
-        if data.in_memory:
-            recorded_logs, chunk = [log.read() for log in logs], data.reference
-        else:
-            recorded_logs, chunk = data.recorded(_RIPPLE)
-        ripple = find_ripple(bare, recorded_logs, chunk.samples, chunk.held_out)
-        found.notes += ripple_notes(ripple)
-        for one in (found, *([] if found.final is None else [found.final])):
-            one.effects = (*one.effects, *ripple)
-    notes = [*(comparison_notes(libraries) if compared else []), *found.notes]
-    if blocks.too_short:
-        notes.append(
-            f"the residual remembers for {blocks.correlation:.2g} s, and the logs are too short for held-out blocks of more "
-            f"than {blocks.seconds:.2g} s: the held-out error may be too good"
-        )
+        _find_ripple(tried, ready.logs)
+    notes = [*(comparison_notes(libraries) if compared else []), *found.notes, *ready.blocks.notes()]
     model = found.model(
         conditioning=tried.conditioning,
         recorded=recorded or {"unit": "N*m", "drive_gains": None},
         history={
             "method": method,
             "library": tried.library.name,
-            "logs": list(dict.fromkeys(log.name for log in logs)),
+            "logs": list(dict.fromkeys(log.name for log in ready.logs)),
             "steps": [report.to_dict() for report in found.reports],
             "range": motion_range(data.reference.samples.motion),
             "slowest": slowest_sliding(data.reference.samples),
@@ -329,7 +235,7 @@ def _finished(
     )
     tally = tried.tally(found.sorter, part)
     parts = []
-    if options.parts:
+    if ready.options.parts:
         progress("what a flexible regression still finds in what the model leaves")
         parts = held_out_parts(model, data, part, progress)
     yardsticks = tried.yardsticks(found.sorter, Options().block_seconds)
@@ -346,12 +252,26 @@ def _finished(
     if compared:
         history["libraries"] = [one.to_dict() for one in libraries]
     model = replace(model, history=history)
-    if options.standard_errors:
+    if ready.options.standard_errors:
         progress("standard errors of the coefficients")
         model = replace(model, uncertainty=uncertainty(model, data, found, tried.library.shared))
         notes += between_logs_notes(model)
         model = replace(model, history={**model.history, "notes": notes})
     return Reconstruction(model, found.reports, tally.score(), notes, libraries, parts)
+
+
+def _find_ripple(tried: Attempt, logs: Sequence[LogSource]) -> None:
+    """Add the gears' ripples, looked for in the logs as they were recorded, to what was found."""
+    found, data = tried.found, tried.data
+    bare = found.model(conditioning=tried.conditioning)
+    if data.in_memory:
+        recorded_logs, chunk = [log.read() for log in logs], data.reference
+    else:
+        recorded_logs, chunk = data.recorded(_RIPPLE)
+    ripple = find_ripple(bare, recorded_logs, chunk.samples, chunk.held_out)
+    found.notes += ripple_notes(ripple)
+    for one in (found, *([] if found.final is None else [found.final])):
+        one.effects = (*one.effects, *ripple)
 
 
 def held_out_parts(model: ReconstructedModel, data: Data, part: Part, progress: Progress) -> list[Parts]:
