@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -104,6 +105,29 @@ def test_what_is_beside_a_load_is_found_too(model: ReconstructedModel, seed: int
     assert abs(float(np.asarray(friction["level"].value)) - level) < 0.02
     times = np.column_stack([load["picked_up"].value, load["put_down"].value])
     np.testing.assert_allclose(times, TIMES, atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("left", "law", "events", "asked"),
+    [
+        (3.9, None, [], False),
+        (4.1, None, [], True),
+        (0.0, "a law", [], True),
+        (0.0, None, [None], False),
+        (0.0, None, [None, 2], False),
+        (0.0, None, [None, None], True),
+    ],
+)
+def test_it_is_asked_where_much_is_left_or_several_forces_came_and_went(
+    left: float, law: str | None, events: list[int | None], asked: bool
+) -> None:
+    score = SimpleNamespace(energy=np.array([0.0, 10 * left]), rows=np.array([10, 10]))
+    account: Any = SimpleNamespace(
+        unlisted=law,
+        outcome=SimpleNamespace(after=SimpleNamespace(score=score)),
+        contacts=[SimpleNamespace(added=SimpleNamespace(effect=SimpleNamespace(joint=j))) for j in events],
+    )
+    assert carrying._is_asked(account) is asked
 
 
 def test_a_load_of_moments_alone_is_none(model: ReconstructedModel, monkeypatch: pytest.MonkeyPatch) -> None:

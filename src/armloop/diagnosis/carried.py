@@ -2,9 +2,9 @@
 
 Load and intervals are found in turn (hard expectation maximisation). The load being given, the likeliest sequence of carried
 and not carried follows by dynamic programming (Viterbi 1967), each change at a price; the sequence being given, the load is
-regressed. It is looked for where the effects found leave more than the model's own shortcomings, and taken if what is then
-left is far less: what comes and goes is no law of the motion, and a search for laws would find the nearest. When the load
-is carried, all samples say; how heavy it is, only those outside the fold that is judged.
+regressed. It is looked for where the effects found leave more than the model's own shortcomings, or several forces came and
+went, and taken if what is then left is far less: what comes and goes is no law of the motion, and a search for laws would
+find the nearest. When the load is carried, all samples say; how heavy it is, only those outside the fold that is judged.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def account_with_load(
     Args:
         account: that without such a load.
     """
-    if not _much_is_left(account):
+    if not _is_asked(account):
         return None
     progress("whether a load was carried in parts of the run")
     found = find_carried(without(whole, []))
@@ -135,9 +135,14 @@ def _beside(whole: Evidence, known: Known, unknown: Mask, progress: Progress, jo
         return best_account(again, contacts, progress, panel)
 
 
-def _much_is_left(account: Account) -> bool:
-    """Whether a law was stated, or some joint's error is a multiple of the baseline."""
-    return account.unlisted is not None or bool(much_is_left(account.outcome.after.score).any())
+def _is_asked(account: Account) -> bool:
+    """Whether a law was stated, some joint's error is a multiple of the baseline, or there were several forces.
+
+    What comes and goes may be one thing that is gripped and let go, again and again.
+    """
+    forces = sum(contact.added.effect.joint is None for contact in account.contacts)
+    much = much_is_left(account.outcome.after.score).any()
+    return account.unlisted is not None or bool(much) or forces > 1
 
 
 def find_carried(evidence: Evidence) -> tuple[CarriedLoad, Mask] | None:
