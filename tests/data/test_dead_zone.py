@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from synthetic import sines
 
+from armloop.data.creep import may_stick
 from armloop.data.log import MotionLog
-from armloop.data.signals import Conditioning, preprocess, velocity_noise
+from armloop.data.signals import Conditioning, Speeds, preprocess, velocity_noise
 
 TEN_HZ = Conditioning(cutoff_hz=10.0)
 
@@ -75,6 +76,22 @@ def test_a_joint_that_rests_to_the_last_digit_shows_no_noise_then():
     assert level[0] > 1e-3
     np.testing.assert_allclose(velocity_noise(rests, 10.0), level, rtol=0.3)
     assert velocity_noise(rests.select(time > 2), 10.0)[0] == 0.0
+
+
+def test_a_joint_goes_as_fast_as_in_the_log_in_which_it_does_and_one_that_others_shake_is_not_known():
+    time = np.arange(0, 20, 0.01)
+    # a swing, a slow one, one of a few thousandths of a radian; then the first joint rests and the second goes faster
+    q = np.column_stack([np.sin(time), 0.05 * np.sin(time), 0.004 * np.sin(10 * time)])
+    v = np.column_stack([np.cos(time), 0.05 * np.cos(time), 0.04 * np.cos(10 * time)])
+    first = MotionLog(time, q, v, 0 * q)
+    then = replace(first, q=[0, 2, 1] * q, v=[0, 2, 1] * v)
+    one, other = (Speeds.of(log, 10.0) for log in (first, then))
+    np.testing.assert_allclose(one.fastest, [1.0, 0.05, np.inf], rtol=1e-3)
+    np.testing.assert_allclose(other.fastest, [np.inf, 0.1, np.inf], rtol=1e-3)
+    np.testing.assert_allclose(Speeds.joined([one, other]).fastest, [1.0, 0.1, np.inf], rtol=1e-3)
+    samples = preprocess([first, then], TEN_HZ)
+    np.testing.assert_allclose(samples.fastest, [1.0, 0.1, np.inf], rtol=1e-3)
+    np.testing.assert_allclose(may_stick(samples.fastest), [0.01, 0.005, 0.01], rtol=1e-3)
 
 
 def test_the_noise_is_that_of_all_runs_not_of_the_longest():

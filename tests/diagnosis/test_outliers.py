@@ -92,7 +92,8 @@ class TestBurstsOfTheResidual:
 
     def evidence(self, given: Motion) -> Any:
         samples = SimpleNamespace(motion=given, moving=np.zeros(given.q.shape, dtype=bool))
-        return SimpleNamespace(samples=samples, scale=np.array([0.5]), unknown=None)
+        model = SimpleNamespace(history={}, arm=SimpleNamespace(n=1))
+        return SimpleNamespace(samples=samples, scale=np.array([0.5]), unknown=None, model=model)
 
     def test_only_what_friction_cannot_hold_counts_and_the_rest_of_the_run_is_the_yardstick(
         self, monkeypatch: pytest.MonkeyPatch

@@ -16,7 +16,7 @@ from armloop.robot.arm import Arm, load_arm
 pytest.importorskip("mujoco", reason="mujoco is needed for tests only; it is in requirements-test.lock")
 
 from outside.mujoco_arms import OutsideArm, random_arm, write_log
-from outside.references import mixed_reference
+from outside.references import fourier_reference, mixed_reference
 
 #: Ten arms of two to six joints; what their seeds are was not looked at.
 TEN = [(100 + k, 2 + k % 5) for k in range(10)]
@@ -50,6 +50,24 @@ def check(seed: int, joints: int, seconds: float, folder: Path) -> None:
 
 def test_friction_and_mass_matrix_of_one_arm(tmp_path: Path) -> None:
     check(1, 2, 30.0, tmp_path)
+
+
+def test_joints_that_never_go_fast(tmp_path: Path) -> None:
+    """Two that turn at two degrees a second, and one that slides a centimetre in a second."""
+    made = random_arm(33, 3, sliding=True)
+    paths = [
+        write_log(
+            made.simulate(fourier_reference(made, seed, 100.0, 0.03, period=200.0), seed=seed, rate=100),
+            tmp_path / f"{seed}.csv",
+        )
+        for seed in (33, 34)
+    ]
+    arm = load_arm(made.write_urdf(tmp_path / "arm.urdf", mass_error=0.1))
+    model = reconstruct([read_log(path) for path in paths], arm, options=Options(parts=False)).model
+    assert max(model.history["range"][1]) < 0.05 and model.history["range"][1][2] < 0.015
+    assert max(model.baseline["nrmse"]) < 0.01
+    for link, line in zip(made.links, model.uncertainty["friction_line"], strict=True):
+        assert line["coulomb"]["value"] == pytest.approx(link.frictionloss, rel=0.02)
 
 
 @pytest.mark.long

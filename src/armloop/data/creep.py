@@ -9,6 +9,13 @@ from armloop.util.arrays import Array, Mask
 
 #: A joint creeps below this part of the speed that its model was trained at.
 CREEPING = 0.05
+#: A joint slower than this, rad/s or m/s, may stick, or be shaken by others.
+STICKING = 0.01
+
+
+def may_stick(fastest: Array) -> Array:
+    """(n,) speeds below which joints may stick, rad/s (m/s), by the largest that they go at: some joints never go fast."""
+    return np.minimum(STICKING, CREEPING * fastest)
 
 
 def creeping(samples: Samples, speeds: Array) -> Mask:

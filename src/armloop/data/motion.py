@@ -170,6 +170,7 @@ class Samples:
         the runs are as they were recorded
     wider : corner of the low-pass that the motion has passed, as a multiple of tau's
     unknown : (N, n) true where tau is no measurement of the joint's torque (it counts as not moving); None where all are
+    fastest : (n,) largest speed of each joint, rad/s (m/s), infinite where it gets nowhere; None where nobody looked
 
     Raises `InputError` when the shapes do not agree.
     """
@@ -182,6 +183,7 @@ class Samples:
     spans: Array | None = None
     wider: float = 1.0
     unknown: Mask | None = None
+    fastest: Array | None = None
 
     def __post_init__(self) -> None:
         if self.tau.shape != self.motion.q.shape or self.moving.shape != self.motion.q.shape:

@@ -9,7 +9,7 @@ Runs are treated one by one, never across a gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,6 +29,8 @@ _SHORTEST = 6
 FELT = 0.01
 #: Periods that differ by less than this part are one.
 _ALIKE = 0.01
+#: The largest speed of a log is this quantile, and a joint gets somewhere in it that travels so far, rad or m.
+_FASTEST, _TRAVELS = 0.995, 0.02
 #: Hz; a filter of a lower corner would need hours of a log.
 LOWEST_CORNER = 1e-3
 
@@ -85,6 +87,33 @@ class ShortRunError(LogError):
     """No run of a log is long enough for the filter."""
 
 
+@dataclass(frozen=True, eq=False)
+class Speeds:
+    """What logs show of the joints' speeds, (n,) each, rad/s (m/s).
+
+    Attributes:
+        noise: standard deviation of what a filter leaves of its noise (:func:`velocity_noise`).
+        fastest: the largest; infinite for a joint that gets nowhere, which others may shake.
+    """
+
+    noise: Array
+    fastest: Array
+
+    @staticmethod
+    def of(log: MotionLog, cutoff_hz: float) -> Speeds:
+        """Those of one log."""
+        fastest = np.quantile(np.abs(log.v), _FASTEST, axis=0)
+        travels = np.ptp(log.q, axis=0) >= _TRAVELS
+        return Speeds(velocity_noise(log, cutoff_hz), np.where(travels, fastest, np.inf))
+
+    @staticmethod
+    def joined(each: Iterable[Speeds]) -> Speeds:
+        """Those of the noisiest log, and of the one in which a joint goes fastest, joint by joint."""
+        noises, speeds = zip(*((own.noise, own.fastest) for own in each), strict=True)
+        known = np.where(np.isfinite(speeds), speeds, 0.0).max(axis=0)
+        return Speeds(np.max(noises, axis=0), np.where(known > 0, known, np.inf))
+
+
 def uniform_period(time: Array) -> float:
     """The mean sample period of a run of at least two samples, s.
 
@@ -98,7 +127,7 @@ def derivative(x: Array, period: float) -> Array:
     return np.gradient(x, period, axis=0, edge_order=2)
 
 
-def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None = None) -> Samples:
+def preprocess(logs: Sequence[MotionLog], how: Conditioning, speeds: Speeds | None = None) -> Samples:
     """Prepare logs for regression: resample, filter, differentiate, trim, decimate.
 
     Each run is put on a uniform grid (cubic splines where its stamps jitter), filtered, and thinned to
@@ -107,7 +136,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     ``vdot`` is the filtered log's own column, else the derivative of the filtered v.
 
     Args:
-        noise: (n,) of :func:`velocity_noise`, where it is known from more logs than these.
+        speeds: what is known from more logs than these.
 
     Returns:
         The samples of all runs, one after the other; ``moving`` is false within ``smear`` periods of
@@ -119,14 +148,14 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
     """
     if how.cutoff_hz <= 0:
         return _as_they_are(logs)
-    if noise is None:
-        noise = np.max([velocity_noise(log, how.cutoff_hz) for log in logs], axis=0)
+    if speeds is None:
+        speeds = Speeds.joined(Speeds.of(log, how.cutoff_hz) for log in logs)
     parts, spans = [], []
     for log in logs:
         lag = log.velocity_lag
         fresh = repaired(recorded(log), lag if lag * how.cutoff_hz >= FELT else 0.0)
         for run in log.runs():
-            part = _condition_run(fresh, run, how, how.dead_zone * noise)
+            part = _condition_run(fresh, run, how, how.dead_zone * speeds.noise)
             if part is not None:
                 parts.append(part)
                 spans.append(log.time[[run.start, run.stop - 1]])
@@ -155,6 +184,7 @@ def preprocess(logs: Sequence[MotionLog], how: Conditioning, noise: Array | None
         np.array(spans),
         WIDER,
         lost if lost.any() else None,
+        speeds.fastest,
     )
 
 

@@ -80,7 +80,7 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         tells = np.ones_like(residual, dtype=bool)
         every = frozenset(range(motion.joints))
         bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
-    holds = turning(motion, evidence.samples.moving) | at_rest(evidence.samples)
+    holds = turning(motion, evidence.samples.moving) | at_rest(evidence)
     bursts = _rare(evidence.rows, bursts)
 
     def counted(burst: Burst, others: Sequence[Burst]) -> Mask:

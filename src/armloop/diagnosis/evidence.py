@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from armloop.data.blocks import BLOCK_SECONDS, block_numbers, halves, widened
+from armloop.data.creep import may_stick
 from armloop.data.filters import INDEPENDENT
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import independent_rows, smooth
@@ -229,6 +230,17 @@ def creep(model: ReconstructedModel) -> Array:
     """(n,) speed of each joint, rad/s (m/s), below which it is pushed about within its friction and has not moved."""
     ranges = model.history.get("range")
     return STILL * np.asarray(ranges[1]) if ranges else np.full(model.arm.n, 1e-3)
+
+
+def fastest(model: ReconstructedModel) -> Array:
+    """(n,) largest speed of each joint that the model was trained at, rad/s (m/s); infinite where nobody knows."""
+    ranges = model.history.get("range")
+    return np.asarray(ranges[1], dtype=float) if ranges else np.full(model.arm.n, np.inf)
+
+
+def sticking(model: ReconstructedModel) -> Array:
+    """(n,) speed of each joint, rad/s (m/s), below which it may stick; the level of its friction is that at this speed."""
+    return may_stick(fastest(model))
 
 
 def starting(samples: Samples) -> Mask:

@@ -95,9 +95,11 @@ class Fit:
         Args:
             tried: the values of its nonlinear parameter that were tried.
         """
-        free, value = self.solution.free[k], self.solution.values[k]
-        mine = self.effects[k].estimates(self.arm, free, np.zeros((len(free), len(free))), value)
-        return self.effects[k].plausible(self.arm, mine) and self.effects[k].resolved(mine, tried)
+        effect, free, value = self.effects[k], self.solution.free[k], self.solution.values[k]
+        # most are, whatever their errors
+        bare = effect.estimates(self.arm, free, np.zeros((len(free), len(free))), value)
+        possible = effect.plausible(self.arm, bare) or effect.plausible(self.arm, self.parameters[k])
+        return possible and effect.resolved(bare, tried)
 
     @cached_property
     def clear(self) -> tuple[float, ...]:

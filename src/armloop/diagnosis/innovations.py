@@ -14,10 +14,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from armloop.data.blocks import widened
-from armloop.data.creep import CREEPING
+from armloop.data.creep import CREEPING, STICKING
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import smooth
-from armloop.diagnosis.evidence import Evidence, too_slow
+from armloop.diagnosis.evidence import Evidence, fastest, sticking, too_slow
 from armloop.diagnosis.judgement import NEARLY, SIGNIFICANCE
 from armloop.dynamics import Dynamics, ModelEquations
 from armloop.laws.friction import Direction
@@ -28,8 +28,6 @@ from armloop.util.functions import NUMPY
 
 #: Seconds over which a residual is averaged before its size is taken: what oscillates faster is no event.
 WINDOW = 0.2
-#: A joint slower than this, rad/s or m/s, may stick; the level of its friction is that at this speed.
-CREEP = 0.01
 #: Dry friction of a joint that creeps is known but for what may, by chance, be left there as on the model's training
 #: logs, at most, and where nobody knows that, or slower than it slid in them, but for this part …
 _UNSURE = 0.8
@@ -46,7 +44,7 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     """
     samples, model = evidence.samples, evidence.model
     motion = samples.motion
-    rest = at_rest(samples)
+    rest = at_rest(evidence)
     # Where sliding takes more than the model says, so does sticking.
     sliding_more = [
         float(np.median((np.sign(motion.v[:, j]) * residual[:, j])[evidence.rows[:, j]]))
@@ -56,8 +54,8 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     ]
     more = np.abs(sliding_more)
     dry = dry_level(evidence, known) + more
-    ranges = model.history.get("range")
-    slow = CREEPING * np.asarray(ranges[1]) if ranges else np.full(motion.joints, CREEP)
+    speeds = fastest(model)
+    slow = np.where(np.isfinite(speeds), CREEPING * speeds, STICKING)
     left = [np.inf if x is None else x for x in model.baseline.get("creeping") or [None]]
     creeping = np.minimum(SIGNIFICANCE * np.array(left) + more, _UNSURE * dry)
     creeping = creeping * np.exp(-((motion.v / np.maximum(slow, 1e-9)) ** 2))
@@ -78,13 +76,14 @@ def innovations(evidence: Evidence, residual: Array, known: Sequence[AddedEffect
     return sign * size / deviations(evidence, residual), rest
 
 
-def at_rest(samples: Samples) -> Mask:
+def at_rest(evidence: Evidence) -> Mask:
     """(N, n) whether a joint stands still; around a standstill the filter has smeared only its torque."""
+    samples = evidence.samples
     rest = ~samples.moving
     reach = max(1, round(samples.reach / samples.period)) if samples.cutoff_hz > 0 else 0
     if reach:
         rest = ~widened(samples.moving, samples.motion, reach)
-    return np.asarray(rest | (np.abs(samples.motion.v) < CREEP))
+    return np.asarray(rest | (np.abs(samples.motion.v) < sticking(evidence.model)))
 
 
 def averaged(samples: Samples, values: Array) -> Array:
@@ -151,7 +150,7 @@ def _dry(evidence: Evidence, known: Sequence[AddedEffect]) -> list[tuple[Directi
         rubbing = ModelEquations(model.with_effects(known), NUMPY, sharp=True)
     except ModelError:  # an effect of one's own that is no law of the state
         rubbing = ModelEquations(replace(model, effects=()), NUMPY, sharp=True)
-    creep = list(np.full_like(motion.v, CREEP).T)
+    creep = list(np.broadcast_to(sticking(model), motion.v.shape).T)
     load = np.zeros_like(motion.v) if evidence.context.load is None else evidence.context.load
     found = rubbing.dry_and_smooth(list(motion.q.T), creep, list(load.T), motion.elapsed)
     return [(along, np.abs(level) + np.zeros(len(motion.v))) for along, level, _ in found]

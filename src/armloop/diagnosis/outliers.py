@@ -10,8 +10,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from armloop.data.motion import Motion
-from armloop.diagnosis.evidence import Evidence
-from armloop.diagnosis.innovations import CREEP, dry_level
+from armloop.diagnosis.evidence import Evidence, sticking
+from armloop.diagnosis.innovations import dry_level
 from armloop.diagnosis.pushes import PAUSE, around
 from armloop.util.arrays import Array
 
@@ -34,7 +34,7 @@ def outlying(evidence: Evidence, residual: Array) -> list[slice]:
         residual: (N, n) what the model leaves, N·m (N).
     """
     motion = evidence.samples.motion
-    rest = ~evidence.samples.moving | (np.abs(motion.v) < CREEP)
+    rest = ~evidence.samples.moving | (np.abs(motion.v) < sticking(evidence.model))
     held = np.where(rest, dry_level(evidence), 0.0)
     if evidence.unknown is not None:
         held = np.where(evidence.unknown, np.inf, held)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,6 +20,7 @@ from armloop.identification.reconstruction.lagrangian import _Problem, _Problems
 from armloop.identification.reconstruction.shared import FRICTION
 from armloop.model.components import Lagrangian
 from armloop.regression.moments import Moments
+from armloop.util.errors import ExcitationError
 
 NONE = np.zeros(0, dtype=np.intp)
 
@@ -113,6 +115,15 @@ def test_a_constant_force_is_weight_where_a_slide_lifts_it_and_an_offset_elsewhe
             theta = np.zeros(total)
             theta[support] = own.solve(support)
             weights = 1 / fit.errors(theta)
+
+
+def test_a_joint_that_never_slides_fast_is_told_by_its_number() -> None:
+    library = EnergyTerms(np.zeros(2, dtype=bool), *np.zeros((3, 2, 2), dtype=int))
+    given = Moments.of(np.ones((3, 2)), np.ones(3))
+    parts = [(np.arange(2), given), (np.arange(2), replace(given, count=0.0, yy=0.0))]
+    data: Any = SimpleNamespace(sum=lambda function, what: _Problems(_Problem(2, parts), _Problem(2, parts)))
+    with pytest.raises(ExcitationError, match=r"^q2: no sample"):
+        lagrangian._choose(library, data, [])
 
 
 class Faked:

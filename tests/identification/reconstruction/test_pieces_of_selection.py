@@ -308,7 +308,9 @@ class TestLadder:
 class TestSharedSamples:
     def samples(self, v: np.ndarray, cutoff: float = 5.0, starts: tuple[int, ...] = (0,)) -> Any:
         motion = Motion(np.arange(len(v)) * 0.1, 0 * v, v, 0 * v, np.array(starts))
-        return SimpleNamespace(motion=motion, cutoff_hz=cutoff, period=0.1, moving=np.abs(v) > 0.001)
+        return SimpleNamespace(
+            motion=motion, cutoff_hz=cutoff, period=0.1, moving=np.abs(v) > 0.001, fastest=None
+        )
 
     def test_steady_creep_keeps_direction_and_half_of_its_speed_over_a_period_of_the_corner(self) -> None:
         v = np.full((30, 1), 0.008)

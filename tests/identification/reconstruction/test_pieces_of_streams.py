@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from armloop.data.motion import Motion, Samples
-from armloop.data.signals import ShortRunError
+from armloop.data.signals import ShortRunError, Speeds
 from armloop.identification.reconstruction import data as module
 from armloop.identification.reconstruction.data import Chunk, Data
 
@@ -41,14 +41,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The noise that the conditioning was told of; a log of fewer than three samples is too short."""
     noises: list[Any] = []
 
-    def preprocess(logs: Any, how: Any, noise: Any = None) -> Samples:
-        noises.append(None if noise is None else noise.tolist())
+    def preprocess(logs: Any, how: Any, speeds: Any = None) -> Samples:
+        noises.append(None if speeds is None else speeds.noise.tolist())
         if logs[0].samples < 3:
             raise ShortRunError("too short")
         return samples(logs[0].samples, 100.0 * logs[0].number)
 
     monkeypatch.setattr(module, "preprocess", preprocess)
-    monkeypatch.setattr(module, "velocity_noise", lambda log, cutoff_hz: np.array([log.noise, 1.0]))
+    monkeypatch.setattr(
+        Speeds, "of", lambda log, cutoff_hz: Speeds(np.array([log.noise, 1.0]), np.array([np.inf, 1.0]))
+    )
     return noises
 
 

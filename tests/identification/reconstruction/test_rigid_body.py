@@ -11,7 +11,7 @@ from armloop.data.motion import Motion
 from armloop.data.signals import preprocess
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction import Options, Reconstruction, reconstruct
-from armloop.identification.reconstruction.shared import SHARED_CONDITIONING, sliding_rows
+from armloop.identification.reconstruction.shared import SHARED_CONDITIONING, sliding_rows, sticking
 from armloop.identification.scoring import score
 from armloop.robot.arm import Arm
 from armloop.robot.kinematics import nominal_parameters, regressor
@@ -175,12 +175,15 @@ def test_friction_keeps_its_level_where_a_joint_creeps() -> None:
         assert (np.sqrt(np.mean(error**2, axis=0)) < most * level).all()
 
 
-def test_steady_creeping_counts_and_a_slow_reversal_does_not() -> None:
+@pytest.mark.parametrize(("fastest", "edge"), [(1.0, 0.01), (0.4, 0.01), (0.1, 0.005), (0.04, 0.002)])
+def test_steady_creeping_counts_and_a_slow_reversal_does_not(fastest: float, edge: float) -> None:
+    """Slow is what is slow for the joint, where it never goes fast."""
     slow = preprocess([creeping(1)], SHARED_CONDITIONING)
     assert sliding_rows(slow).all()
     time = np.arange(0, 4.0, 0.01)
-    v = np.column_stack([0.05 * np.sin(np.pi * time)] * 3)
+    v = np.column_stack([fastest * np.sin(np.pi * time)] * 3)
     motion = Motion(time, np.cumsum(v, axis=0) / 100, v, np.zeros_like(v), np.array([0]))
     swing = preprocess([exact(motion, 1)], SHARED_CONDITIONING)
     rows, speed = sliding_rows(swing), np.abs(swing.motion.v)
-    assert rows[speed > 0.011].all() and not rows[speed < 0.009].any()
+    assert rows[swing.moving & (speed > 1.1 * edge)].all() and not rows[speed < 0.9 * edge].any()
+    np.testing.assert_allclose(sticking(swing), edge, rtol=0.01)

@@ -31,6 +31,7 @@ from armloop.laws.effects import (
 )
 from armloop.laws.effects.base import entry, fill, std_errors
 from armloop.laws.effects.found import RANGE
+from armloop.laws.effects.payload import reach
 from armloop.laws.friction import KINDS
 from armloop.robot.arm import load_arm
 from armloop.util.errors import InputError, ModelError
@@ -225,11 +226,47 @@ def test_a_torque_from_outside_is_one_number() -> None:
     np.testing.assert_array_equal(columns, np.ones((4, 1)))
 
 
-def test_a_load_weighs_something_and_its_slope_has_a_column_a_number() -> None:
+def test_a_load_weighs_something() -> None:
     load = effect("payload", None)
     for mass, possible in ((1e-9, True), (0.0, False)):
         found = {"mass": Estimate(mass, 0.0, "kg"), "com": Estimate([0.0] * 3, [0.0] * 3, "m")}
         assert load.plausible(an_arm(), found) is possible
+
+
+def test_a_centre_that_the_motion_hides_lies_where_a_load_can_and_one_that_is_surely_elsewhere_is_none() -> (
+    None
+):
+    load, arm = effect("payload", None), an_arm()
+    far = 1.2 * reach(arm)
+
+    def found(com: list[float], errors: list[float]) -> tuple[np.ndarray, bool]:
+        at = arm.X_tool[:3, :3] @ com + arm.X_tool[:3, 3]
+        J = 2.0 * arm.X_tool[:3, :3]
+        spread = np.zeros((5, 5))
+        spread[1:4, 1:4] = J @ np.diag(np.square(errors)) @ J.T
+        stated = load.estimates(arm, np.array([2.0, *(2.0 * at), 0.0]), spread, 0.0)
+        np.testing.assert_allclose(stated["com"].std_error, errors, rtol=1e-6)
+        return np.array(stated["com"].value), load.plausible(arm, stated)
+
+    # the hidden component gives way, those that are known stay
+    com, possible = found([0.1 * far, -far, 0.02], [1e-4, 0.3 * far, 1e-4])
+    assert possible and com[[0, 2]] == pytest.approx([0.1 * far, 0.02], rel=1e-4)
+    assert np.linalg.norm(com) == pytest.approx(reach(arm), rel=2e-3)
+    # of two alike hidden ones both give way alike
+    com, possible = found([far, -far, 0.0], [0.5 * far, 0.5 * far, 1e-4])
+    assert possible and com[0] == pytest.approx(-com[1], rel=1e-6)
+    for com, errors in (
+        ([0.0, -far, 0.0], [0.1, 0.02 * far, 0.1]),  # it is known where it is
+        ([0.0, -far, 0.0], [0.1, 0.0, 0.1]),
+        ([far, 0.0, 0.0], [0.0, 0.5, 0.5]),
+    ):
+        assert found(com, errors)[1] is False
+    com, possible = found([0.3 * far, 0.0, 0.0], [far, far, far])
+    assert possible and com == pytest.approx([0.3 * far, 0.0, 0.0])
+
+
+def test_a_loads_slope_has_a_column_a_number() -> None:
+    load = effect("payload", None)
     beta, J = load.embed(np.array([2.0, 0.2, -0.4, 0.6, 0.05]))
     assert beta.shape == (10,) and J.shape == (10, 5)
 

@@ -18,7 +18,7 @@ from armloop.data.pieces import LogSource
 from armloop.data.signals import Conditioning, ShortRunError, preprocess, smooth
 from armloop.features.rigid_body import BaseParameters
 from armloop.identification.reconstruction.inner_folds import SHORTEST
-from armloop.identification.reconstruction.shared import PLAIN_FRICTION, SLIDING
+from armloop.identification.reconstruction.shared import PLAIN_FRICTION, sticking
 from armloop.identification.uncertainty.blocking import correlation_time
 from armloop.regression.moments import Moments, total
 from armloop.robot.arm import Arm
@@ -102,7 +102,7 @@ def _correlation(arm: Arm, parts: Sequence[Samples]) -> float:
         for part, shared in zip(parts, columns, strict=True):
             own = [term.column(part.motion, j) for term in PLAIN_FRICTION]
             X = np.hstack([shared[:, j], smooth(part, np.column_stack(own))])
-            problems.append((part, X, np.abs(part.motion.v[:, j]) > SLIDING))
+            problems.append((part, X, np.abs(part.motion.v[:, j]) > sticking(part)[j]))
         fit = total(Moments.of(X[rows], part.tau[rows, j]) for part, X, rows in problems)
         if fit.count < 10 * len(fit.b):
             continue

@@ -22,9 +22,9 @@ from armloop.data.blocks import block_numbers, stretch
 from armloop.data.log import MotionLog
 from armloop.data.motion import Motion, Samples
 from armloop.data.pieces import LogSource
-from armloop.data.signals import Conditioning, ShortRunError, independent_rows, preprocess, velocity_noise
+from armloop.data.signals import Conditioning, ShortRunError, Speeds, independent_rows, preprocess
 from armloop.identification.reconstruction.options import Options
-from armloop.util.arrays import Array, Index, Mask
+from armloop.util.arrays import Index, Mask
 from armloop.util.progress import Progress, paced, silent
 from armloop.util.workers import Serial, Workers
 
@@ -123,14 +123,14 @@ class _Conditioned:
 
     source: LogSource
     how: Conditioning
-    noise: Array | None
+    speeds: Speeds | None
     options: Options
     first: int = 0
 
     def chunk(self) -> Chunk | None:
         """None where no run is long enough for the filter."""
         try:
-            samples = preprocess([self.source.read()], self.how, self.noise)
+            samples = preprocess([self.source.read()], self.how, self.speeds)
         except ShortRunError:
             return None
         return Chunk.of(samples, self.options, self.first)
@@ -165,15 +165,16 @@ class Data:
         Raises:
             ShortRunError: no log has a run long enough for the filter.
         """
-        noise = np.max([_noise(how.cutoff_hz, log) for log in logs], axis=0) if how.cutoff_hz > 0 else None
+        each = (Speeds.of(log, how.cutoff_hz) for log in logs)
+        speeds = Speeds.joined(each) if how.cutoff_hz > 0 else None
         chunks, first = [], 0
         for log in logs:
-            chunk = _Conditioned(log, how, noise, options, first).chunk()
+            chunk = _Conditioned(log, how, speeds, options, first).chunk()
             if chunk is not None:
                 chunks.append(chunk)
                 first = int(chunk.blocks[-1]) + 1
         if not chunks:
-            preprocess(logs, how, noise)  # says how long a run must be
+            preprocess(logs, how, speeds)  # says how long a run must be
         return Data(chunks, _joined(chunks), Serial())
 
     def nested(self) -> Data:
@@ -202,20 +203,20 @@ class Data:
             ShortRunError: no log has a run long enough for the filter.
         """
         workers = workers or Serial()
-        noise = None
+        speeds = None
         if how.cutoff_hz > 0:
-            noise = np.max(list(workers.map(partial(_noise, how.cutoff_hz), logs)), axis=0)
+            speeds = Speeds.joined(workers.map(partial(_speeds, how.cutoff_hz), logs))
         stride = max(1, sum(log.samples for log in logs) // REFERENCE)
         # Samples that are no time series are dealt into folds one by one: every fold must be met.
         while gcd(stride, options.folds) > 1:
             stride += 1
         parts, reference, first = [], [], 0
         surveyed = workers.map(
-            partial(_survey, stride), [_Conditioned(log, how, noise, options) for log in logs]
+            partial(_survey, stride), [_Conditioned(log, how, speeds, options) for log in logs]
         )
         for log, survey in zip(logs, surveyed, strict=True):
             if survey is not None:
-                parts.append(_Conditioned(log, how, noise, options, first))
+                parts.append(_Conditioned(log, how, speeds, options, first))
                 thinned, blocks = survey
                 fold = (first + thinned.blocks) % options.folds
                 reference.append(
@@ -223,7 +224,7 @@ class Data:
                 )
                 first += blocks
         if not parts:
-            preprocess([logs[0].read()], how, noise)  # says which run is too short
+            preprocess([logs[0].read()], how, speeds)  # says which run is too short
         return Data(parts, _joined(reference), workers, progress)
 
     def sampled(self, count: int) -> Data:
@@ -303,8 +304,8 @@ def _stretches(chunk: Chunk, count: int, length: int) -> list[Chunk]:
     return [deepcopy(chunk.cut(low, low + length)) for low in starts.tolist()]
 
 
-def _noise(cutoff_hz: float, log: LogSource) -> Array:
-    return velocity_noise(log.read(), cutoff_hz)
+def _speeds(cutoff_hz: float, log: LogSource) -> Speeds:
+    return Speeds.of(log.read(), cutoff_hz)
 
 
 def _survey(stride: int, part: _Conditioned) -> tuple[Chunk, int] | None:

@@ -222,6 +222,9 @@ def _choose(library: EnergyTerms, data: Data, weights_of: Sequence[int]) -> Inde
     """
     problems = data.sum(partial(_Problems.of, library=library), "normal equations of the candidates")
     fit, judge, n = problems.fit, problems.judge, len(library.revolute)
+    for j, (_, part) in enumerate(fit.parts):
+        if part.count == 0:
+            raise ExcitationError(f"q{j + 1}: no sample that is fitted slides fast enough to choose terms by")
     lifts = library.potential & (np.abs(library.degrees).sum(axis=1) == 1)
     lifts &= (library.degrees[:, weights_of] == 1).any(axis=1)
     offsets = library.count + len(FRICTION) * np.array(weights_of, dtype=int)

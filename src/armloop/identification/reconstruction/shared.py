@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from armloop.data.creep import may_stick
 from armloop.data.filters import at_least
 from armloop.data.motion import Motion, Samples
 from armloop.data.signals import Conditioning
@@ -34,9 +35,9 @@ FRICTION = (
 )
 #: What the load is estimated with, before any friction that depends on it is regressed.
 PLAIN_FRICTION = tuple(term for term in FRICTION if term.kind != "hysteresis")
-#: Below this speed, rad/s or m/s, a joint's torque is not determined by its motion, unless it creeps steadily: so much
-#: of the largest speed must the smallest one be, over a period of the filter to both sides.
-SLIDING, _STEADY = 0.01, 0.5
+#: A joint that may stick creeps steadily where its smallest speed, over a period of the filter to both sides, is so much of
+#: the largest.
+_STEADY = 0.5
 #: Part of the samples that a model knows the arm's range by leaves out at each end.
 _TAIL = 0.005
 #: What a constraint has pressed to zero, N·m.
@@ -50,7 +51,13 @@ def sliding_rows(samples: Samples) -> Mask:
 
 def fast_rows(samples: Samples) -> Mask:
     """(N, n) samples so fast that a direction which fades in late (:data:`FRICTION`) is right all the same."""
-    return samples.moving & (np.abs(samples.motion.v) > SLIDING)
+    return samples.moving & (np.abs(samples.motion.v) > sticking(samples))
+
+
+def sticking(samples: Samples) -> Array:
+    """(n,) speeds below which a joint's torque is not determined by its motion, unless it creeps steadily; rad/s (m/s)."""
+    fastest = samples.fastest
+    return may_stick(np.full(samples.motion.joints, np.inf) if fastest is None else fastest)
 
 
 def _steady(samples: Samples) -> Mask:

@@ -23,6 +23,8 @@ from armloop.robot.newton_euler import inverse_dynamics
 from armloop.util.functions import NUMPY
 
 _FOUR = np.eye(4)
+#: A centre farther out than a load can be, by no more than so many standard errors, is one that the motion hides.
+_HIDDEN = 3.0
 _TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -91,21 +93,17 @@ class Payload(Effect):
         J = np.hstack([-com[:, None] / mass, np.eye(3) / mass])
         R, p = arm.X_tool[:3, :3], arm.X_tool[:3, 3]
         mass_error, own_error = std_errors(np.eye(5), covariance)[[0, 4]].tolist()
+        errors = std_errors(R.T @ J, covariance[:4, :4])
         return {
             "mass": Estimate(mass, mass_error, "kg"),
-            "com": Estimate(
-                (R.T @ (com - p)).tolist(), std_errors(R.T @ J, covariance[:4, :4]).tolist(), "m"
-            ),
+            "com": Estimate(_within(R.T @ (com - p), errors, reach(arm)).tolist(), errors.tolist(), "m"),
             "own_inertia": Estimate(max(float(x[4]), 0.0), own_error, "kg*m^2"),
         }
 
     def plausible(self, arm: Arm, parameters: dict[str, Estimate]) -> bool:
         # A body has a mass, and its centre lies where something bolted to the flange can reach.
         mass, com = number(parameters["mass"].value), np.asarray(parameters["com"].value)
-        chain = float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum())
-        # The last link's own length is not in the chain; a link reaches twice as far as its centre, and a load beyond.
-        reach = max(0.15, 0.5 * chain, 2.5 * float(np.linalg.norm(arm.com[-1])))
-        return mass > 0 and float(np.linalg.norm(com)) < reach
+        return mass > 0 and float(np.linalg.norm(com)) < reach(arm)
 
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         mass, com = parameters["mass"], parameters["com"]
@@ -115,6 +113,37 @@ class Payload(Effect):
             for x, one in zip(np.asarray(com.value), known, strict=True)
         )
         return on_the_last_link(mass, at)
+
+
+def reach(arm: Arm) -> float:
+    """Distance from the flange, m, within which the centre of a load lies."""
+    chain = float(np.linalg.norm(arm.X_PF[:, :3, 3], axis=1).sum())
+    # The last link's own length is not in the chain; a link reaches twice as far as its centre, and a load beyond.
+    return max(0.15, 0.5 * chain, 2.5 * float(np.linalg.norm(arm.com[-1])))
+
+
+def _within(com: Array, errors: Array, farthest: float) -> Array:
+    """The centre (3,) of a load nearest to one that was found, in its standard errors, that lies so far away, m, at most.
+
+    A motion that hides a component of it leaves that to noise. One that is surely farther away stays.
+    """
+    from scipy.optimize import brentq
+
+    known = np.isfinite(errors)
+    found, spread = np.where(known, com, 0.0), np.where(known, errors, 0.0)
+    if np.linalg.norm(found) < farthest:
+        return com
+
+    def pulled(strength: float) -> Array:
+        return np.asarray(found / (1 + strength * spread**2))
+
+    # the multiplier of the constraint: the stronger, the nearer to the flange
+    strongest = 1e9 / max(float(spread.max()), 1e-9) ** 2
+    if np.linalg.norm(pulled(strongest)) > 0.999 * farthest:
+        return com
+    near = pulled(brentq(lambda x: float(np.linalg.norm(pulled(x))) - 0.999 * farthest, 0.0, strongest))
+    off = (near - found)[spread > 0] / spread[spread > 0]
+    return near if np.linalg.norm(off) <= _HIDDEN else com
 
 
 def on_the_last_link(mass: Estimate, centre: str) -> str:
