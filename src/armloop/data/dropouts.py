@@ -20,8 +20,8 @@ from armloop.util.arrays import PER_MEDIAN, TINY, Array, Index, stretches
 _SPIKE, _BACK = 15.0, 0.3
 #: Steps to either side that say what is usual there, and the part of a column's samples that spikes are at most.
 _BESIDE, _RARE = 15, 0.01
-#: Steps away that no spike at this one reaches.
-_AWAY = 3
+#: Steps away that no spike at this one reaches, and the part of the usual step that samples are apart at least.
+_AWAY, _NO_GAP = 3, 0.1
 #: Spikes of a column from which on they are said, and of a speed (rad/s, m/s) that are none.
 _SAID, _NO_SPEED = 3, 0.02
 #: Chance of as many equal values in a row somewhere in a column, from which on they are none; and the fewest of them.
@@ -94,7 +94,7 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
     for (kind, j), rows in spikes(log).items():
         if len(rows) >= _SAID:
             x = getattr(log, kind)[:, j]
-            size = np.abs(x - _bridged(x, rows)).max()
+            size = np.abs(x - _bridged(x, rows, log.time)).max()
             yield Finding(
                 f"column {kind}{j + 1}",
                 f"has spikes of one or two samples, {len(rows)} in all, of up to {size:.3g}; what lies beside them takes "
@@ -130,7 +130,7 @@ def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
         rows, x = found["v", j], log.v[:, j]
         later, before = np.minimum(rows + 1, len(x) - 1), np.maximum(rows - 1, 0)
         rate = (log.q[later, j] - log.q[before, j]) / (log.time[later] - log.time[before])
-        height = np.abs(x - _bridged(x, rows))[rows]
+        height = np.abs(x - _bridged(x, rows, log.time))[rows]
         found["v", j] = rows[(np.abs(x[rows] - rate) > 0.5 * height) & (height > _NO_SPEED)]
     count = np.zeros(len(log.time), dtype=int)
     for (kind, _), rows in found.items():
@@ -145,7 +145,7 @@ def _without_spikes(log: Recorded) -> Recorded:
     for (kind, j), rows in spikes(log).items():
         if columns[kind] is getattr(log, kind):
             columns[kind] = np.array(columns[kind])
-        columns[kind][:, j] = _bridged(columns[kind][:, j], rows)
+        columns[kind][:, j] = _bridged(columns[kind][:, j], rows, log.time)
     if log.derived and columns["q"] is not log.q:
         columns["v"] = np.concatenate([np.gradient(columns["q"][r], log.time[r], axis=0) for r in log.runs])
     return replace(log, q=columns["q"], v=columns["v"], tau=columns["tau"])
@@ -164,7 +164,7 @@ def _moving_on(log: Recorded) -> Recorded:
     q, v, tau = (np.array(x) for x in (log.q, log.v, log.tau))
     for x, own in ((q, rows), (v, rows), (tau, np.concatenate([rows[:0], *short]))):
         for column in x.T:
-            column[:] = _bridged(column, own)
+            column[:] = _bridged(column, own, log.time)
     return replace(log, q=q, v=v, tau=tau)
 
 
@@ -201,29 +201,33 @@ def cut_off(log: Recorded, j: int) -> list[tuple[float, float]]:
     return found
 
 
-def _bridged(x: Array, rows: Index) -> Array:
-    """x (N,) with lines through what lies beside some rows."""
+def _bridged(x: Array, rows: Index, time: Array) -> Array:
+    """x (N,) at some instants (N,) with lines through what lies beside some rows."""
     others = np.delete(np.arange(len(x)), rows)
     bridged = np.array(x)
-    bridged[rows] = np.interp(rows, others, x[others])
+    bridged[rows] = np.interp(time[rows], time[others], x[others])
     return bridged
 
 
 def _spikes(x: Array, log: Recorded) -> Index:
-    """Rows of the spikes of one column (N,): one or two samples far from both neighbours, which agree."""
+    """Rows of the spikes of one column (N,): one or two samples far from both neighbours, which agree.
+
+    Samples were taken at their stamps, or evenly where only the stamps jitter: as fewer steps are large.
+    """
     none = np.zeros(0, dtype=np.intp)
-    steps = np.diff(x)
-    resolution = float(np.min(np.abs(steps)[steps != 0], initial=np.inf))
-    if len(steps) < 2 * _BESIDE or not np.isfinite(resolution):
+    changes = np.diff(x)
+    resolution = float(np.min(np.abs(changes)[changes != 0], initial=np.inf))
+    if len(changes) < 2 * _BESIDE or not np.isfinite(resolution):
         return none  # it never changes, or there is too little of it
-    # what a step is beside the steps around it: a joint that moves fast makes large ones
-    trend = np.concatenate([steps[:_AWAY], 0.5 * (steps[: -2 * _AWAY] + steps[2 * _AWAY :]), steps[-_AWAY:]])
-    size = np.abs(steps - trend)
-    usual = max(PER_MEDIAN * float(np.median(size)), 0.5 * resolution)
-    large = np.flatnonzero(size > 0.5 * _SPIKE * usual)
+    stamps = np.diff(log.time)
+    usual_gap = max(float(np.median(stamps)), TINY)
+    clocks = [np.ones(len(changes)), np.maximum(stamps / usual_gap, _NO_GAP)]
+    tried = ((each, *_large(changes, each, resolution)) for each in clocks)
+    gaps, usual, large = min(tried, key=lambda found: (len(found[2]), found[1]))
     # a spike makes two large steps, and some three to either side
     if len(large) == 0 or len(large) > 8 * _RARE * len(x):
         return none
+    steps = changes / gaps
     found: list[int] = []
     for width in (1, 2):
         # up at step k, down at step k + width: samples k + 1 … k + width
@@ -231,13 +235,27 @@ def _spikes(x: Array, log: Recorded) -> Index:
             near = np.r_[steps[max(0, k - _BESIDE) : k], steps[k + width + 1 : k + width + 1 + _BESIDE]]
             slope = float(np.median(near))
             least = max(usual, PER_MEDIAN * float(np.median(np.abs(near - slope))))
-            up, down = steps[k] - slope, steps[k + width] - slope
+            up, down = ((steps[i] - slope) * gaps[i] for i in (k, k + width))
             height = min(abs(up), abs(down))
-            away = abs(x[k + width + 1] - x[k] - (width + 1) * slope)
+            away = abs(x[k + width + 1] - x[k] - slope * float(gaps[k : k + width + 1].sum()))
             back = up * down < 0 and away < _BACK * height
             if back and height > _SPIKE * least and _in_one_run(log, k, k + width + 1):
                 found += range(k + 1, k + width + 1)
     return np.unique(np.array(found, dtype=np.intp))
+
+
+def _large(changes: Array, gaps: Array, resolution: float) -> tuple[float, Index]:
+    """How far steps usually are from those around them, and which are so much farther that they may be a spike's.
+
+    Args:
+        changes: (N - 1,) from sample to sample, of which each lasts for one of ``gaps``.
+    """
+    steps = changes / gaps
+    # what a step is beside the steps around it: a joint that moves fast makes large ones
+    trend = np.concatenate([steps[:_AWAY], 0.5 * (steps[: -2 * _AWAY] + steps[2 * _AWAY :]), steps[-_AWAY:]])
+    size = np.abs(steps - trend) * gaps
+    usual = max(PER_MEDIAN * float(np.median(size)), 0.5 * resolution)
+    return usual, np.flatnonzero(size > 0.5 * _SPIKE * usual)
 
 
 def _in_one_run(log: Recorded, first: int, last: int) -> bool:
