@@ -40,10 +40,18 @@ class Table:
         return float(prior)
 
 
+def laws(*elements: int) -> list[Any]:
+    """Extensions of so many elements each."""
+    return [
+        selection.Extension(f"law {k}", [[FrictionTerm("viscous")] * count])
+        for k, count in enumerate(elements)
+    ]
+
+
 def state(errors: dict[str, Any], taken: list[list[int]] | None = None, **of: Any) -> Any:
     errors = {"- -": 4.0, **errors}
     table: Any = Table(errors, **{k: v for k, v in of.items() if k == "counts"})
-    found = selection._State(table, [[0], [1], [2]], of.get("priors", {}))
+    found = selection._State(table, laws(1, 1, 1), of.get("priors", {}))
     if taken is not None:
         found.taken = taken
         found._weights, found._errors = found._judged()
@@ -63,7 +71,7 @@ class TestLadder:
     def test_they_are_relative_to_its_squares_whatever_its_samples(self) -> None:
         one = state({}, counts=((10.0, 1.0), (10.0, 1.0), (5.0, 0.0)))
         one.pooled.squares = np.array([[40.0, 9.0], [40.0, 9.0], [20.0, 18.0]])
-        again = selection._State(one.pooled, [[0]], {})
+        again = selection._State(one.pooled, laws(1), {})
         assert again._error(np.array([[4.0, 1.0], [4.0, 4.0], [1.0, 4.0]])) == pytest.approx(
             0.5 * (np.sqrt(9 / 100) + np.sqrt(9 / 36))
         )
@@ -157,6 +165,29 @@ class TestLadder:
         assert took.before == pytest.approx(np.sqrt(8 / 20))
         assert took.after == pytest.approx(0.5 * (np.sqrt(2 * kept / 20) + np.sqrt(8 / 20)))
 
+    def test_what_was_asked_before_a_later_law_was_there_is_asked_once_more_of_the_joints_without_it(
+        self,
+    ) -> None:
+        errors = {
+            "02 0": 4.0,
+            "012 0": [[1.0, 4.0]] * 2,
+            "02 01": [[4.0, 16.0]] * 2,
+            "012 01": [[1.0, 16.0]] * 2,
+        }
+        one = state(errors, [[0, 2], [0]])
+        (again,) = one.take_again()
+        # nothing is later than the last law; the first is there
+        assert one.taken == [[0, 1, 2], [0]] and (again.rung, again.joints) == ("law 1, once more", [0])
+        assert again.before == pytest.approx(np.sqrt(8 / 20)) and again.refused is None
+        assert again.after == pytest.approx(0.5 * (np.sqrt(2 / 20) + np.sqrt(8 / 20)))
+        # all have it, or nothing came after it
+        assert state({"012 012": 4.0}, [[0, 1, 2], [0, 1, 2]]).take_again() == []
+        assert state({"0 0": 4.0}, [[0], [0]]).take_again() == []
+        # for all together, those that have it keep it once
+        both = state({"012 02": 4.0, "012 012": 1.0}, [[0, 1, 2], [0, 2]])
+        (again,) = both.take_again()
+        assert both.taken == [[0, 1, 2], [0, 1, 2]] and again.joints == [1]
+
     @pytest.mark.parametrize(("both", "kept"), [(0.0019, [0]), (0.0021, [0, 1])])
     def test_a_joint_drops_the_elements_that_it_does_not_miss_together_the_last_first(
         self, both: float, kept: list[int]
@@ -166,7 +197,7 @@ class TestLadder:
         for choice, error in (("01", 4 * np.exp(0.001)), ("0", 4 * np.exp(both)), ("1", 9.0), ("-", 9.0)):
             table.errors[f"{choice} 3"] = [[error, 4.0]] * 2
             table.errors[f"{choice} -"] = [[error, 9.0]] * 2
-        one = selection._State(table, [[0, 1], [2], [3]], {})
+        one = selection._State(table, laws(2, 1, 1), {})
         one.taken = [[0, 1], [2]]
         one._weights, one._errors = one._judged()
         took = one.drop_elements()
@@ -226,7 +257,14 @@ class TestLadder:
         """The offset gains, the Stribeck fall and what follows do not."""
         asked: dict[str, Any] = {}
         speeds = [0.1, 0.2, 0.3]
-        monkeypatch.setattr(selection, "stribeck_speeds", lambda *given: speeds)
+        sought: list[Any] = []
+
+        def speeds_beside(data: Any, design: Any, beside: Any, ranges: Any) -> list[float]:
+            sought.append(beside)
+            # beside the friction that is chosen they are others, with enough data to seek them there
+            return speeds if len(sought) == 1 + plenty else [0.5, 0.2, 0.3]
+
+        monkeypatch.setattr(selection, "stribeck_speeds", speeds_beside)
 
         class Faked(Table):
             def held_out(self, choice: Any, weights: Any, prior: Any) -> np.ndarray:
@@ -258,6 +296,7 @@ class TestLadder:
             reference=SimpleNamespace(motion=motion), slowest=lambda part: None, pooled=pooled, plenty=plenty
         )
         for names, rungs in ((None, 10), (["offset", "coulomb", "viscous", "nonlinear_viscous"], 3)):
+            sought.clear()
             options: Any = SimpleNamespace(friction=names, physical=True)
             priors: Any = {} if names else {"drawings": 2.0, "nothing": 1.0}
             found = selection.select_friction(three_axis(), data, None, options, priors)  # type: ignore[arg-type]
@@ -266,6 +305,7 @@ class TestLadder:
             every = [[t for e in ladder for t in e.elements[j]] for j in range(3)]
             assert found.candidates == every == asked["candidates"]
             taken = [[*ladder[0].elements[j], FrictionTerm("offset")] for j in range(3)]
+            assert sought == ([] if names else [ladder[0].elements, *[taken] * plenty])
             # in the end the first is not missed either
             assert found.laws == ([[FrictionTerm("offset")]] * 3 if plenty else taken)
             assert [c.rung for c in found.comparisons] == [

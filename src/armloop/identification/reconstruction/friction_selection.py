@@ -9,7 +9,8 @@ which a passive regression keeps few. It is taken for all joints if the error on
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
 must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
-2020). At the end, each joint hands back the extensions it does not miss, and of the others the elements.
+2020). What was asked before a later law was there is asked once more beside it. At the end, each joint hands back the
+extensions it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no extension: within a run it fits, on another run it fails.
 
@@ -41,6 +42,8 @@ from armloop.util.progress import Progress, paced, silent
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
 #: Chance that a selection has an extension which nothing calls for.
 _LEVEL = 0.05
+#: Every extension is asked so many times at most, and velocities that differ by less than this part are the same.
+_ASKED, _SAME_SPEED = 2, 0.02
 #: Part of a joint's squared error that an extension must be worth for the joint to keep it.
 _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
@@ -210,35 +213,40 @@ def select_friction(
         options: the friction laws that may be chosen; the first of them is taken anyway.
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
-    motion, slowest = data.reference.motion, data.slowest(_CREEP)
+    motion, slowest, tell = data.reference.motion, data.slowest(_CREEP), paced(progress)
     nested = restricted(extensions(arm, motion, slowest), options.friction)
-    if any(term.kind == "stribeck_peak" for extension in nested for term in extension.elements[0]):
-        progress("friction: each joint's Stribeck velocity")
-        speeds = stribeck_speeds(data, design, nested[0].elements, stribeck_ranges(arm, motion))
-        nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
-    candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
-    pooled = data.pooled(design, candidates, options.physical)
-    ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])
-    places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
-    state = _State(pooled, places, priors)
-    comparisons, tell = [], paced(progress)
-    for level, extension in enumerate(nested):
-        tell(f"friction: extension {level + 1} of {len(nested)}")
-        comparisons.append(state.take(level, extension.name, one_by_one=data.plenty))
+    falls = any(term.kind == "stribeck_peak" for extension in nested for term in extension.elements[0])
+    beside, speeds = nested[0].elements, list[float]()
+    # A velocity found beside Coulomb and viscous friction alone stands for whatever else there is, too: it is sought once
+    # more beside the friction that was chosen with it.
+    for _ in range(1 + (falls and data.plenty)):
+        if falls:
+            progress("friction: each joint's Stribeck velocity")
+            before, speeds = speeds, stribeck_speeds(data, design, beside, stribeck_ranges(arm, motion))
+            if before and np.allclose(before, speeds, rtol=_SAME_SPEED):
+                break
+            nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
+        candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
+        pooled = data.pooled(design, candidates, options.physical)
+        state = _State(pooled, nested, priors)
+        comparisons = state.take_in_turn(data.plenty, tell)
+        beside = [[term for term in own if term.kind != "stribeck_peak"] for own in state.chosen(candidates)]
     if data.plenty:
-        comparisons += [state.eliminate_backward(), state.drop_elements()]
+        comparisons += [*state.take_again(), state.eliminate_backward(), state.drop_elements()]
     notes = [] if state.prior_name is None else [f"where the motion tells nothing: {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
-    laws = [[candidates[j][k] for k in chosen] for j, chosen in enumerate(state.choice(state.taken))]
+    laws = state.chosen(candidates)
     return FrictionSelection(laws, state.prior, comparisons, notes + _notes(comparisons), candidates, pooled)
 
 
 class _State:
     """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds."""
 
-    def __init__(self, pooled: Pooled, places: list[list[int]], priors: dict[str, Prior]) -> None:
-        self.pooled, self._places = pooled, places
+    def __init__(self, pooled: Pooled, nested: Sequence[Extension], priors: dict[str, Prior]) -> None:
+        ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])
+        self.pooled, self._names = pooled, [extension.name for extension in nested]
+        self._places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
         self._counts = pooled.counts
         self._squares = np.maximum(pooled.squares.sum(axis=0), TINY)
         self.taken: list[list[int]] = [[] for _ in pooled.candidates]
@@ -255,10 +263,32 @@ class _State:
             for own, dropped in zip(taken, self._dropped, strict=True)
         ]
 
+    def chosen(self, candidates: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
+        """The law of each joint."""
+        choice = self.choice(self.taken)
+        return [[own[k] for k in places] for own, places in zip(candidates, choice, strict=True)]
+
+    def take_in_turn(self, one_by_one: bool, tell: Progress) -> list[Comparison]:
+        """Take the extensions that earn their place, the simplest first."""
+        comparisons = []
+        for level, name in enumerate(self._names):
+            tell(f"friction: extension {level + 1} of {len(self._names)}")
+            comparisons.append(self.take(level, name, one_by_one))
+        return comparisons
+
+    def take_again(self) -> list[Comparison]:
+        """Take the extensions that earn their place beside later ones, which were not there when they were asked."""
+        comparisons = []
+        for level, name in enumerate(self._names):
+            last = max((k for own in self.taken for k in own), default=0)
+            if level < last and any(level not in own for own in self.taken):
+                comparisons.append(self.take(level, f"{name}, once more", one_by_one=True))
+        return comparisons
+
     def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
         """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway."""
-        before = self._error(self._errors)
-        everyone = [[*own, level] for own in self.taken]
+        before, had = self._error(self._errors), [level in own for own in self.taken]
+        everyone = [own if has else sorted([*own, level]) for own, has in zip(self.taken, had, strict=True)]
         errors = self._held_out(everyone)
         gain, sure = self._gain(errors, _SURE)
         if level == 0:
@@ -268,9 +298,10 @@ class _State:
             self.taken = everyone
         elif one_by_one:
             self.taken = [
-                everyone[j] if self._earns_alone(j, level) else own for j, own in enumerate(self.taken)
+                everyone[j] if not had[j] and self._earns_alone(j, level) else own
+                for j, own in enumerate(self.taken)
             ]
-        joints = [j for j, own in enumerate(self.taken) if level in own]
+        joints = [j for j, own in enumerate(self.taken) if level in own and not had[j]]
         if joints:
             self._weights, self._errors = self._judged()
         after = self._error(self._errors)
@@ -305,7 +336,7 @@ class _State:
         return Comparison("elements dropped", before, self._error(self._errors), None, joints)
 
     def _earns_alone(self, joint: int, level: int) -> bool:
-        more = [[*own, level] if j == joint else own for j, own in enumerate(self.taken)]
+        more = [sorted([*own, level]) if j == joint else own for j, own in enumerate(self.taken)]
         gain, sure = self._gain(self._held_out(more), _SURER, [joint])
         return sure and gain > _WORTH
 
@@ -341,7 +372,7 @@ class _State:
         gains = (self._counts * ratios).sum(axis=1) / whole
         scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
         likelihood = 0.5 * whole / self.pooled.repeats * gains.sum()
-        questions = len(self._places) * (1 if joints is None else len(self.taken))
+        questions = _ASKED * len(self._places) * (1 if joints is None else len(self.taken))
         sure = gains.sum() > times * scatter and likelihood > np.log(questions / _LEVEL)
         return float(gains.sum()), bool(sure)
 
