@@ -81,6 +81,7 @@ class Answers:
             "outweighed": lambda *_: None,
             "drowned": lambda *_: False,
             "useful": lambda evidence, outcome: self.note("useful", (evidence.name, outcome.name), outcome),
+            "strongest_first": lambda evidence, outcome: self.note("ordered", evidence.name, outcome),
             "strengths": lambda evidence, outcome: [evidence.name, outcome],
         }
         for name, part in parts.items():
@@ -203,6 +204,7 @@ def test_a_run_that_moves_is_searched(
     name = "turned" if turned else "account"
     assert (made.outcome.name, made.evidence.name) == (name, name) and made.strengths[0] == name
     assert (made.reversals is not None) == turned and answers.asked["useful"] == (name, name)
+    assert answers.asked["ordered"] == name
     assert answers.asked["carried"] == ("whole", "account", 2)
     model = ("with", *found, *(["push"] if contacts else []))
     assert made.model == model

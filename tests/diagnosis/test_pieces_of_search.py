@@ -300,6 +300,15 @@ class TestOutcomes:
             ("ab all", "all ab"),
         ]
 
+    def test_the_strongest_comes_first_everywhere(self) -> None:
+        nothing: Any = None
+        outcome = self.outcome("a", "b", "c")
+        for found, share in zip(outcome.found, (0.2, 0.5, 0.3), strict=True):
+            found.share = share
+        made = searching.strongest_first(nothing, outcome)
+        assert [f.shape for f in made.found] == ["b", "c", "a"]
+        assert vars(made.after) == {"score": "bca"} and searching.strongest_first(nothing, made) is made
+
     def test_effects_beside_which_the_others_leave_no_more_go_the_worst_first(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -27,6 +27,7 @@ from armloop.diagnosis.search import (
     Strength,
     outweighed,
     strengths,
+    strongest_first,
     useful,
     without_effect,
 )
@@ -169,7 +170,6 @@ class Diagnosis:
                     "alternatives": _alternatives(added.effect, found.rivals),
                 }
             )
-        effects.sort(key=lambda item: -item["share"])
         effects += [
             {
                 **contact.added.to_dict(),
@@ -310,7 +310,7 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
     turned = judge_reversals(evidence, outcome, kept, progress)
     if turned is not None:
         outcome, evidence = turned.outcome, turned.evidence
-    outcome = useful(evidence, outcome)
+    outcome = strongest_first(evidence, useful(evidence, outcome))
     progress("how far the run can be judged")
     known = [] if unlisted is None else [unlisted.joint]
     doubted: list[str] = []

@@ -250,6 +250,12 @@ def strengths(evidence: Evidence, outcome: Outcome) -> list[Strength]:
     return found
 
 
+def strongest_first(evidence: Evidence, outcome: Outcome) -> Outcome:
+    """The outcome with its effects in the order of their shares."""
+    order = sorted(outcome.found, key=lambda found: -found.share)
+    return outcome if order == outcome.found else _with_only(evidence, outcome, order)
+
+
 def useful(evidence: Evidence, outcome: Outcome) -> Outcome:
     """The outcome without effects that, beside the others, remove no held-out error; the worst first.
 
