@@ -9,8 +9,8 @@ which a passive regression keeps few. It is taken for all joints if the error on
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
 must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
-2020). What was asked before a later law was there is asked once more beside it. At the end, each joint hands back the
-extensions it does not miss, and of the others the elements.
+2020). What was asked before a later law was there is asked once more beside it, and must be surer then. At the end, each
+joint hands back the extensions it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no extension: within a run it fits, on another run it fails.
 
@@ -282,15 +282,19 @@ class _State:
         for level, name in enumerate(self._names):
             last = max((k for own in self.taken for k in own), default=0)
             if level < last and any(level not in own for own in self.taken):
-                comparisons.append(self.take(level, f"{name}, once more", one_by_one=True))
+                comparisons.append(self.take(level, f"{name}, once more", True, _SURER))
         return comparisons
 
-    def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
-        """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway."""
+    def take(self, level: int, name: str, one_by_one: bool, times: float = _SURE) -> Comparison:
+        """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway.
+
+        Args:
+            times: how often its scatter the gain must be for all.
+        """
         before, had = self._error(self._errors), [level in own for own in self.taken]
         everyone = [own if has else sorted([*own, level]) for own, has in zip(self.taken, had, strict=True)]
         errors = self._held_out(everyone)
-        gain, sure = self._gain(errors, _SURE)
+        gain, sure = self._gain(errors, times)
         if level == 0:
             self.taken = everyone
             self._choose_prior()
