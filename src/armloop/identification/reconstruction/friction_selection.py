@@ -9,7 +9,7 @@ which a passive regression keeps few. It is taken for all joints if the error on
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
 must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
-2020). What was asked before a later law was there is asked once more beside it, and must be surer then. At the end, each
+2020). What was asked before a later law was there is asked once more beside it, and must be plain then. At the end, each
 joint hands back the extensions it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no extension: within a run it fits, on another run it fails.
@@ -42,8 +42,9 @@ from armloop.util.progress import Progress, paced, silent
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
 #: Chance that a selection has an extension which nothing calls for.
 _LEVEL = 0.05
-#: Every extension is asked so many times at most, and velocities that differ by less than this part are the same.
-_ASKED, _SAME_SPEED = 2, 0.02
+#: Every extension is asked so many times at most, and what comes of asking again must remove this part of the squared error:
+#: plainly more than what the order of the extensions leaves to chance.
+_ASKED, _PLAIN = 2, 0.05
 #: Part of a joint's squared error that an extension must be worth for the joint to keep it.
 _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
@@ -214,36 +215,56 @@ def select_friction(
         priors: what the shared coefficients may be drawn to, by name; none if empty.
     """
     motion, slowest, tell = data.reference.motion, data.slowest(_CREEP), paced(progress)
-    nested = restricted(extensions(arm, motion, slowest), options.friction)
-    falls = any(term.kind == "stribeck_peak" for extension in nested for term in extension.elements[0])
-    beside, speeds = nested[0].elements, list[float]()
-    # A velocity found beside Coulomb and viscous friction alone stands for whatever else there is, too: it is sought once
-    # more beside the friction that was chosen with it.
-    for _ in range(1 + (falls and data.plenty)):
-        if falls:
+
+    def selection(beside: list[list[FrictionTerm]] | None) -> _State:
+        """Forward selection, with Stribeck velocities sought beside some friction, if there are any."""
+        speeds: list[float] = []
+        if beside is not None:
             progress("friction: each joint's Stribeck velocity")
-            before, speeds = speeds, stribeck_speeds(data, design, beside, stribeck_ranges(arm, motion))
-            if before and np.allclose(before, speeds, rtol=_SAME_SPEED):
-                break
-            nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
+            speeds = stribeck_speeds(data, design, beside, stribeck_ranges(arm, motion))
+        nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
         candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
-        pooled = data.pooled(design, candidates, options.physical)
-        state = _State(pooled, nested, priors)
-        comparisons = state.take_in_turn(data.plenty, tell)
-        beside = [[term for term in own if term.kind != "stribeck_peak"] for own in state.chosen(candidates)]
+        state = _State(data.pooled(design, candidates, options.physical), nested, candidates, priors)
+        state.take_in_turn(data.plenty, tell)
+        return state
+
+    simplest = restricted(extensions(arm, motion, slowest), options.friction)
+    falls = any(term.kind == "stribeck_peak" for extension in simplest for term in extension.elements[0])
+    state = selection(simplest[0].elements if falls else None)
     if data.plenty:
-        comparisons += [*state.take_again(), state.eliminate_backward(), state.drop_elements()]
+        if falls:
+            # A velocity found beside Coulomb and viscous friction alone stands for whatever else there is, too.
+            beside = [[term for term in own if term.kind != "stribeck_peak"] for own in state.chosen()]
+            again = selection(beside)
+            state = again if 2 * np.log(state.error() / again.error()) > _PLAIN else state
+        state.take_again()
+        state.eliminate_backward()
+        state.drop_elements()
     notes = [] if state.prior_name is None else [f"where the motion tells nothing: {state.prior_name}"]
     if options.friction is not None:
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
-    laws = state.chosen(candidates)
-    return FrictionSelection(laws, state.prior, comparisons, notes + _notes(comparisons), candidates, pooled)
+    notes += _notes(state.comparisons)
+    return FrictionSelection(
+        state.chosen(), state.prior, state.comparisons, notes, state.candidates, state.pooled
+    )
 
 
 class _State:
-    """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds."""
+    """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds.
 
-    def __init__(self, pooled: Pooled, nested: Sequence[Extension], priors: dict[str, Prior]) -> None:
+    Attributes:
+        candidates: the elements of all extensions, for each joint.
+        comparisons: what was asked so far.
+    """
+
+    def __init__(
+        self,
+        pooled: Pooled,
+        nested: Sequence[Extension],
+        candidates: list[list[FrictionTerm]],
+        priors: dict[str, Prior],
+    ) -> None:
+        self.candidates, self.comparisons = candidates, list[Comparison]()
         ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])
         self.pooled, self._names = pooled, [extension.name for extension in nested]
         self._places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
@@ -263,57 +284,59 @@ class _State:
             for own, dropped in zip(taken, self._dropped, strict=True)
         ]
 
-    def chosen(self, candidates: list[list[FrictionTerm]]) -> list[list[FrictionTerm]]:
+    def chosen(self) -> list[list[FrictionTerm]]:
         """The law of each joint."""
         choice = self.choice(self.taken)
-        return [[own[k] for k in places] for own, places in zip(candidates, choice, strict=True)]
+        return [[own[k] for k in places] for own, places in zip(self.candidates, choice, strict=True)]
 
-    def take_in_turn(self, one_by_one: bool, tell: Progress) -> list[Comparison]:
+    def error(self) -> float:
+        """Held-out nRMSE, mean over the joints."""
+        return self._error(self._errors)
+
+    def take_in_turn(self, one_by_one: bool, tell: Progress) -> None:
         """Take the extensions that earn their place, the simplest first."""
-        comparisons = []
         for level, name in enumerate(self._names):
             tell(f"friction: extension {level + 1} of {len(self._names)}")
-            comparisons.append(self.take(level, name, one_by_one))
-        return comparisons
+            self.take(level, name, one_by_one)
 
-    def take_again(self) -> list[Comparison]:
-        """Take the extensions that earn their place beside later ones, which were not there when they were asked."""
-        comparisons = []
+    def take_again(self) -> None:
+        """Take the extensions that plainly earn their place beside later ones, which were not there when they were asked."""
         for level, name in enumerate(self._names):
             last = max((k for own in self.taken for k in own), default=0)
             if level < last and any(level not in own for own in self.taken):
-                comparisons.append(self.take(level, f"{name}, once more", True, _SURER))
-        return comparisons
+                self.take(level, f"{name}, once more", one_by_one=True, worth=_PLAIN)
 
-    def take(self, level: int, name: str, one_by_one: bool, times: float = _SURE) -> Comparison:
+    def take(self, level: int, name: str, one_by_one: bool, worth: float = _WORTH) -> Comparison:
         """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway.
 
         Args:
-            times: how often its scatter the gain must be for all.
+            worth: part of the squared error that it must remove.
         """
-        before, had = self._error(self._errors), [level in own for own in self.taken]
+        before, had = self.error(), [level in own for own in self.taken]
         everyone = [own if has else sorted([*own, level]) for own, has in zip(self.taken, had, strict=True)]
         errors = self._held_out(everyone)
-        gain, sure = self._gain(errors, times)
+        gain, sure = self._gain(errors, _SURE)
         if level == 0:
             self.taken = everyone
             self._choose_prior()
-        elif sure and gain > _WORTH:
+        elif sure and gain > worth:
             self.taken = everyone
         elif one_by_one:
             self.taken = [
-                everyone[j] if not had[j] and self._earns_alone(j, level) else own
+                everyone[j] if not had[j] and self._earns_alone(j, level, worth) else own
                 for j, own in enumerate(self.taken)
             ]
         joints = [j for j, own in enumerate(self.taken) if level in own and not had[j]]
         if joints:
             self._weights, self._errors = self._judged()
-        after = self._error(self._errors)
-        return Comparison(name, before, after, None if joints else self._error(errors), joints)
+        after = self.error()
+        refused = None if joints else self._error(errors)
+        self.comparisons.append(Comparison(name, before, after, refused, joints))
+        return self.comparisons[-1]
 
-    def eliminate_backward(self) -> Comparison:
+    def eliminate_backward(self) -> None:
         """Backward elimination: every joint drops the extensions it does not miss, the last first."""
-        before, joints = self._error(self._errors), set()
+        before, joints = self.error(), set()
         for level in reversed(range(len(self._places))):
             for j, own in enumerate(self.taken):
                 if level in own:
@@ -322,14 +345,16 @@ class _State:
                     if -self._gain(errors, _SURE, [j])[0] < _KEEP:
                         self.taken, self._errors = shorter, errors
                         joints.add(j)
-        return Comparison("backward elimination", before, self._error(self._errors), None, sorted(joints))
+        self.comparisons.append(
+            Comparison("backward elimination", before, self.error(), None, sorted(joints))
+        )
 
-    def drop_elements(self) -> Comparison:
+    def drop_elements(self) -> None:
         """Backward elimination of elements (widths, speeds, powers) that a joint does not miss together, the last first.
 
         The simpler and the sharper stay.
         """
-        before, joints = self._error(self._errors), []
+        before, joints = self.error(), []
         for j, dropped in enumerate(self._dropped):
             for place in reversed(self.choice(self.taken)[j]):
                 dropped.add(place)
@@ -337,12 +362,12 @@ class _State:
                     dropped.remove(place)
             joints += [j] if dropped else []
         self._weights, self._errors = self._judged()
-        return Comparison("elements dropped", before, self._error(self._errors), None, joints)
+        self.comparisons.append(Comparison("elements dropped", before, self.error(), None, joints))
 
-    def _earns_alone(self, joint: int, level: int) -> bool:
+    def _earns_alone(self, joint: int, level: int, worth: float) -> bool:
         more = [sorted([*own, level]) if j == joint else own for j, own in enumerate(self.taken)]
         gain, sure = self._gain(self._held_out(more), _SURER, [joint])
-        return sure and gain > _WORTH
+        return sure and gain > worth
 
     def _choose_prior(self) -> None:
         if self._priors:
