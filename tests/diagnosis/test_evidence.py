@@ -77,7 +77,7 @@ def test_a_models_own_errors_are_weighted_like_the_rows(monkeypatch: pytest.Monk
         samples=None,
         independent=np.arange(4),
         rows=rows,
-        kept=np.array([0, 2, 3]),
+        stacking=(np.array([0, 2, 2, 3]), np.array([0, 1, 1, 2]), np.array([0, 0, 1, 1])),
         _places=np.array([0, 2, 3]),
         scale=np.array([0.5, 4.0]),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -243,7 +243,8 @@ class TestWhatIsKnownOfARun:
         samples: Any = SimpleNamespace(
             moving=moving, reach=reach, period=0.1, cutoff_hz=cutoff, motion=motion(30, 3)
         )
-        found = innovations.at_rest(samples)
+        model = SimpleNamespace(history={}, arm=SimpleNamespace(n=3))
+        found = innovations.at_rest(cast(Any, SimpleNamespace(samples=samples, model=model)))
         assert np.flatnonzero(found[:, 1]).tolist() == list(range(10 + smeared, 20 - smeared))
         # to the end of the run it rests
         assert np.flatnonzero(found[:, 0]).tolist() == list(range(25 + smeared, 30)) and not found[:, 2].any()

@@ -125,9 +125,8 @@ class TestTrials:
         def fitted(evidence: Any, residual: Any, effects: Any, shapes: Any) -> Any:
             asked.append((effects, shapes))
             solution = Solution(np.zeros(2), [np.zeros(1)] * 2, np.eye(2), [0.0] * 2)
-            return Fit(
-                cast(Any, None), tuple(effects), tuple(shapes), solution, np.zeros((2, 0)), cast(Any, None)
-            )
+            nothing: Any = SimpleNamespace(X=np.zeros((0, 2)), y=np.zeros(0))
+            return Fit(cast(Any, None), tuple(effects), tuple(shapes), solution, np.zeros((2, 0)), nothing)
 
         monkeypatch.setattr(trials, "fit", fitted)
         chosen = Shape(2.0, (1.0, 2.0))
@@ -136,7 +135,9 @@ class TestTrials:
         rows[2, 0] = True
         evidence: Any = SimpleNamespace(rows=rows, context=None, model=SimpleNamespace(arm=None))
         # what was known before is nothing beside it, and may be of either sign
-        other: Any = SimpleNamespace(plausible=lambda arm, parameters: False)
+        other: Any = SimpleNamespace(
+            plausible=lambda arm, parameters: False, estimates=lambda arm, free, spread, value: {}
+        )
         current: Any = SimpleNamespace(effects=(other,), shapes=(Shape.fixed(0.0),))
         trial = Known(evidence, np.zeros((4, 2)), current).trial(effect)
         assert (trial is not None) == made
