@@ -236,7 +236,7 @@ def select_friction(
             # A velocity found beside Coulomb and viscous friction alone stands for whatever else there is, too.
             beside = [[term for term in own if term.kind != "stribeck_peak"] for own in state.chosen()]
             again = selection(beside)
-            state = again if 2 * np.log(state.error() / again.error()) > _PLAIN else state
+            state = again if again.error() ** 2 < (1 - _PLAIN) * state.error() ** 2 else state
         state.take_again()
         state.eliminate_backward()
         state.drop_elements()

@@ -41,6 +41,11 @@ class Prepared:
     lag: TorqueLag | None
     zeros: EncoderZeros | None
 
+    @property
+    def runs(self) -> Sequence[LogSource]:
+        """The logs, in memory where they are."""
+        return self.kept or self.logs
+
     def conditioning(self, usual: Conditioning) -> Conditioning:
         """The filter for a library that would usually have this one."""
         how = self.given or self.bandwidth.suited(usual)

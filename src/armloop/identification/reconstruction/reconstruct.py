@@ -16,9 +16,7 @@ from armloop.dynamics.physics import check_physics
 from armloop.identification.goodness import Parts, merged, parts_of, witness
 from armloop.identification.goodness.features import Scales
 from armloop.identification.goodness.witness import MOST, Witness
-from armloop.identification.reconstruction.bandwidth import (
-    check_nyquist,
-)
+from armloop.identification.reconstruction.bandwidth import check_nyquist
 from armloop.identification.reconstruction.data import Chunk, Data
 from armloop.identification.reconstruction.excitation import check_recorded, determined
 from armloop.identification.reconstruction.fitted import uncertainty
@@ -159,7 +157,7 @@ def reconstruct(
         wanted = wanted if conditioning.cutoff_hz > 0 else wanted[:1]
     usual = [one.conditioning for one in wanted]
     ready = prepared(logs, kept, arm, usual, conditioning, settings, progress, corrected=method != REFERENCE)
-    check_torques(ready.kept or ready.logs, arm, ready.bandwidth.cutoff_hz)
+    check_torques(ready.runs, arm, ready.bandwidth.cutoff_hz)
 
     def attempt(library: Library, nested: bool = False) -> Attempt:
         how = ready.conditioning(library.conditioning)
@@ -182,8 +180,7 @@ def reconstruct(
 
 def _refused(arm: Arm, wanted: Sequence[Library], ready: Prepared) -> dict[Library, str]:
     """Libraries whose terms the logs do not determine, and why."""
-    logs, cutoff_hz = ready.kept or ready.logs, ready.bandwidth.cutoff_hz
-    reasons = {one: one.undetermined(arm, logs, cutoff_hz) for one in wanted}
+    reasons = {one: one.undetermined(arm, ready.runs, ready.bandwidth.cutoff_hz) for one in wanted}
     return {one: why for one, why in reasons.items() if why}
 
 
