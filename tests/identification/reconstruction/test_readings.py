@@ -71,13 +71,15 @@ def test_measured_records_are_taken_as_they_stand_and_misread_ones_are_not(measu
         log = read_log(measured / folder / f"{path}.csv", quiet=True)
         upright = list(range(arm.n))
         check_torques([log], arm, 8.0)
-        turned = "in another order: taken as " + ", ".join(str(k + 1) for k in upright[::-1])
-        first = [upright[-1], *upright[:-1]], 1.0, "in another order: taken as 2, 3"
-        of_folder = {
-            "ur10e": [(upright[::-1], 1.0, turned), first, (upright, 1 / (2 * np.pi), "in revolutions")],
-            "panda": [first],
-        }
-        for order, factor, words in of_folder[folder]:
+        for order, factor, words in (
+            (
+                upright[::-1],
+                1.0,
+                "in another order: taken as " + ", ".join(str(k + 1) for k in upright[::-1]),
+            ),
+            ([upright[-1], *upright[:-1]], 1.0, "in another order: taken as 2, 3"),
+            (upright, 1 / (2 * np.pi), "in revolutions"),
+        ):
             with pytest.raises(LogError, match=words):
                 check_torques([misread(log, order, factor)], arm, 8.0)
 

@@ -97,7 +97,7 @@ def test_measured_arms_are_not_accused_and_their_faults_are_found(measured: Path
                 check_torques([read_log(path, drive_gains=gains, quiet=True)], arm, 8.0)
     arm = load_arm(measured / "ur10e" / "ur10e.urdf")
     log = read_log(measured / "ur10e" / "noload_20_01_31-unload.csv")
-    for j in (0, 2, 5):
+    for j in range(6):
         with pytest.raises(LogError, match=rf"the sign of tau{j + 1} is turned"):
             check_torques([replace(log, tau=log.tau * (1.0 - 2.0 * np.eye(6)[j]))], arm, 8.0)
         if j:
