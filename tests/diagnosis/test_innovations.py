@@ -329,8 +329,11 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
     )
     arm = load_arm("three_axis")
 
-    def level(terms: tuple[FrictionTerm, ...], *known: AddedEffect, load: float = 0.0) -> float:
-        model = ReconstructedModel(arm, (), FrictionLaw((terms, (), ())))
+    def level(
+        terms: tuple[FrictionTerm, ...], *known: AddedEffect, load: float = 0.0, fastest: float = 1.0
+    ) -> float:
+        ranges = [[1.0] * 3, [fastest] * 3, [1.0] * 3, [0.0] * 3]
+        model = ReconstructedModel(arm, (), FrictionLaw((terms, (), ())), history={"range": ranges})
         still = np.zeros((2, 3))
         motion = Motion(np.array([0.0, 0.1]), still, still, still, np.array([0]))
         samples, context = SimpleNamespace(motion=motion), SimpleNamespace(load=still + load)
@@ -342,6 +345,10 @@ def test_dry_friction_is_half_of_what_the_direction_changes_at_creeping_speed() 
     for load in (4.0, -8.0):
         assert level(terms, load=load) == pytest.approx(2 + 0.5 + 0.25 * abs(load))
     assert level(terms[3:4]) == pytest.approx(0.5)
+    # what is a creep for a joint that never goes fast is slower
+    peak = (FrictionTerm("stribeck_peak", 3.0, CREEP),)
+    for fastest, creep in ((1.0, CREEP), (0.1, CREEP / 2)):
+        assert level(peak, fastest=fastest) == pytest.approx(3 * np.exp(-((creep / CREEP) ** 2)))
     # at rest it holds the level that a direction fades in to, not what there is of it at a creep
     assert level((FrictionTerm("smooth_sign", 3.0, 10 * CREEP),)) == pytest.approx(3.0)
     # what is known of it beside the model counts, too; what no direction changes does not

@@ -136,6 +136,10 @@ class TestBurstsOfTheResidual:
         monkeypatch.setattr(outliers, "dry_level", lambda evidence: np.full((400, 1), 1.0))
         evidence = self.evidence(motion([400], 0.02))
         evidence.samples.moving[:], evidence.samples.motion.v[:] = moving, speed
+        if speed == -0.0099:  # of a joint that never went faster than ten times as fast, that is no creep
+            evidence.model.history = {"range": [[1.0], [0.1], [1.0], [0.0]]}
+            assert len(outliers.outlying(evidence, steps(400, (150, 200, 2.1))[:, None])) == 1
+            evidence.model.history = {}
         # 4.2 baselines, or 2.2 above what friction holds
         found = outliers.outlying(evidence, steps(400, (150, 200, 2.1))[:, None])
         assert len(found) == (not held)

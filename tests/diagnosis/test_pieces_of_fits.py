@@ -145,6 +145,49 @@ class TestTrials:
             shape = chosen if "shapes" in of else Shape.fixed(5.0)
             assert asked == [([other, effect], [Shape.fixed(0.0), shape])]
 
+    @pytest.mark.parametrize(
+        ("bare", "with_errors", "possible"), [(True, False, True), (False, True, True), (False, False, False)]
+    )
+    def test_what_is_possible_within_its_errors_is_possible(
+        self, bare: bool, with_errors: bool, possible: bool
+    ) -> None:
+        """The second of two effects, of two free parameters with variances 2 and 3; of the first there are one, and 1."""
+        told: list[np.ndarray] = []
+
+        def estimates(arm: Any, free: Any, spread: np.ndarray, value: float) -> Any:
+            told.append(spread)
+            return {"surely": not spread.any(), "free": free, "value": value}
+
+        def plausible(arm: Any, mine: Any) -> bool:
+            assert (mine["free"].tolist(), mine["value"]) == ([5.0, 6.0], 8.0)
+            return bare if mine["surely"] else with_errors
+
+        of: Any = SimpleNamespace(
+            estimates=estimates, plausible=plausible, resolved=lambda mine, tried: tried == [8.0]
+        )
+        first: Any = SimpleNamespace(estimates=lambda *_: {})
+        free = [np.array([4.0]), np.array([5.0, 6.0])]
+        nothing: Any = None
+        solution = Solution(np.zeros(3), free, np.eye(3), [7.0, 8.0])
+        made = Fit(nothing, (first, of), (), solution, np.zeros((2, 0)), nothing)
+        vars(made)["_spread"] = [np.eye(1), np.diag([2.0, 3.0])]
+        assert made.is_possible(-1, [8.0]) is possible and not made.is_possible(1, [9.0])
+        assert not told[0].any() and told[0].shape == (2, 2)
+
+    def test_every_effect_has_its_own_block_of_the_covariance(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        whole = np.arange(9.0).reshape(3, 3)
+        asked: list[Any] = []
+        monkeypatch.setattr(fit, "covariance", lambda X, left, rows: asked.append((X, left)) or whole)
+        J = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
+        rows: Any = SimpleNamespace(X=np.ones((2, 3)), y=np.array([10.0, 20.0]))
+        solution = Solution(np.array([1.0, 2.0, 3.0]), [np.zeros(1), np.zeros(2)], J, [0.0, 0.0])
+        own, other = Fit(cast(Any, None), (), (), solution, np.zeros((2, 0)), rows)._spread
+        np.testing.assert_array_equal(own, [[0.0]])
+        np.testing.assert_array_equal(other, [[4.0, 5.0], [7.0, 8.0]])
+        ((X, left),) = asked
+        np.testing.assert_array_equal(X, [[1.0, 2.0, 3.0]] * 2)
+        np.testing.assert_array_equal(left, [4.0, 14.0])
+
     def test_a_shape_is_chosen_on_all_blocks_and_without_each_fold(self) -> None:
         t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
         shapes = [1.0, 2.0, 3.0]

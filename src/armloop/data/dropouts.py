@@ -222,7 +222,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
     stamps = np.diff(log.time)
     usual_gap = max(float(np.median(stamps)), TINY)
     clocks = [np.ones(len(changes)), np.maximum(stamps / usual_gap, _NO_GAP)]
-    tried = ((each, *_large(changes, each, resolution)) for each in clocks)
+    tried = ((each, *_large(changes / each, resolution)) for each in clocks)
     gaps, usual, large = min(tried, key=lambda found: (len(found[2]), found[1]))
     # a spike makes two large steps, and some three to either side
     if len(large) == 0 or len(large) > 8 * _RARE * len(x):
@@ -235,7 +235,7 @@ def _spikes(x: Array, log: Recorded) -> Index:
             near = np.r_[steps[max(0, k - _BESIDE) : k], steps[k + width + 1 : k + width + 1 + _BESIDE]]
             slope = float(np.median(near))
             least = max(usual, PER_MEDIAN * float(np.median(np.abs(near - slope))))
-            up, down = ((steps[i] - slope) * gaps[i] for i in (k, k + width))
+            up, down = steps[k] - slope, steps[k + width] - slope
             height = min(abs(up), abs(down))
             away = abs(x[k + width + 1] - x[k] - slope * float(gaps[k : k + width + 1].sum()))
             back = up * down < 0 and away < _BACK * height
@@ -244,16 +244,11 @@ def _spikes(x: Array, log: Recorded) -> Index:
     return np.unique(np.array(found, dtype=np.intp))
 
 
-def _large(changes: Array, gaps: Array, resolution: float) -> tuple[float, Index]:
-    """How far steps usually are from those around them, and which are so much farther that they may be a spike's.
-
-    Args:
-        changes: (N - 1,) from sample to sample, of which each lasts for one of ``gaps``.
-    """
-    steps = changes / gaps
+def _large(steps: Array, resolution: float) -> tuple[float, Index]:
+    """How far steps (N - 1,) usually are from those around them, and which are so far that they may be a spike's."""
     # what a step is beside the steps around it: a joint that moves fast makes large ones
     trend = np.concatenate([steps[:_AWAY], 0.5 * (steps[: -2 * _AWAY] + steps[2 * _AWAY :]), steps[-_AWAY:]])
-    size = np.abs(steps - trend) * gaps
+    size = np.abs(steps - trend)
     usual = max(PER_MEDIAN * float(np.median(size)), 0.5 * resolution)
     return usual, np.flatnonzero(size > 0.5 * _SPIKE * usual)
 

@@ -16,14 +16,14 @@ from armloop.identification.reconstruction.block_length import Blocks, independe
 RNG = np.random.default_rng(3)
 
 
-def part(samples: int, joints: int = 1, fast: int | None = None) -> Samples:
+def part(samples: int, joints: int = 1, fast: int | None = None, fastest: float = np.inf) -> Samples:
     """Velocities well above those that count as rest, but for all after the first ``fast``."""
     v = RNG.choice([-1.0, 1.0], (samples, joints)) * RNG.uniform(0.5, 2.0, (samples, joints))
     if fast is not None:
         v[fast:] = 0.005
     motion = Motion(0.1 * np.arange(samples), np.cumsum(v, axis=0), v, np.zeros_like(v), np.array([0]))
     tau = 0.5 + 2.0 * np.sign(v) + 3.0 * v + 0.7 * v * np.abs(v) + RNG.normal(size=v.shape)
-    return Samples(motion, tau, np.ones(v.shape, dtype=bool), 0.1)
+    return Samples(motion, tau, np.ones(v.shape, dtype=bool), 0.1, fastest=np.full(joints, fastest))
 
 
 @pytest.fixture
@@ -39,6 +39,13 @@ def heard(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     monkeypatch.setattr(block_length, "BaseParameters", SimpleNamespace(of_arm=lambda arm, rotors: base))
     monkeypatch.setattr(block_length, "correlation_time", time)
     return asked
+
+
+def test_of_a_joint_that_never_goes_fast_slower_samples_count(heard: list[Any]) -> None:
+    # the last hundred at 0.005 rad/s, more than a twentieth of 0.08
+    block_length._correlation(SimpleNamespace(n=1), [part(300, fast=200, fastest=0.08)])  # type: ignore[arg-type]
+    ((_, rows, _, _),) = heard
+    assert rows.all()
 
 
 def test_the_residual_is_that_of_least_squares_on_all_samples_that_move(heard: list[Any]) -> None:

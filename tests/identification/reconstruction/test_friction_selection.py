@@ -114,15 +114,15 @@ def test_what_a_law_brought_is_said_to_the_digit_that_decided():
 
 @pytest.mark.parametrize(
     ("samples", "joints", "sure"),
-    [(1140, None, False), (1170, None, True), (2570, [1], False), (2600, [1], True)],
+    [(1000, None, False), (1030, None, True), (2290, [1], False), (2330, [1], True)],
 )
 def test_a_rung_must_be_likelier_than_chance_makes_one_of_all_rungs_and_joints(
     samples: int, joints: list[int] | None, sure: bool
 ) -> None:
     """Squared errors that fall by 1 % on each of five folds, of samples of which ten neighbours tell as much as one.
 
-    Every rung may be asked twice: half of 1 % of the 5 x 2 x samples / 10 values exceeds ln(16 / 0.05) from 1,154 on; of one
-    joint's half as many values ln(32 / 0.05) from 2,585 on.
+    Half of 1 % of the 5 x 2 x samples / 10 values exceeds ln(8 / 0.05) from 1,015 on; of one joint's half as many values
+    ln(16 / 0.05) from 2,307 on.
     """
     state = object.__new__(_State)
     state.pooled = SimpleNamespace(repeats=10.0)  # type: ignore[assignment]

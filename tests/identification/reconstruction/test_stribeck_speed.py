@@ -15,12 +15,12 @@ SPEEDS = np.array([0.1, 0.045, 0.2])
 LEVEL, EXCESS, VISCOUS = 0.5, 0.25, 1.0
 
 
-def a_run(seed: int) -> MotionLog:
+def a_run(seed: int, by_load: float = 0.0, speeds: np.ndarray = SPEEDS) -> MotionLog:
     motion = fourier_motion(40.0, 200.0, seed)
     v = motion.v
-    dry = (LEVEL + EXCESS * np.exp(-((v / SPEEDS) ** 2))) * np.tanh(v / 1e-3)
-    tau = rigid_torque(three_axis(), motion.q, v, motion.vdot) + dry + VISCOUS * v
-    return measured(motion, tau, seed, noise=0.005)
+    load = rigid_torque(three_axis(), motion.q, v, motion.vdot)
+    dry = (LEVEL + by_load * np.abs(load) + EXCESS * np.exp(-((v / speeds) ** 2))) * np.tanh(v / 1e-3)
+    return measured(motion, load + dry + VISCOUS * v, seed, noise=0.005)
 
 
 def test_friction_reads_as_the_law_that_it_is() -> None:
@@ -38,6 +38,21 @@ def test_friction_reads_as_the_law_that_it_is() -> None:
         assert level == pytest.approx(LEVEL, rel=0.03)
         assert main.parameter == pytest.approx(speed, rel=0.1)
         assert not {t.kind for t in terms} - {"smooth_sign", "viscous", "stribeck_peak"}
+
+
+def test_a_fall_is_read_beside_friction_that_grows_with_the_load() -> None:
+    """Beside Coulomb and viscous friction alone, the velocity of the first joint's stands for the load, too: 0.118."""
+    logs = [a_run(seed, 0.3, np.array([0.1, 0.06, 0.15])) for seed in (1, 2, 3)]
+    options = Options(standard_errors=False, parts=False)
+    result = reconstruct(logs, three_axis(), library="rigid-body", options=options)
+    assert any("Stribeck, once more: joints 1" in note for note in result.notes)
+    terms = {term.kind: term for term in result.model.friction.terms[0]}
+    assert len(result.model.friction.terms[0]) == len(terms) == 4
+    assert terms["stribeck_peak"].parameter == pytest.approx(0.1, rel=0.03)
+    assert terms["stribeck_peak"].coefficient == pytest.approx(EXCESS, rel=0.03)
+    assert terms["smooth_sign"].coefficient == pytest.approx(LEVEL, rel=0.03)
+    assert terms["viscous"].coefficient == pytest.approx(VISCOUS, rel=0.01)
+    assert terms["load_smooth_sign"].coefficient == pytest.approx(0.3, rel=0.03)
 
 
 def test_one_velocity_comes_before_the_row_and_takes_a_place_of_it() -> None:

@@ -9,8 +9,9 @@ which a passive regression keeps few. It is taken for all joints if the error on
 scatter over the folds; else for the joints alone for which it falls by more than twice that. In either case held-out data
 must be likelier by a factor that chance reaches in one of twenty selections at most (the likelihood ratio of data that
 fitted neither exceeds 1/a with a chance of a at most: Wasserman, Ramdas and Balakrishnan, *Universal inference*, PNAS
-2020). What was asked before a later law was there is asked once more beside it, and must be plain then. At the end, each
-joint hands back the extensions it does not miss, and of the others the elements.
+2020). The Stribeck fall is asked for a second time beside all that was chosen, at the velocities that explain most there:
+beside Coulomb and viscous friction alone one stands for whatever else there is, too. What comes of that must be plain. At
+the end, each joint hands back the extensions it does not miss, and of the others the elements.
 
 Friction that depends on the position or drifts with time is no extension: within a run it fits, on another run it fails.
 
@@ -42,9 +43,8 @@ from armloop.util.progress import Progress, paced, silent
 _WORTH, _SURE, _SURER = 0.005, 1.0, 2.0
 #: Chance that a selection has an extension which nothing calls for.
 _LEVEL = 0.05
-#: Every extension is asked so many times at most, and what comes of asking again must remove this part of the squared error:
-#: plainly more than what the order of the extensions leaves to chance.
-_ASKED, _PLAIN = 2, 0.05
+#: Part of the squared error that Stribeck falls must remove that are asked for a second time.
+_PLAIN = 0.05
 #: Part of a joint's squared error that an extension must be worth for the joint to keep it.
 _KEEP = 0.002
 #: Speeds over which the direction fades in, rad/s; presliding widths, rad; a prismatic joint's are a tenth, in m.
@@ -52,6 +52,8 @@ _FADES = (0.003, 0.01, 0.03, 0.1)
 _WIDTHS = (3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
 #: The slowest motion is this quantile of the speeds; it is so much faster than the fade that reaches down to it.
 _CREEP, _SHARPER = 0.005, 4.0
+#: The element of a Stribeck fall.
+_FALL = "stribeck_peak"
 #: Stribeck speeds tried, from the slowest to the given part of the fastest speed.
 _STRIBECK, _SLOWEST, _PART = 5, 0.02, 0.3
 
@@ -216,28 +218,25 @@ def select_friction(
     """
     motion, slowest, tell = data.reference.motion, data.slowest(_CREEP), paced(progress)
 
-    def selection(beside: list[list[FrictionTerm]] | None) -> _State:
-        """Forward selection, with Stribeck velocities sought beside some friction, if there are any."""
+    def begun(beside: Sequence[list[FrictionTerm]]) -> _State:
+        """No extension taken yet; the Stribeck velocities, if there are any, are sought beside some friction."""
         speeds: list[float] = []
-        if beside is not None:
+        if beside:
             progress("friction: each joint's Stribeck velocity")
-            speeds = stribeck_speeds(data, design, beside, stribeck_ranges(arm, motion))
+            speeds = stribeck_speeds(data, design, list(beside), stribeck_ranges(arm, motion))
         nested = restricted(extensions(arm, motion, slowest, speeds), options.friction)
         candidates = [[term for extension in nested for term in extension.elements[j]] for j in range(arm.n)]
-        state = _State(data.pooled(design, candidates, options.physical), nested, candidates, priors)
-        state.take_in_turn(data.plenty, tell)
-        return state
+        return _State(data.pooled(design, candidates, options.physical), nested, candidates, priors)
 
     simplest = restricted(extensions(arm, motion, slowest), options.friction)
-    falls = any(term.kind == "stribeck_peak" for extension in simplest for term in extension.elements[0])
-    state = selection(simplest[0].elements if falls else None)
+    falls = any(term.kind == _FALL for extension in simplest for term in extension.elements[0])
+    state = begun(simplest[0].elements if falls else ())
+    state.take_in_turn(range(len(state.nested)), data.plenty, tell)
     if data.plenty:
-        if falls:
-            # A velocity found beside Coulomb and viscous friction alone stands for whatever else there is, too.
-            beside = [[term for term in own if term.kind != "stribeck_peak"] for own in state.chosen()]
-            again = selection(beside)
+        if state.has_more_than_falls():
+            again = begun(state.without_falls())
+            again.take_falls_again(state, tell)
             state = again if again.error() ** 2 < (1 - _PLAIN) * state.error() ** 2 else state
-        state.take_again()
         state.eliminate_backward()
         state.drop_elements()
     notes = [] if state.prior_name is None else [f"where the motion tells nothing: {state.prior_name}"]
@@ -245,7 +244,7 @@ def select_friction(
         notes.append(f"friction: nothing but {', '.join(options.friction)} was allowed")
     notes += _notes(state.comparisons)
     return FrictionSelection(
-        state.chosen(), state.prior, state.comparisons, notes, state.candidates, state.pooled
+        state.laws(state.taken), state.prior, state.comparisons, notes, state.candidates, state.pooled
     )
 
 
@@ -253,7 +252,8 @@ class _State:
     """Where the selection stands: the extensions each joint has taken, and the squared errors on the held-out folds.
 
     Attributes:
-        candidates: the elements of all extensions, for each joint.
+        nested: the extensions, the simplest first.
+        candidates: the elements of all of them, for each joint.
         comparisons: what was asked so far.
     """
 
@@ -264,10 +264,15 @@ class _State:
         candidates: list[list[FrictionTerm]],
         priors: dict[str, Prior],
     ) -> None:
-        self.candidates, self.comparisons = candidates, list[Comparison]()
+        self.pooled, self.nested, self.candidates = pooled, nested, candidates
+        self.comparisons: list[Comparison] = []
         ends = np.cumsum([0] + [len(extension.elements[0]) for extension in nested])
-        self.pooled, self._names = pooled, [extension.name for extension in nested]
         self._places = [list(range(a, z)) for a, z in pairwise(ends.tolist())]
+        self._falls = [
+            k
+            for k, extension in enumerate(nested)
+            if {term.kind for term in extension.elements[0]} == {_FALL}
+        ]
         self._counts = pooled.counts
         self._squares = np.maximum(pooled.squares.sum(axis=0), TINY)
         self.taken: list[list[int]] = [[] for _ in pooled.candidates]
@@ -284,49 +289,55 @@ class _State:
             for own, dropped in zip(taken, self._dropped, strict=True)
         ]
 
-    def chosen(self) -> list[list[FrictionTerm]]:
-        """The law of each joint."""
-        choice = self.choice(self.taken)
-        return [[own[k] for k in places] for own, places in zip(self.candidates, choice, strict=True)]
+    def laws(self, taken: list[list[int]]) -> list[list[FrictionTerm]]:
+        """The law of each joint that has taken some extensions."""
+        return [
+            [own[k] for k in places] for own, places in zip(self.candidates, self.choice(taken), strict=True)
+        ]
 
     def error(self) -> float:
         """Held-out nRMSE, mean over the joints."""
         return self._error(self._errors)
 
-    def take_in_turn(self, one_by_one: bool, tell: Progress) -> None:
-        """Take the extensions that earn their place, the simplest first."""
-        for level, name in enumerate(self._names):
-            tell(f"friction: extension {level + 1} of {len(self._names)}")
-            self.take(level, name, one_by_one)
+    def take_in_turn(self, levels: Iterable[int], one_by_one: bool, tell: Progress, again: str = "") -> None:
+        """Take those of some extensions that earn their place, the simplest first."""
+        for level in levels:
+            tell(f"friction: extension {level + 1} of {len(self.nested)}")
+            self.take(level, f"{self.nested[level].name}{again}", one_by_one)
 
-    def take_again(self) -> None:
-        """Take the extensions that plainly earn their place beside later ones, which were not there when they were asked."""
-        for level, name in enumerate(self._names):
-            last = max((k for own in self.taken for k in own), default=0)
-            if level < last and any(level not in own for own in self.taken):
-                self.take(level, f"{name}, once more", one_by_one=True, worth=_PLAIN)
+    def has_more_than_falls(self) -> bool:
+        """Whether there are Stribeck falls to be asked for beside an extension that came after them."""
+        first = min(self._falls, default=len(self.nested))
+        return any(k > first and k not in self._falls for own in self.taken for k in own)
 
-    def take(self, level: int, name: str, one_by_one: bool, worth: float = _WORTH) -> Comparison:
-        """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway.
+    def without_falls(self) -> list[list[FrictionTerm]]:
+        """The law of each joint but for its Stribeck falls."""
+        return self.laws([[k for k in own if k not in self._falls] for own in self.taken])
 
-        Args:
-            worth: part of the squared error that it must remove.
-        """
-        before, had = self.error(), [level in own for own in self.taken]
-        everyone = [own if has else sorted([*own, level]) for own, has in zip(self.taken, had, strict=True)]
+    def take_falls_again(self, before: _State, tell: Progress) -> None:
+        """Begin with what another selection has taken but for its Stribeck falls, and ask for these."""
+        self.taken = [[k for k in own if k not in self._falls] for own in before.taken]
+        self.prior, self.prior_name = before.prior, before.prior_name
+        self.comparisons = [*before.comparisons]
+        self._weights, self._errors = self._judged()
+        self.take_in_turn(self._falls, True, tell, ", once more")
+
+    def take(self, level: int, name: str, one_by_one: bool) -> Comparison:
+        """Take an extension for all joints or for some if it earns its place; the first, what every drive has, anyway."""
+        before = self.error()
+        everyone = [sorted([*own, level]) for own in self.taken]
         errors = self._held_out(everyone)
         gain, sure = self._gain(errors, _SURE)
         if level == 0:
             self.taken = everyone
             self._choose_prior()
-        elif sure and gain > worth:
+        elif sure and gain > _WORTH:
             self.taken = everyone
         elif one_by_one:
             self.taken = [
-                everyone[j] if not had[j] and self._earns_alone(j, level, worth) else own
-                for j, own in enumerate(self.taken)
+                everyone[j] if self._earns_alone(j, level) else own for j, own in enumerate(self.taken)
             ]
-        joints = [j for j, own in enumerate(self.taken) if level in own and not had[j]]
+        joints = [j for j, own in enumerate(self.taken) if level in own]
         if joints:
             self._weights, self._errors = self._judged()
         after = self.error()
@@ -364,10 +375,10 @@ class _State:
         self._weights, self._errors = self._judged()
         self.comparisons.append(Comparison("elements dropped", before, self.error(), None, joints))
 
-    def _earns_alone(self, joint: int, level: int, worth: float) -> bool:
+    def _earns_alone(self, joint: int, level: int) -> bool:
         more = [sorted([*own, level]) if j == joint else own for j, own in enumerate(self.taken)]
         gain, sure = self._gain(self._held_out(more), _SURER, [joint])
-        return sure and gain > worth
+        return sure and gain > _WORTH
 
     def _choose_prior(self) -> None:
         if self._priors:
@@ -401,7 +412,7 @@ class _State:
         gains = (self._counts * ratios).sum(axis=1) / whole
         scatter = float(gains.std(ddof=1)) * np.sqrt(len(gains)) if len(gains) > 1 else np.inf
         likelihood = 0.5 * whole / self.pooled.repeats * gains.sum()
-        questions = _ASKED * len(self._places) * (1 if joints is None else len(self.taken))
+        questions = len(self._places) * (1 if joints is None else len(self.taken))
         sure = gains.sum() > times * scatter and likelihood > np.log(questions / _LEVEL)
         return float(gains.sum()), bool(sure)
 
