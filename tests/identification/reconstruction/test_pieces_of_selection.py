@@ -174,6 +174,8 @@ class TestLadder:
         ):
             one.taken = taken
             assert one.has_more_than_falls() is more
+        one._falls, one.taken = [1, 2], [[0, 2]] * 2
+        assert one.has_more_than_falls() is False
         one._falls, one.taken = [], [[0, 2]] * 2
         assert one.has_more_than_falls() is False
 
