@@ -11,7 +11,8 @@ from synthetic import three_axis
 
 from armloop.data.motion import Motion
 from armloop.diagnosis import pushes
-from armloop.laws.effects import effect
+from armloop.laws.effects import Estimate, effect
+from armloop.model import AddedEffect
 
 
 def motion(lengths: tuple[int, ...], joints: int = 1) -> Motion:
@@ -43,6 +44,32 @@ class TestSizeOfAPush:
         np.testing.assert_allclose(
             pushes._size_error(columns, np.array([3.0, 4.0]), 0 * left, pieces), [0.0, 5.0], atol=1e-6
         )
+
+
+class TestWhereAForceActs:
+    def at(self, link: float, force: float) -> pushes.Contact:
+        of = {"force": Estimate([force, 0.0, 0.0], [0.3, 0.0, 0.0], "N")}
+        if link:
+            of["link"] = Estimate(link, 0.0, "1")
+        nothing: Any = None
+        added = AddedEffect(effect("external_contact", None), of)
+        return pushes.Contact(added, nothing, nothing, nothing, 0.9, 0.9)
+
+    def test_what_explains_it_elsewhere_is_the_error_of_force_and_link(self) -> None:
+        points = [self.at(4.0, 3.0), self.at(4.5, 2.0), self.at(3.5, 4.0)]
+        found = pushes._somewhere(self.at(4.0, 3.0), points).added.parameters
+        np.testing.assert_allclose(found["force"].std_error, [np.sqrt(0.5 + 0.09), 0.0, 0.0])
+        # points half a link apart, and anywhere between them
+        np.testing.assert_allclose(found["link"].std_error, np.sqrt(0.5 / 4 + 0.25 / 12))
+        assert found["link"].value == 4.0
+
+    def test_no_more_is_known_of_a_link_than_its_points_are_apart(self) -> None:
+        found = pushes._somewhere(self.at(4.0, 3.0), []).added.parameters
+        np.testing.assert_allclose(found["link"].std_error, 0.5 / np.sqrt(12))
+
+    def test_a_force_on_the_tool_has_no_link(self) -> None:
+        found = pushes._somewhere(self.at(0.0, 3.0), [self.at(4.5, 3.0)]).added.parameters
+        assert set(found) == {"force"}
 
 
 class TestIntervalOfAPush:

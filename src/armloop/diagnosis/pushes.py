@@ -13,6 +13,7 @@ from armloop.diagnosis.fit import REFINEMENTS
 from armloop.diagnosis.judgement import MOSTLY, NOTICEABLE, enough, leaves_more
 from armloop.diagnosis.score import Score
 from armloop.laws.effects import Context, Effect, Estimate, effect
+from armloop.laws.effects.base import number
 from armloop.laws.effects.events import interval
 from armloop.model import AddedEffect
 from armloop.util.arrays import Array, Index, Mask
@@ -26,6 +27,8 @@ SHORTEST = 0.1
 FREEDOM = 0.05
 #: So many joints or fewer feel a force as if it were a torque on any of them.
 _FEW = 3
+#: Points at which a force may have acted lie so many links apart.
+_STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,17 +125,23 @@ def push(
     best = replace(best, rivals=list(rivals.values()))
     if chosen.effect.joint is not None:
         return best
-    halves = (_Kind(chosen.effect, k / 2) for k in range(1, 2 * n + 1))
-    points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in halves]
+    along = (_Kind(chosen.effect, link) for link in np.arange(_STEP, n + _STEP, _STEP).tolist())
+    points = [_trial(evidence, residual, weight, burst, kind, shown) for kind in along]
     return _somewhere(best, [p for p in points if p and p.share >= most - FREEDOM and not p.contradicted])
 
 
 def _somewhere(found: Contact, points: list[Contact]) -> Contact:
-    """A force that acts on one of these points, nobody knows on which: its error by the law of total variance."""
+    """A force on one of these points, nobody knows on which: its error, and its link's, by the law of total variance."""
     forces = [point.added.parameters["force"] for point in (found, *points)]
     values, errors = (np.array([getattr(f, of) for f in forces]) for of in ("value", "std_error"))
     error = np.sqrt(np.mean((values - values[0]) ** 2 + errors**2, axis=0))
     parameters = {**found.added.parameters, "force": replace(forces[0], std_error=error.tolist())}
+    if "link" in parameters:
+        own = number(parameters["link"].value)
+        off = np.array([0.0, *(number(point.added.parameters["link"].value) - own for point in points)])
+        # it may lie anywhere between two points, too
+        error = np.sqrt(np.mean(off**2) + _STEP**2 / 12)
+        parameters["link"] = replace(parameters["link"], std_error=float(error))
     return replace(found, added=replace(found.added, parameters=parameters))
 
 

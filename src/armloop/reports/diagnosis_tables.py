@@ -15,6 +15,7 @@ from armloop.reports.words import MISSING, effect_label, percent, unit, vector, 
 
 if TYPE_CHECKING:
     from armloop.diagnosis import Closing, Diagnosis
+    from armloop.laws.effects import Estimate
     from armloop.robot.arm import Arm
 
 #: Parameters that say when something was, which the sentences tell.
@@ -55,14 +56,11 @@ def events_table(diagnosis: Diagnosis) -> Table:
         p, joint = contact.added.parameters, contact.added.effect.joint
         size = p["force"] if joint is None else p["torque"]
         value = np.atleast_1d(np.asarray(size.value, dtype=float))
-        where = f"link {int(np.asarray(p['link'].value))}" if "link" in p else "tool"
+        where = f"link {_rounded(p['link'], 1, 0)}" if "link" in p else "tool"
         rows.append(
             [
                 k + 1,
-                *(
-                    f"{float(np.asarray(p[key].value)):.2f} ± {float(np.asarray(p[key].std_error)):.2f}"
-                    for key in ("start", "end")
-                ),
+                *(_rounded(p[key], 2, 2) for key in ("start", "end")),
                 where if joint is None else f"joint {joint}",
                 float(np.linalg.norm(value)),
                 unit(size.unit),
@@ -73,6 +71,12 @@ def events_table(diagnosis: Diagnosis) -> Table:
         )
     headers = ["event", "from [s]", "to [s]", "at", "mean", "unit", "(x, y, z)", "std. error", "explains"]
     return make_table(headers, rows, "Events", left=(3, 5))
+
+
+def _rounded(of: Estimate, places: int, of_value: int) -> str:
+    """A value and its error to so many places."""
+    value, error = (float(np.asarray(x)) for x in (of.value, of.std_error))
+    return f"{value:.{of_value}f} ± {error:.{places}f}"
 
 
 def errors_table(diagnosis: Diagnosis) -> Table:
