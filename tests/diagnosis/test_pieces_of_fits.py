@@ -289,6 +289,18 @@ def test_standard_errors_fall_with_the_size_of_columns_and_their_correlation() -
     assert one == pytest.approx(1 / 0.8) and both == pytest.approx(np.sqrt(1 / 0.8))
 
 
+def test_of_what_no_motion_shows_there_is_no_standard_error() -> None:
+    """The height of a load on an arm whose axes are all vertical."""
+
+    def stage(*columns: list[float]) -> Any:
+        X = np.array(columns).T
+        return SimpleNamespace(columns=lambda effect, shape: X[:, :2] if effect == "load" else X[:, 2:])
+
+    laws: Any = [SimpleNamespace(effect="load", shape=0.0), SimpleNamespace(effect="height", shape=0.0)]
+    run, then = stage([1, 0, 0], [0, 0, 0], [0, 0, 1e-12]), stage([2, 0, 0], [0, 0, 0], [0, 0, 5])
+    assert next_run._sharper(run, then, laws) == [("load", pytest.approx(0.5))]
+
+
 def test_what_feedforward_changes_along_a_run() -> None:
     change = FeedforwardChange(np.arange(2), np.array([[3.0, -1.0], [-4.0, 1.0]]))
     assert change.rms.tolist() == pytest.approx([np.sqrt(12.5), 1.0]) and change.largest.tolist() == [

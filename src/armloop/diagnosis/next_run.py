@@ -28,6 +28,9 @@ from armloop.util.progress import Progress, silent
 
 __all__ = ["FAR_ENOUGH", "NextRun", "Told", "Wish", "next_run", "training_ranges"]
 
+#: Less than this part of the largest column, or eigenvalue, is none.
+_NOTHING = 1e-9
+
 
 @dataclass(frozen=True)
 class Told:
@@ -120,13 +123,24 @@ def next_run(diagnosis: Diagnosis, wish: Wish | None = None, progress: Progress 
 
 
 def _sharper(run: Stage, then: Stage, laws: Sequence[Law]) -> list[tuple[Effect, float]]:
-    """Factor of the standard errors of each effect's coefficients, the geometric mean over them."""
+    """Factor of the standard errors of each effect's coefficients, the geometric mean over them.
+
+    A coefficient of which a motion shows nothing, as the height of a load on an arm of vertical axes, has none.
+    """
+    each = [[stage.columns(law.effect, law.shape) for law in laws] for stage in (run, then)]
+    designs = [np.hstack(columns) for columns in each]
+    scales = [np.sqrt((X**2).sum(axis=0)) for X in designs]
+    felt = np.all([scale > _NOTHING * scale.max() for scale in scales], axis=0)
     logs = []
-    for stage in (run, then):
-        X = np.hstack([stage.columns(law.effect, law.shape) for law in laws])
-        scale = np.sqrt((X**2).sum(axis=0))
-        inverse = np.linalg.pinv((X / scale).T @ (X / scale), rcond=1e-9)
-        logs.append(0.5 * np.log(np.diag(inverse)) - np.log(scale))
-    sizes = [run.columns(law.effect, law.shape).shape[1] for law in laws]
-    change = np.split(logs[1] - logs[0], np.cumsum(sizes)[:-1])
-    return [(law.effect, float(np.exp(part.mean()))) for law, part in zip(laws, change, strict=True)]
+    for X, scale in zip(designs, scales, strict=True):
+        unit = X[:, felt] / scale[felt]
+        logs.append(
+            0.5 * np.log(np.diag(np.linalg.pinv(unit.T @ unit, rcond=_NOTHING))) - np.log(scale[felt])
+        )
+    owner = np.repeat(np.arange(len(laws)), [columns.shape[1] for columns in each[0]])[felt]
+    change = logs[1] - logs[0]
+    return [
+        (law.effect, float(np.exp(change[owner == k].mean())))
+        for k, law in enumerate(laws)
+        if (owner == k).any()
+    ]
