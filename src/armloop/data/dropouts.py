@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from armloop.data.recorded import Finding, Recorded
+from armloop.data.stamps import NEARLY, bridged, coincident
 from armloop.util.arrays import PER_MEDIAN, TINY, Array, Index, stretches
 
 #: A spike leaves and comes back by so many deviations of the steps beside it, and ends this part of it from where it began.
@@ -56,8 +57,19 @@ def repaired(log: Recorded, lag: float = 0.0) -> Recorded:
 
 
 def mended(log: Recorded) -> Recorded:
-    """The record with what lies beside them in place of repeated rows and spikes."""
-    return _without_spikes(_moving_on(log))
+    """The record with what lies beside them in place of rows that coincide, repeated rows and spikes."""
+    return _without_spikes(_moving_on(_at_their_instants(log)))
+
+
+def _at_their_instants(log: Recorded) -> Recorded:
+    """The record with lines through what lies beside rows whose stamps nearly coincide with another's."""
+    rows = coincident(log.time, log.q, log.runs)
+    if len(rows) == 0:
+        return log
+    q, v, tau = (bridged(x, rows, log.time) for x in (log.q, log.v, log.tau))
+    return replace(
+        log, q=q, v=v, tau=tau, vdot=None if log.vdot is None else bridged(log.vdot, rows, log.time)
+    )
 
 
 def _in_time(log: Recorded, lag: float) -> Array:
@@ -84,6 +96,15 @@ def later(time: Array, x: Array, seconds: float) -> Array:
 
 def dropouts(log: Recorded) -> Iterator[Finding]:
     """What is replaced or left out, a sentence for each column; of one or two spikes none."""
+    close = coincident(log.time, log.q, log.runs)
+    if len(close) >= _SAID:
+        least = float(np.diff(log.time).min())
+        yield Finding(
+            "column time",
+            f"has rows nearer to another than {NEARLY:.0%} of the usual step, {len(close)} in all, {least:.2g} s at the "
+            "least, as where messages are stamped when they arrive; what lies beside them takes their place",
+        )
+    log = _at_their_instants(log)
     held = _held(log)
     if len(held):
         yield Finding(
@@ -94,7 +115,7 @@ def dropouts(log: Recorded) -> Iterator[Finding]:
     for (kind, j), rows in spikes(log).items():
         if len(rows) >= _SAID:
             x = getattr(log, kind)[:, j]
-            size = np.abs(x - _bridged(x, rows, log.time)).max()
+            size = np.abs(x - bridged(x, rows, log.time)).max()
             yield Finding(
                 f"column {kind}{j + 1}",
                 f"has spikes of one or two samples, {len(rows)} in all, of up to {size:.3g}; what lies beside them takes "
@@ -130,7 +151,7 @@ def spikes(log: Recorded) -> dict[tuple[str, int], Index]:
         rows, x = found["v", j], log.v[:, j]
         later, before = np.minimum(rows + 1, len(x) - 1), np.maximum(rows - 1, 0)
         rate = (log.q[later, j] - log.q[before, j]) / (log.time[later] - log.time[before])
-        height = np.abs(x - _bridged(x, rows, log.time))[rows]
+        height = np.abs(x - bridged(x, rows, log.time))[rows]
         found["v", j] = rows[(np.abs(x[rows] - rate) > 0.5 * height) & (height > _NO_SPEED)]
     count = np.zeros(len(log.time), dtype=int)
     for (kind, _), rows in found.items():
@@ -145,7 +166,7 @@ def _without_spikes(log: Recorded) -> Recorded:
     for (kind, j), rows in spikes(log).items():
         if columns[kind] is getattr(log, kind):
             columns[kind] = np.array(columns[kind])
-        columns[kind][:, j] = _bridged(columns[kind][:, j], rows, log.time)
+        columns[kind][:, j] = bridged(columns[kind][:, j], rows, log.time)
     if log.derived and columns["q"] is not log.q:
         columns["v"] = np.concatenate([np.gradient(columns["q"][r], log.time[r], axis=0) for r in log.runs])
     return replace(log, q=columns["q"], v=columns["v"], tau=columns["tau"])
@@ -161,10 +182,8 @@ def _moving_on(log: Recorded) -> Recorded:
         return log
     stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     short = [own for own in stretches if len(own) < _FEWEST and (log.tau[own] == log.tau[own - 1]).all()]
-    q, v, tau = (np.array(x) for x in (log.q, log.v, log.tau))
-    for x, own in ((q, rows), (v, rows), (tau, np.concatenate([rows[:0], *short]))):
-        for column in x.T:
-            column[:] = _bridged(column, own, log.time)
+    repeated = np.concatenate([rows[:0], *short])
+    q, v, tau = (bridged(x, own, log.time) for x, own in ((log.q, rows), (log.v, rows), (log.tau, repeated)))
     return replace(log, q=q, v=v, tau=tau)
 
 
@@ -199,14 +218,6 @@ def cut_off(log: Recorded, j: int) -> list[tuple[float, float]]:
         if values[end] != 0 and share > _CUT and counts[end] > _PILED * counts[beside].max():
             found.append((float(values[end]), float(share)))
     return found
-
-
-def _bridged(x: Array, rows: Index, time: Array) -> Array:
-    """x (N,) at some instants (N,) with lines through what lies beside some rows."""
-    others = np.delete(np.arange(len(x)), rows)
-    bridged = np.array(x)
-    bridged[rows] = np.interp(time[rows], time[others], x[others])
-    return bridged
 
 
 def _spikes(x: Array, log: Recorded) -> Index:

@@ -22,6 +22,7 @@ from armloop.data.header import check_header, columns_of
 from armloop.data.plausibility import doubts, faults
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import velocity_lag
+from armloop.data.stamps import bridged, coincident
 from armloop.data.tables import place, read_columns, said_of, write_columns
 from armloop.util.arrays import Array, Mask
 from armloop.util.doubts import warn
@@ -311,12 +312,15 @@ def _check_gains(path: Path, drive_gains: ArrayLike, n: int) -> Array:
 def differentiated(time: Array, q: Array, name: str) -> Array:
     """(N, n) rates of q by central differences within each run; a run of one sample has none.
 
+    Rows whose stamps nearly coincide count as one.
+
     Raises `LogError` when time and q do not fit together or time does not rise.
     """
     _check_shapes(time, q, name)
     _check_time(time, name, lambda row: f"row {row + 1}")
-    v = np.zeros_like(q)
-    for run in _runs(time):
+    v, runs = np.zeros_like(q), _runs(time)
+    q = bridged(q, coincident(time, q, runs), time)
+    for run in runs:
         if run.stop - run.start > 1:
             v[run] = np.gradient(q[run], time[run], axis=0)
     return v
