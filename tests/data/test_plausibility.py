@@ -145,6 +145,23 @@ def test_lists_are_converted() -> None:
     assert whole.q.dtype == np.float64
 
 
+@pytest.mark.parametrize(("ticks", "unit"), [(1 / 3600, "hours"), (1 / 86400, "days")])
+@pytest.mark.parametrize("derived", [False, True])
+def test_times_of_coarse_clocks_are_refused(ticks: float, unit: str, derived: bool) -> None:
+    """Days as MATLAB and spreadsheets count them."""
+    log = good()
+    expected = rf"column time has .* samples a second, as if it were in {unit} \(100 Hz\); .* at most"
+    with pytest.raises(LogError, match=expected):
+        MotionLog.from_arrays(ticks * log.time, log.q, log.tau, v=None if derived else log.v, name="run")
+
+
+def test_times_in_minutes_are_doubted_where_no_v_tells() -> None:
+    log = good()
+    expected = r"column time has 6e\+03 samples a second, more than recorders of arms take"
+    with pytest.warns(InputWarning, match=expected):
+        MotionLog.from_arrays(log.time / 60, log.q, log.tau, name="run")
+
+
 @pytest.mark.parametrize(
     ("ticks", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")]
 )

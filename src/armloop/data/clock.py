@@ -6,10 +6,11 @@ import numpy as np
 
 from armloop.util.arrays import Array
 
-#: Samples a second that a motion of an arm takes; what has fewer was not sampled in time, or its times are no seconds.
-LEAST_RATE = 5.0
-# Ticks a second of the clocks that there are, and the rate, Hz, from which on a log may have been sampled.
-_TICKS, _USUAL_RATE = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}, 20.0
+#: Samples a second that a motion of an arm takes, and that no recorder of one exceeds; beyond, the times are no seconds.
+LEAST_RATE, MOST_RATE = 5.0, 2e4
+#: Ticks a second of the clocks that there are, and the rates, Hz, from which on and up to which a log is usually sampled.
+_FINE, _USUAL_RATE = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}, 20.0
+_COARSE, _HIGH_RATE = {"minutes": 1 / 60, "hours": 1 / 3600, "days": 1 / 86400}, 2000.0
 
 
 def sample_rate(time: Array) -> float:
@@ -20,7 +21,9 @@ def sample_rate(time: Array) -> float:
 
 def likely_unit(rate: float) -> tuple[str, float] | None:
     """The unit of times that as seconds are of a rate that no log has, and the rate in it, Hz; None for other rates."""
-    if rate >= LEAST_RATE:
+    if LEAST_RATE <= rate <= MOST_RATE:
         return None
-    fitting = ((unit, rate * ticks) for unit, ticks in _TICKS.items())
-    return next((found for found in fitting if found[1] >= _USUAL_RATE), ("nanoseconds", rate * 1e9))
+    clocks = _FINE if rate < LEAST_RATE else _COARSE
+    found = [(unit, rate * ticks) for unit, ticks in clocks.items()]
+    usual = (each for each in found if (each[1] >= _USUAL_RATE if clocks is _FINE else each[1] <= _HIGH_RATE))
+    return next(usual, found[-1])

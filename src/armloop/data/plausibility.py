@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from armloop.data.clock import LEAST_RATE, likely_unit, sample_rate
+from armloop.data.clock import LEAST_RATE, MOST_RATE, likely_unit, sample_rate
 from armloop.data.dropouts import dropouts, mended
 from armloop.data.recorded import Finding, Recorded
 from armloop.data.redundancy import (
@@ -33,6 +33,8 @@ _SPIKE_SAMPLES, _SPIKE_RATIO, _FEWEST = 3, 10.0, 20
 _SPIKE_LEAST = {"q": 0.1, "v": 1.0, "vdot": 100.0, "tau": 1.0}
 # A jump of q: rad or m beyond what the neighbouring rates explain, and so many times what is usual in the log.
 _JUMP, _UNUSUAL = 0.1, 30.0
+# Samples a second that hardly any recorder takes.
+_HARDLY = 5000.0
 # Rows that tell whether a log is a time series.
 _SERIES_ROWS = 20_000
 
@@ -71,6 +73,11 @@ def doubts(log: Recorded) -> Iterator[Finding]:
         yield Finding(
             "column time",
             f"has {rate:.3g} samples a second; accelerations and reversals of friction need 100 or more",
+        )
+    elif rate > _HARDLY:
+        yield Finding(
+            "column time",
+            f"has {rate:.3g} samples a second, more than recorders of arms take; check that it is in s",
         )
 
 
@@ -153,7 +160,7 @@ def _clock(log: Recorded) -> Iterator[Finding]:
         yield Finding(
             "column time",
             f"has {rate:.3g} samples a second, as if it were in {unit} ({in_unit:.4g} Hz); time must be in s, and the "
-            f"motion of an arm takes {LEAST_RATE:g} samples a second or more",
+            f"motion of an arm takes {LEAST_RATE:g} samples a second or more, {MOST_RATE:g} at most",
         )
 
 
