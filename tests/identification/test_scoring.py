@@ -6,7 +6,7 @@ from synthetic import three_axis
 
 from armloop.data.filters import LowPass
 from armloop.data.motion import Motion, Samples
-from armloop.identification.scoring import residual, score
+from armloop.identification.scoring import residual, score, score_errors
 from armloop.laws.friction import FrictionLaw
 from armloop.model import ReconstructedModel
 from armloop.model.components import SparseTerms
@@ -58,6 +58,15 @@ def test_the_answer_has_the_published_shape():
 def test_a_torque_that_is_zero_has_no_relative_error():
     result = score(constant_model(), samples_of(np.zeros((30, 3)), np.ones((30, 3), dtype=bool)))
     assert result.overall["rmse"] == pytest.approx([1.0] * 3) and result.overall["nrmse"] == [None] * 3
+
+
+def test_what_a_filter_leaves_of_a_torque_that_is_zero_is_no_torque():
+    """Numbers of its rounding would decide what is compared by relative errors."""
+    tau = np.full((4, 2), [3.0, 2e-9])
+    found = score_errors(np.ones((4, 2)), tau, np.ones((4, 2), dtype=bool))
+    assert found.moving["nrmse"] == [pytest.approx(1 / 3), None] and found.rms == [3.0, 0.0]
+    tau[:, 1] = 4e-9
+    assert score_errors(np.ones((4, 2)), tau, np.ones((4, 2), dtype=bool)).rms[1] == pytest.approx(4e-9)
 
 
 def test_the_prediction_passes_the_filter_of_the_measurement():

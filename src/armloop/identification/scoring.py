@@ -17,6 +17,9 @@ from armloop.data.signals import smooth
 from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
+#: Less than this part of the largest joint's torque is rounding.
+ROUND_OFF = 1e-9
+
 
 @dataclass(frozen=True)
 class Score:
@@ -61,14 +64,20 @@ def error_sums(squares: Array, tau: Array, moving: Mask) -> Array:
 def score_of_sums(sums: Array, samples: int) -> Score:
     """The score of :func:`error_sums`."""
     rest, moving = sums
-    rms = root_mean(moving[1], moving[2])
-    return Score(errors_of(rest + moving), errors_of(moving), errors_of(rest), rms, samples)
+    return Score(errors_of(rest + moving), errors_of(moving), errors_of(rest), torque_sizes(moving), samples)
 
 
 def errors_of(sums: Array) -> dict[str, Any]:
     """RMSE and nRMSE per joint of sums (3, n)."""
     rmse = root_mean(sums[0], sums[2])
-    return {"rmse": rmse, "nrmse": ratios(rmse, root_mean(sums[1], sums[2]))}
+    return {"rmse": rmse, "nrmse": ratios(rmse, torque_sizes(sums))}
+
+
+def torque_sizes(sums: Array) -> list[float | None]:
+    """RMS torque per joint of sums (3, n); zero where it is but what a filter leaves of one that is zero."""
+    sizes = root_mean(sums[1], sums[2])
+    least = ROUND_OFF * max((size for size in sizes if size), default=0.0)
+    return [0.0 if size is not None and size < least else size for size in sizes]
 
 
 def ratios(errors: Sequence[float | None], sizes: Sequence[float | None]) -> list[float | None]:

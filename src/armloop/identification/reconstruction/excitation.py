@@ -9,10 +9,13 @@ import numpy as np
 
 from armloop.data.motion import Samples
 from armloop.robot.arm import Arm
+from armloop.util.arrays import Array
 from armloop.util.errors import ExcitationError
 
 #: Torques that stay below are none, N·m (N): a watch's are a hundred times as large.
 NOTHING = 1e-8
+#: A joint moves at least so far, rad (m), and so many samples of it count as moving.
+_LEAST_WAY, _FEWEST = 1e-3, 30
 
 
 @contextmanager
@@ -27,21 +30,26 @@ def determined() -> Iterator[None]:
         ) from error
 
 
-def check_recorded(arm: Arm, samples: Samples) -> None:
-    """Raise ``ExcitationError`` if a joint's torque is zero throughout, or next to it: nobody recorded it."""
+def check_recorded(arm: Arm, largest: Array) -> None:
+    """Raise ``ExcitationError`` if a joint's torque, at its largest (n,), is zero, or next to it: nobody recorded it."""
     for j, joint in enumerate(arm.joints):
-        if np.abs(samples.tau[:, j]).max() < NOTHING:
+        if largest[j] < NOTHING:
             raise ExcitationError(
                 f"tau{j + 1}: zero throughout; give logs that hold the torque (or current) of joint {joint.name!r}"
             )
 
 
 def check_excitation(arm: Arm, samples: Samples) -> None:
-    """Raise ``ExcitationError`` if a joint hardly moves."""
+    """Raise ``ExcitationError`` if a joint hardly moves, or too few of its samples do."""
     for j, joint in enumerate(arm.joints):
-        q = samples.motion.q[:, j]
-        if np.ptp(q) < 1e-3 or samples.moving[:, j].sum() < 30:
+        way, moving = np.ptp(samples.motion.q[:, j]), int(samples.moving[:, j].sum())
+        if way < _LEAST_WAY:
             raise ExcitationError(
-                f"q{j + 1}: joint {joint.name!r} hardly moves (range {np.ptp(q):.3g} {joint.position_unit}); "
-                "its terms cannot be determined: log runs in which every joint moves"
+                f"q{j + 1}: joint {joint.name!r} hardly moves (range {way:.3g} {joint.position_unit}); its terms cannot be "
+                "determined: log runs in which every joint moves"
+            )
+        if moving < _FEWEST:
+            raise ExcitationError(
+                f"q{j + 1}: of joint {joint.name!r} {moving} of {samples.motion.samples} filtered samples count as moving, "
+                f"at least {_FEWEST} are needed: log longer, at 100 samples a second or more, in the order they were taken"
             )

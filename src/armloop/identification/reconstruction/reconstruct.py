@@ -150,6 +150,8 @@ def reconstruct(
     streamed = sum(log.samples for log in logs) > in_memory and method != REFERENCE
     kept = [] if streamed else [log.read() for log in logs]
     require_different(kept)
+    if kept:
+        check_recorded(arm, np.max([np.abs(log.tau).max(axis=0) for log in kept], axis=0))
     say_beyond_limits(arm, kept)
     if conditioning is not None:
         check_nyquist(kept or logs, conditioning.cutoff_hz)
@@ -167,7 +169,7 @@ def reconstruct(
         else:
             data = Data.kept(ready.kept, how, ready.options)
             data = data.nested() if nested else data
-        check_recorded(arm, data.reference.samples)
+        check_recorded(arm, np.abs(data.reference.samples.tau).max(axis=0))
         found = library.methods[method](arm, data, ready.options, progress)
         found.history |= ready.history()
         found.notes += ready.notes(arm, how)

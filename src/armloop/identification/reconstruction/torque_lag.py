@@ -235,7 +235,7 @@ def _sizes(x: Array, joint: Index) -> Array:
 
 def _mean(lags: Array, errors: Array) -> tuple[float, float]:
     """Mean of the joints' lags, which differ by more than their errors say, and its standard error."""
-    variance = np.maximum(errors, TINY) ** 2
+    variance = np.maximum(errors**2, TINY)
     weight, more = 1 / variance, len(lags) - 1
     excess = float(weight @ (lags - weight @ lags / weight.sum()) ** 2) - more
     between = max(excess, 0.0) / max(float(weight.sum() - weight @ weight / weight.sum()), TINY)
