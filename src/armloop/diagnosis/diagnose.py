@@ -328,7 +328,10 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             turned,
             strengths=strengths(evidence, outcome),
         )
-        stand = standing(evidence.only(sliding), augmented, found.errors()["after"], known)
+        after = found.errors()["after"]
+        if unlisted is not None:
+            after[unlisted.joint - 1] = unlisted.rmse_with_form
+        stand = standing(evidence.only(sliding), augmented, after, known)
         searched = [f for f in outcome.found if turned is None or f not in turned.found]
         doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])
         if doubtful is not None:

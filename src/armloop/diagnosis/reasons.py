@@ -49,7 +49,8 @@ def standing(
     """How far a run can be judged, once everything found is in the augmented model.
 
     Args:
-        after: per joint the held-out RMSE with everything found, N·m (N); NaN where a joint did not move.
+        after: per joint the held-out RMSE with everything found, an unlisted law included, N·m (N); NaN where a joint did
+            not move.
         explained: joints (1-based) whose residual the verdict names already.
     """
     samples, model = evidence.samples, evidence.model
@@ -75,12 +76,14 @@ def standing(
         of = after[j]
         ratio = np.nan if of is None else of / float(evidence.scale[j])
         judged += 1
-        if j + 1 in explained or poor or not ratio > 1:
+        if poor or not ratio > 1:
+            continue
+        multiples += int(ratio >= MULTIPLE)
+        if j + 1 in explained:
             continue
         words, real = _multiple(part, j, ratio)
         unexplained += [j] if real else []
         if ratio >= MULTIPLE:
-            multiples += 1
             reasons.append(words)
             unknown |= real is not False
     if multiples > max(MOSTLY * judged, 1):
