@@ -102,6 +102,10 @@ class TestSearch:
         names = [f"{name}1" for name in "abcdef"]
         many = {" ".join(names[:k]): 10.0 ** (9 - k) for k in range(7)}
         assert self.found(self.search(monkeypatch, many)) == names[: searching.MOST_EFFECTS]
+        # one law at every joint is of one kind, as where a whole arm warms up
+        alike = [f"a{joint}1" for joint in "abcdef"]
+        many = {" ".join(alike[:k]): 10.0 ** (9 - k) for k in range(7)}
+        assert self.found(self.search(monkeypatch, many)) == alike
 
     def test_the_simplest_of_equals_is_named_and_the_others_are_its_alternatives(
         self, monkeypatch: pytest.MonkeyPatch

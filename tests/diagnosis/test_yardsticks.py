@@ -60,16 +60,16 @@ def test_a_joint_that_gets_nowhere_has_not_slid_however_it_shakes() -> None:
     assert moving[20:40, 0].all()
 
 
-def test_where_the_filter_still_shows_how_a_run_began_nothing_is_judged() -> None:
-    """Its reach from the first sample of each run; without a filter all counts."""
-    time = np.array([0.0, 0.1, 0.19, 0.2, 0.3, 5.0, 5.15, 5.3])
-    motion = Motion(time, *np.zeros((3, 8, 2)), np.array([0, 5]))
+def test_where_the_filter_still_shows_how_a_run_began_or_ended_nothing_is_judged() -> None:
+    """Its reach from the first and the last sample of each run; without a filter all counts."""
+    time = np.array([0.0, 0.1, 0.19, 0.2, 0.39, 0.45, 0.6, 5.0, 5.15, 5.3, 5.6])
+    motion = Motion(time, *np.zeros((3, 11, 2)), np.array([0, 7]))
 
-    def starting(reach: float) -> list[int]:
+    def at_an_end(reach: float) -> list[int]:
         samples: Any = SimpleNamespace(motion=motion, reach=reach)
-        return np.flatnonzero(evidences.starting(samples)).tolist()
+        return np.flatnonzero(evidences.at_an_end(samples)).tolist()
 
-    assert starting(0.2) == [0, 1, 2, 5, 6] and starting(0.0) == []
+    assert at_an_end(0.2) == [0, 1, 2, 5, 6, 7, 8, 10] and at_an_end(0.0) == []
 
 
 def test_what_lies_far_outside_the_trained_range_is_not_judged() -> None:

@@ -328,9 +328,9 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             turned,
             strengths=strengths(evidence, outcome),
         )
-        after = found.errors()["after"]
-        if unlisted is not None:
-            after[unlisted.joint - 1] = unlisted.rmse_with_form
+        after = replace(found, adopted=True).errors()[
+            "after"
+        ]  # a law accounts for what it removes, adopted or not
         stand = standing(evidence.only(sliding), augmented, after, known)
         searched = [f for f in outcome.found if turned is None or f not in turned.found]
         doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])

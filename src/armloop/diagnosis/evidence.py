@@ -106,7 +106,7 @@ class Evidence:
             context = replace(context, period=max(context.period, 1 / INDEPENDENT / samples.cutoff_hz))
         rows = sliding(samples, model)
         rows &= ~far_outside(samples.motion, model.history.get("range")) & ~too_slow(model, samples.motion)
-        rows &= ~starting(samples)[:, None]
+        rows &= ~at_an_end(samples)[:, None]
         asked, unknown = tuple(effects), samples.unknown
         return Evidence(model, samples, scale, variation, rows, blocks, context, asked, unknown)
 
@@ -243,15 +243,16 @@ def sticking(model: ReconstructedModel) -> Array:
     return may_stick(fastest(model))
 
 
-def starting(samples: Samples) -> Mask:
-    """(N,) samples so near a run's start that the filter still shows how the arm began to move.
+def at_an_end(samples: Samples) -> Mask:
+    """(N,) samples so near a run's start or end that the filter still shows how the arm began or ceased to move.
 
-    A controller that is switched on, or a reference that begins at speed, makes it jump.
+    A controller that is switched on, a reference that begins at speed, or brakes that fall in, make it jump.
     """
     motion = samples.motion
     near = np.zeros(motion.samples, dtype=bool)
     for run in motion.runs():
-        near[run] = motion.time[run] - motion.time[run.start] < samples.reach
+        time = motion.time[run]
+        near[run] = np.minimum(time - time[0], time[-1] - time) < samples.reach
     return near
 
 

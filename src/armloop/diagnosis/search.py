@@ -38,7 +38,7 @@ LOG_ODDS = 1.5
 TELLING = 20
 #: An effect of which at least this posterior odds are left, beside the one named in its place, is its alternative.
 ALTERNATIVE = 0.05
-#: A run tells so many effects apart, or terms of a law, at most.
+#: A run tells effects of so many kinds apart, or so many terms of a law, at most; a whole arm that warms up is of one kind.
 MOST_EFFECTS = 4
 #: Log posteriors that differ by less are the same: the same effects, one a little better shaped beside the others.
 _LEAST = 0.1
@@ -171,7 +171,10 @@ class _Search:
 
     def _pairs(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """The same with two effects more, where much is left: what either leaves may be as large as what it removes."""
-        if len(found) + 2 > MOST_EFFECTS or not much_lasts(self.evidence, self._known(found).fit).any():
+        if (
+            len(_kinds(found)) + 2 > MOST_EFFECTS
+            or not much_lasts(self.evidence, self._known(found).fit).any()
+        ):
             return
         more = sorted(self._additions(found), key=lambda step: -step[0])
         for _, first in more[:_FIRST]:
@@ -180,7 +183,7 @@ class _Search:
     def _additions(self, found: list[Found]) -> Iterator[tuple[float, list[Found]]]:
         """Sets with one effect more, with their log posteriors."""
         there = [f.effect for f in found]
-        for trial in self._asked(found)[1] if len(found) < MOST_EFFECTS else []:
+        for trial in self._asked(found)[1] if len(_kinds(found)) < MOST_EFFECTS else []:
             value = log_posterior(self.evidence, trial.score, [*there, trial.effect])
             yield value, [*found, Found(trial.effect, trial.shape, 0.0)]
 
@@ -229,6 +232,10 @@ class _Search:
 
 def _known(evidence: Evidence, found: Sequence[Found]) -> Known:
     return Known.of(evidence, [f.effect for f in found], [f.shape for f in found])
+
+
+def _kinds(found: Sequence[Found]) -> set[str]:
+    return {f.effect.name for f in found}
 
 
 def _others(found: Sequence[Found], k: int) -> list[Found]:
