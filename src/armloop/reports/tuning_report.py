@@ -39,6 +39,8 @@ def tuning_report(tuning: Tuning) -> str:
 
 
 def _card(title: str, loop: TunedLoop) -> Card:
+    if not loop.stable:
+        return Card("unstable", title, "in a posture of the reference")
     phase, peak = (float(x) for x in (np.min(loop.worst[0]), np.max(loop.worst[1])))
     return Card(
         f"{number(phase)} deg",

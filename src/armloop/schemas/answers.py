@@ -95,6 +95,7 @@ class TrackingData(Struct):
     arm: Name = ""
     scored_s: list[Seconds] = []
     unit: list[Name] = []
+    stable: Annotated[bool, Meta(description="the loop at rest where the reference begins")] = True
     not_run: Annotated[list[Name], Meta(description="controllers without a model")] = []
     written_by: Name = ""
 

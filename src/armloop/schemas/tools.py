@@ -164,7 +164,7 @@ class GainsData(Struct):
 
 
 class MarginsData(Struct):
-    """One joint's loop, the others closed; null is infinite."""
+    """One joint's loop, the others closed; null is infinite, or of a loop that is not stable."""
 
     gain_margin: NotNegative | None
     gain_reduction: NotNegative | None
@@ -187,7 +187,7 @@ class TunedData(Struct):
     stable: bool
     loop: Annotated[list[MarginsData], Meta(min_length=1, max_length=MOST_JOINTS)]
     along_reference: AlongData
-    step_deviation: _NotNegatives
+    step_deviation: list[NotNegative | None]
     eta_deg: Annotated[dict[str, _NotNegatives], Meta(description="by controller; deg (mm)")]
 
 

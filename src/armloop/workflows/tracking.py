@@ -23,7 +23,7 @@ from armloop.drake.experiments.tracking import (
     track_in_view,
     without_model,
 )
-from armloop.drake.tuning.loop_analysis import loop_margins
+from armloop.drake.tuning.loop_analysis import LoopMargins, is_stable, loop_margins
 from armloop.drake.view.live import LiveView
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
@@ -61,6 +61,11 @@ def run_scenario(
     progress(f"tracking {scenario.reference.duration:g} s with each controller")
     results = run_tracking(scenario, chosen) if view is None else track_in_view(scenario, chosen, view)
     answer = tracking_answer(scenario, results) | {"not_run": without_model(scenario, chosen)}
+    if not answer["stable"]:
+        warn(
+            f"{scenario.name}: where the reference begins the loop is not stable with the scenario's gains; armloop tune "
+            "proposes others"
+        )
     if folder is not None:
         from armloop.drake.view.replay import write_replay
         from armloop.reports.plots import tracking_figure
@@ -123,24 +128,30 @@ def save_made(
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
-    plant = scenario.plant
-    q0 = scenario.reference.evaluate([0.0])[0][0]
-    margins = loop_margins(
-        plant.arm, plant.config.friction, scenario.gains, q0, period=plant.config.time_step
-    )
+    margins = margins_at_start(scenario)
     return {
         **heading(scenario, next(iter(results.values())).unit),
         "settling_band": BAND,
         "controllers": {name: result_answer(result) for name, result in results.items()},
+        "stable": is_stable(margins),
         "loop": [
-            {
-                "phase_margin_deg": m.phase_margin,
-                "bandwidth_rad_s": m.bandwidth,
-                "sensitivity_peak": m.sensitivity_peak,
-            }
+            finite(
+                {
+                    "phase_margin_deg": m.phase_margin,
+                    "bandwidth_rad_s": m.bandwidth,
+                    "sensitivity_peak": m.sensitivity_peak,
+                }
+            )
             for m in margins
         ],
     }
+
+
+def margins_at_start(scenario: TrackingScenario) -> list[LoopMargins]:
+    """Margins of the joints' loops at rest where the reference begins."""
+    plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
+    config = plant.config
+    return loop_margins(plant.arm, config.friction, scenario.gains, q0, period=config.time_step)
 
 
 def heading(scenario: TrackingScenario, unit: tuple[str, ...]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def tune_scenario(
 
 
 def tuning_answer(tuning: Tuning) -> dict[str, Any]:
-    """The content of ``tune.json``; null stands for what is not finite (any gain, no crossing)."""
+    """The content of ``tune.json``; null stands for what is not finite, and for margins of unstable loops."""
     scenario = tuning.scenario
     return {
         "schema": SCHEMA,
@@ -85,7 +85,7 @@ def _answer(loop: TunedLoop) -> dict[str, Any]:
         "gains": {"kp": gains.kp.tolist(), "ki": gains.ki.tolist(), "kd": gains.kd.tolist()},
         "stable": loop.stable,
         "loop": [finite(asdict(m)) for m in loop.margins],
-        "along_reference": {"phase_margin": finite(phase), "sensitivity_peak": peak.tolist()},
-        "step_deviation": loop.deviation().tolist(),
+        "along_reference": {"phase_margin": finite(phase), "sensitivity_peak": finite(peak)},
+        "step_deviation": finite(loop.deviation()),
         "eta_deg": {name: result.eta.tolist() for name, result in loop.tracking.items()},
     }

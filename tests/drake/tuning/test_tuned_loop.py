@@ -83,6 +83,7 @@ def test_a_degree_and_a_millimetre(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_allclose(found.deviation(), 0.1)
     assert [dry for _, dry, _ in asked["steps"]] == [False, True]
     # the largest deviation of each joint, either way, at any time
+    assert np.isnan(replace(found, stable=False).deviation()).all()
     apart = np.array([[0.1, 0.0], [0.3, -0.4], [0.2, 0.1]])
     assert_allclose(replace(found, smooth=found.linear - apart).deviation(), [0.3, 0.4])
 

@@ -10,7 +10,7 @@ frequency.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import control
 import numpy as np
@@ -40,6 +40,9 @@ class LoopMargins:
     phase_margin : deg
     bandwidth : rad/s, where the closed loop's gain first falls to 0.707; inf if it does not below Nyquist
     sensitivity_peak : largest |1 / (1 + L)|; below 2 is comfortable
+
+    Where the closed loop is not stable there is no margin and no peak: they are NaN, and only the gain reduction says
+    how far the gains must shrink.
     """
 
     gain_margin: float
@@ -143,8 +146,10 @@ class SampledArm:
         return A, np.vstack([self.B @ kp, h * np.eye(n)])
 
     def is_stable(self, gains: PidGains) -> bool:
-        """Tell whether every mode of the closed loop decays."""
-        return bool(np.abs(np.linalg.eigvals(self.closed(gains)[0])).max() < 1 - 1e-9)
+        """Tell whether every mode of the closed loop decays; a sum of errors that nothing answers to is no mode of it."""
+        kept = np.append(np.ones(len(self.A), dtype=bool), np.asarray(gains.ki) != 0)
+        modes = np.linalg.eigvals(self.closed(gains)[0][np.ix_(kept, kept)])
+        return bool(np.abs(modes).max() < 1 - 1e-9)
 
 
 def loop_margins(
@@ -159,11 +164,19 @@ def loop_margins(
     return sampled_margins(SampledArm.of(posture_model(arm, friction, q0), period), gains)
 
 
+def is_stable(margins: Sequence[LoopMargins]) -> bool:
+    """Tell whether the loops that these margins are of are stable: else they have no sensitivity."""
+    return not any(np.isnan(m.sensitivity_peak) for m in margins)
+
+
 def sampled_margins(sampled: SampledArm, gains: PidGains, *, points: int = 2000) -> list[LoopMargins]:
     """Return the margins of every joint's loop of a sampled arm, from so many frequencies up to Nyquist."""
     w = sampled.frequencies(points)
     L = sampled.loops(gains, w)
-    return [_margins(cut_loop(L, i), w) for i in range(len(gains.kp))]
+    found = [_margins(cut_loop(L, i), w) for i in range(len(gains.kp))]
+    if sampled.is_stable(gains):
+        return found
+    return [replace(m, gain_margin=np.nan, phase_margin=np.nan, sensitivity_peak=np.nan) for m in found]
 
 
 def cut_loop(L: Array, i: int) -> Array:

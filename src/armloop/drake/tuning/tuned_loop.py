@@ -30,7 +30,8 @@ class TunedLoop:
 
     Attributes:
         margins: per joint, in the posture where the reference begins, all loops closed.
-        worst: least phase margin in deg and largest sensitivity peak, (n,) each, over postures along the reference.
+        worst: least phase margin in deg and largest sensitivity peak, (n,) each, over postures along the reference; NaN if
+            the loop is not stable in one of them.
         stable: whether every mode decays in all of these postures.
         w, loops: rad/s (W,), and the joints' loops (W, n), the others closed.
         time, linear, smooth, dry: s (N,), and the answers (N, n) to a small step of all joints, in deg (mm), by the linear
@@ -51,7 +52,12 @@ class TunedLoop:
     tracking: dict[str, TrackingResult]
 
     def deviation(self) -> Array:
-        """(n,) largest difference between the linear answer and the simulated one without dry friction, part of the step."""
+        """(n,) largest difference between the linear answer and the simulated one without dry friction, part of the step.
+
+        NaN where the loop is not stable: what grows without bound is compared with nothing.
+        """
+        if not self.stable:
+            return np.full(self.linear.shape[1], np.nan)
         return np.asarray(np.abs(self.linear - self.smooth).max(axis=0) / STEP)
 
 

@@ -1,0 +1,47 @@
+"""Gains under which the arm rings up: nothing is said of margins, and the reader is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from answers import answered
+
+from armloop.drake.control.pid import PidGains
+from armloop.drake.experiments.scenarios import TrackingScenario, load_tracking
+from armloop.reports.tuning_tables import verified_table
+from armloop.util.errors import InputWarning
+from armloop.util.progress import silent
+from armloop.workflows import tune_scenario
+from armloop.workflows.tracking import run_scenario
+
+
+def wild() -> TrackingScenario:
+    """Joint 3 with a derivative gain that rings up, on a short reference."""
+    usual = load_tracking("three_axis_tracking")
+    gains = PidGains([80.0] * 3, [8.0] * 3, [5.0, 5.0, 60.0])
+    short = replace(usual.reference, duration=1.0)
+    return replace(usual, gains=gains, controllers=("pid",), reference=short, score=(0.1, 1.0))
+
+
+def test_a_comparison_says_that_its_loop_is_not_stable(tmp_path: Path) -> None:
+    says = "not stable with the scenario's gains; armloop tune proposes others"
+    with pytest.warns(InputWarning, match=says):
+        run_scenario(wild(), {}, tmp_path, silent)
+    answer = answered((tmp_path / "tracking.json").read_text(), "tracking")
+    assert answer["stable"] is False
+    assert all(
+        loop["phase_margin_deg"] is None and loop["sensitivity_peak"] is None for loop in answer["loop"]
+    )
+
+
+def test_a_tuning_states_no_margin_of_it(tmp_path: Path) -> None:
+    _, tuning = tune_scenario(wild(), 2 * np.pi * 5, 60.0, None, tmp_path, silent)
+    present = answered((tmp_path / "tune.json").read_text(), "tune")["present"]
+    assert present["stable"] is False and present["step_deviation"] == [None] * 3
+    assert present["along_reference"] == {"phase_margin": [None] * 3, "sensitivity_peak": [None] * 3}
+    assert max(map(len, str(verified_table(tuning)).splitlines())) < 100
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "unstable" in page and "nan" not in page.split("<svg", 1)[0].lower()
