@@ -285,5 +285,5 @@ class TestWhatIsKnownOfARun:
             assert_allclose(made.scale[1:], [0.03, 0.04], rtol=1e-6)
         # where a run begins nothing counts
         assert made.rows.all()
-        monkeypatch.setattr(evidence, "starting", lambda samples: np.arange(40) < 3)
+        monkeypatch.setattr(evidence, "at_an_end", lambda samples: np.arange(40) < 3)
         assert Evidence.of(model, samples, []).rows.all(axis=1).tolist() == [False] * 3 + [True] * 37
