@@ -27,6 +27,25 @@ def test_of_a_group_the_row_nearest_to_its_neighbours_line_is_kept() -> None:
     assert coincident(time, q, WHOLE).tolist() == [10, 20, 21]
 
 
+def test_a_log_that_changes_its_rate_has_no_such_rows() -> None:
+    """1 kHz while the arm moves and 100 Hz while it rests, as many rows of either, back and forth."""
+    steps = np.tile(np.repeat([0.001, 0.01], 100), 3)
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    assert len(coincident(time, line(time), [slice(0, len(time))])) == 0
+    # pairs throughout, and bursts of ten with a pause after each, are of one instant each
+    pairs = np.cumsum(np.tile([1e-6, 0.01], 100))
+    assert len(coincident(pairs, line(pairs), [slice(0, 200)])) == 100 - 1
+    bursts = np.cumsum(np.tile([*[1e-4] * 9, 0.0091], 20))
+    assert len(coincident(bursts, line(bursts), [slice(0, 200)])) > 0.8 * 200
+
+
+def test_of_an_arm_that_rests_any_row_is_as_near() -> None:
+    time, q = TIME.copy(), np.zeros((40, 2))
+    time[10] = time[11] - 1e-6
+    q[30:, 0] = 1.0  # but for one step
+    assert len(coincident(time, q, WHOLE)) == 1
+
+
 def test_nearly_is_a_quarter_of_the_mean_step() -> None:
     for part, found in ((0.26, []), (0.23, [10])):
         time = TIME.copy()

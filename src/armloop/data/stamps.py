@@ -12,8 +12,10 @@ import numpy as np
 
 from armloop.util.arrays import TINY, Array, Index
 
-#: Rows nearer than this part of a run's mean period tell of one instant.
+#: Rows nearer than this part of the mean step before them, and of that after them, tell of one instant …
 NEARLY = 0.25
+#: … a mean of so many steps: a log may change its rate.
+_BESIDE = 15
 #: Fewest rows of a run of which the period is known.
 _FEWEST = 5
 
@@ -27,7 +29,7 @@ def coincident(time: Array, q: Array, runs: Sequence[slice]) -> Index:
     for run in runs:
         if run.stop - run.start >= _FEWEST:
             steps = np.diff(time[run])
-            close[run.start : run.stop - 1] = steps < NEARLY * steps.mean()
+            close[run.start : run.stop - 1] = steps < NEARLY * _usual(steps)
     if not close.any():
         return np.zeros(0, dtype=np.intp)
     group = np.concatenate([[0], np.cumsum(~close)])
@@ -37,13 +39,22 @@ def coincident(time: Array, q: Array, runs: Sequence[slice]) -> Index:
     own = group[rows]
     before, after = np.maximum(first[own] - 1, 0), np.minimum(first[own] + sizes[own], len(time) - 1)
     part = ((time[rows] - time[before]) / (time[after] - time[before]))[:, None]
-    usual = np.maximum(np.median(np.abs(np.diff(q, axis=0)), axis=0), TINY)
-    off = np.abs(q[rows] - (1 - part) * q[before] - part * q[after]) / usual
+    way = np.maximum(np.abs(np.diff(q, axis=0)).mean(axis=0), TINY)
+    off = np.abs(q[rows] - (1 - part) * q[before] - part * q[after]) / way
     # beyond a run's first and last row there is no neighbour
     edges = np.isin(rows, [row for run in runs for row in (run.start, run.stop - 1)])
     order = np.lexsort((np.where(edges, -1.0, off.sum(axis=1)), own))
     nearest = np.unique(own[order], return_index=True)[1]
     return np.sort(np.delete(rows[order], nearest))
+
+
+def _usual(steps: Array) -> Array:
+    """(K,) the lesser of the mean steps before and after each of the steps of a run."""
+    sums, k = np.concatenate([[0.0], np.cumsum(steps)]), np.arange(len(steps))
+    first, last = np.maximum(k - _BESIDE, 0), np.minimum(k + 1 + _BESIDE, len(steps))
+    sides = (sums[k] - sums[first], k - first), (sums[last] - sums[k + 1], last - k - 1)
+    means = [np.divide(total, count, out=np.full(len(k), np.inf), where=count > 0) for total, count in sides]
+    return np.minimum(*means)
 
 
 def bridged(x: Array, rows: Index, time: Array) -> Array:

@@ -328,10 +328,9 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             turned,
             strengths=strengths(evidence, outcome),
         )
-        after = replace(found, adopted=True).errors()[
-            "after"
-        ]  # a law accounts for what it removes, adopted or not
-        stand = standing(evidence.only(sliding), augmented, after, known)
+        # a law accounts for what it removes, adopted or not
+        left = replace(found, adopted=True).errors()["after"]
+        stand = standing(evidence.only(sliding), augmented, left, known)
         searched = [f for f in outcome.found if turned is None or f not in turned.found]
         doubtful = outweighed(evidence, outcome, searched, stand.left, sliding[evidence.rows])
         if doubtful is not None:
@@ -340,9 +339,9 @@ def _concluded(whole: Evidence, account: Account, progress: Progress) -> Diagnos
             contacts = account.without_effect(outcome).contacts
             continue
         # a residual without a law is all there, though the verdict names it
-        left = stand.left if unlisted is None or unlisted.parameters else (*stand.left, unlisted.joint - 1)
+        rest = stand.left if unlisted is None or unlisted.parameters else (*stand.left, unlisted.joint - 1)
         slides = evidence.only(sliding)
-        drowning = [each for each in contacts if drowned(slides, augmented, each, left)]
+        drowning = [each for each in contacts if drowned(slides, augmented, each, rest)]
         if not drowning:
             break
         doubted += [event_in_doubt(each.added) for each in drowning]

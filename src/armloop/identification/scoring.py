@@ -18,7 +18,7 @@ from armloop.model import ReconstructedModel
 from armloop.util.arrays import Array, Mask
 
 #: Less than this part of the largest joint's torque is rounding.
-ROUND_OFF = 1e-9
+_ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def errors_of(sums: Array) -> dict[str, Any]:
 def torque_sizes(sums: Array) -> list[float | None]:
     """RMS torque per joint of sums (3, n); zero where it is but what a filter leaves of one that is zero."""
     sizes = root_mean(sums[1], sums[2])
-    least = ROUND_OFF * max((size for size in sizes if size), default=0.0)
+    least = _ROUND_OFF * max((size for size in sizes if size), default=0.0)
     return [0.0 if size is not None and size < least else size for size in sizes]
 
 

@@ -56,7 +56,7 @@ def events_table(diagnosis: Diagnosis) -> Table:
         p, joint = contact.added.parameters, contact.added.effect.joint
         size = p["force"] if joint is None else p["torque"]
         value = np.atleast_1d(np.asarray(size.value, dtype=float))
-        where = f"link {_rounded(p['link'], 1, 0)}" if "link" in p else "tool"
+        where = f"link {_rounded(p['link'], 0, 1)}" if "link" in p else "tool"
         rows.append(
             [
                 k + 1,
@@ -73,10 +73,10 @@ def events_table(diagnosis: Diagnosis) -> Table:
     return make_table(headers, rows, "Events", left=(3, 5))
 
 
-def _rounded(of: Estimate, places: int, of_value: int) -> str:
-    """A value and its error to so many places."""
+def _rounded(of: Estimate, places: int, of_error: int) -> str:
+    """A value and its error, each to so many decimal places."""
     value, error = (float(np.asarray(x)) for x in (of.value, of.std_error))
-    return f"{value:.{of_value}f} ± {error:.{places}f}"
+    return f"{value:.{places}f} ± {error:.{of_error}f}"
 
 
 def errors_table(diagnosis: Diagnosis) -> Table:

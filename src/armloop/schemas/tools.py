@@ -187,7 +187,7 @@ class TunedData(Struct):
     stable: bool
     loop: Annotated[list[MarginsData], Meta(min_length=1, max_length=MOST_JOINTS)]
     along_reference: AlongData
-    step_deviation: list[NotNegative | None]
+    step_deviation: Annotated[list[NotNegative | None], Meta(min_length=1, max_length=MOST_JOINTS)]
     eta_deg: Annotated[dict[str, _NotNegatives], Meta(description="by controller; deg (mm)")]
 
 

@@ -23,7 +23,7 @@ from armloop.drake.experiments.tracking import (
     track_in_view,
     without_model,
 )
-from armloop.drake.tuning.loop_analysis import LoopMargins, is_stable, loop_margins
+from armloop.drake.tuning.loop_analysis import SampledArm, posture_model, sampled_margins
 from armloop.drake.view.live import LiveView
 from armloop.identification.goodness import extrapolated
 from armloop.identification.reconstruction import reconstruct
@@ -128,12 +128,13 @@ def save_made(
 
 def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingResult]) -> dict[str, Any]:
     """The content of ``tracking.json``: η and other metrics per joint and controller, and the loop's margins at rest."""
-    margins = margins_at_start(scenario)
+    plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
+    sampled = SampledArm.of(posture_model(plant.arm, plant.config.friction, q0), plant.config.time_step)
     return {
         **heading(scenario, next(iter(results.values())).unit),
         "settling_band": BAND,
         "controllers": {name: result_answer(result) for name, result in results.items()},
-        "stable": is_stable(margins),
+        "stable": sampled.is_stable(scenario.gains),
         "loop": [
             finite(
                 {
@@ -142,16 +143,9 @@ def tracking_answer(scenario: TrackingScenario, results: Mapping[str, TrackingRe
                     "sensitivity_peak": m.sensitivity_peak,
                 }
             )
-            for m in margins
+            for m in sampled_margins(sampled, scenario.gains)
         ],
     }
-
-
-def margins_at_start(scenario: TrackingScenario) -> list[LoopMargins]:
-    """Margins of the joints' loops at rest where the reference begins."""
-    plant, q0 = scenario.plant, scenario.reference.evaluate([0.0])[0][0]
-    config = plant.config
-    return loop_margins(plant.arm, config.friction, scenario.gains, q0, period=config.time_step)
 
 
 def heading(scenario: TrackingScenario, unit: tuple[str, ...]) -> dict[str, Any]:

@@ -13,13 +13,17 @@ from armloop.drake.tuning.loop_analysis import (
     SampledArm,
     _margins,
     cut_loop,
-    is_stable,
-    loop_margins,
     model_posture,
     posture_model,
+    sampled_margins,
 )
 from armloop.laws.friction import FrictionTerm
 from armloop.robot.arm import load_arm
+
+
+def loop_margins(arm, friction, gains, q0, period=1e-3):
+    """Of an arm at rest at q0."""
+    return sampled_margins(SampledArm.of(posture_model(arm, friction, q0), period), gains)
 
 
 @pytest.fixture
@@ -121,7 +125,6 @@ def test_the_papers_gains_are_comfortable():
     # of a loop that is not stable there is no margin, whatever its frequency response looks like
     for m in wild:
         assert np.isnan([m.gain_margin, m.phase_margin, m.sensitivity_peak]).all()
-    assert is_stable(margins) and not is_stable(wild)
 
 
 def test_a_loop_with_the_others_closed():

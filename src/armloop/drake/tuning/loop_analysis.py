@@ -152,23 +152,6 @@ class SampledArm:
         return bool(np.abs(modes).max() < 1 - 1e-9)
 
 
-def loop_margins(
-    arm: Arm,
-    friction: Sequence[JointFriction],
-    gains: PidGains,
-    q0: ArrayLike,
-    *,
-    period: float = 1e-3,
-) -> list[LoopMargins]:
-    """Return the margins of every joint's loop at posture q0 (n,), with a controller of a period in s."""
-    return sampled_margins(SampledArm.of(posture_model(arm, friction, q0), period), gains)
-
-
-def is_stable(margins: Sequence[LoopMargins]) -> bool:
-    """Tell whether the loops that these margins are of are stable: else they have no sensitivity."""
-    return not any(np.isnan(m.sensitivity_peak) for m in margins)
-
-
 def sampled_margins(sampled: SampledArm, gains: PidGains, *, points: int = 2000) -> list[LoopMargins]:
     """Return the margins of every joint's loop of a sampled arm, from so many frequencies up to Nyquist."""
     w = sampled.frequencies(points)
