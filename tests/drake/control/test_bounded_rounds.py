@@ -36,7 +36,7 @@ def moved(position: float, velocity: float, acceleration: float = 0.0) -> Answer
     """An answer whose last knot of the second joint deviates by so much."""
     d = np.zeros((3, 11, 3))
     d[:, -1, 1] = position, velocity, acceleration
-    return Answer(d, np.full((11, 3), 100 * position))
+    return Answer(d, np.full((11, 3), 10 * position))
 
 
 @pytest.fixture
@@ -108,13 +108,22 @@ def test_the_sign_is_open_where_the_reference_is_slow_or_the_deviation_turns_it_
 def test_rounds_end_once_positions_move_no_more(rounds: Any) -> None:
     found, asked = rounds(moved(0.02, 0.4), moved(0.02011, 0.3), moved(0.0202, 0.25))
     assert len(asked) == 3 and taken(found) == pytest.approx(0.0202)
-    assert_allclose(found.torques, 2.02)
+    assert_allclose(found.torques, 0.202)
 
 
-def test_after_eight_rounds_the_last_is_taken(rounds: Any) -> None:
-    answers = [moved(0.1 * 0.5**k, 0.5**k) for k in range(8)]
+def test_after_forty_rounds_the_last_is_taken(rounds: Any) -> None:
+    answers = [moved(0.1 * 0.95**k, 0.95**k) for k in range(40)]
     found, _ = rounds(*answers)
-    assert taken(found) == pytest.approx(0.1 * 0.5**7)
+    assert taken(found) == pytest.approx(0.1 * 0.95**39)
+
+
+def test_of_a_motion_that_needs_more_than_the_limits_it_is_said(rounds: Any) -> None:
+    """Torques that were linear in the deviation kept them; those of the motion grow with the square of its speeds."""
+    answers = [moved(0.2, 0.0) for _ in range(40)]
+    for k, answer in enumerate(answers):
+        answer.d[1, 1:] = 30.0 if k == 0 else 12.0 + 12.0 * (-0.98) ** k
+    with pytest.raises(InputError, match=r"or none was found: the nearest that was needs .* times as much"):
+        rounds(*answers)
 
 
 def test_a_round_that_moves_velocities_farther_is_made_again_near_the_last(rounds: Any) -> None:
@@ -123,9 +132,11 @@ def test_a_round_that_moves_velocities_farther_is_made_again_near_the_last(round
     assert [program.near for program in asked] == [0.0, 0.0, 0.3, 0.3]
     assert [program.last[-1, 1] for program in asked] == pytest.approx([0.0, 0.1, 0.1, 0.15])
     assert taken(found) == pytest.approx(0.02501)
-    # near it, too: then what there was is kept
-    found, _ = rounds(start, far, far)
-    assert taken(found) == pytest.approx(0.02) and found.torques[0, 0] == pytest.approx(2.0)
+    # near it, too: nearer still, and when nothing is near enough it is taken
+    nearer = [0.3 * 5.0**k for k in range(8)]
+    found, asked = rounds(start, *[far] * 10)
+    assert [program.near for program in asked] == pytest.approx([0.0, 0.0, *nearer, nearer[-1]])
+    assert taken(found) == pytest.approx(0.03)
     # as far as before is not farther
     found, asked = rounds(start, moved(0.03, 0.2), moved(0.03, 0.2))
     assert asked[-1].near == 0.0

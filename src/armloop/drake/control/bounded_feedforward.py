@@ -25,8 +25,11 @@ from armloop.util.arrays import Array
 from armloop.util.errors import InputError
 from armloop.util.functions import NUMPY
 
-_ROUNDS = 8
-_NEAR = 0.3  # w of the program once a round moves the velocities farther than the one before
+_ROUNDS = 40
+# w of the program once a round moves the velocities farther than the one before, by how much it grows, and until when
+_NEAR, _NEARER, _NEAREST = 0.3, 5.0, 1e4
+_STILL = 1e-4  # rad (m), by which a round that is the last moves positions
+_EXCEEDS = 0.01  # of a limit, by which the torque of the motion that was found may exceed it
 _FAR = 0.3  # rad (m); beyond it, as where an arm would have to fall, nothing is near
 _NONE, _REMEDY = (
     "no motion near the reference keeps the torque limits",
@@ -90,33 +93,46 @@ def bounded_reference(
     equations = ModelEquations(model, NUMPY, sharp=True)
     dry, _, slow = _dry_friction(equations, *base)
     level = _dry_friction(equations, base[0], _CREEP + 0 * base[1], base[2])[1]
-    d, torques = np.zeros((3, steps + 1, n)), np.zeros((steps + 1, n))
+    d, torques, excess = np.zeros((3, steps + 1, n)), np.zeros((steps + 1, n)), np.inf
     near, moved = 0.0, np.full(2, np.inf)
     for _ in range(_ROUNDS):
-        slow |= np.sign(base[1] + d[1]) != np.sign(base[1])
+        state = [x + y for x, y in zip(base, d, strict=True)]
+        opened = (np.sign(state[1]) != np.sign(base[1])) & ~slow
+        if moved[0] < _STILL and excess < _EXCEEDS and not opened.any():
+            break
+        slow |= opened
         reserve = effort - np.where(slow, level, 0.0)
         if np.any(reserve <= 0):
             raise InputError(f"{_NONE} {limits}: dry friction alone takes them; {_REMEDY}")
         # the torque about the present answer, told as a function of the whole deviation
-        rigid, J = _derivatives(equations, *(x + y for x, y in zip(base, d, strict=True)))
-        smooth, slope = _smooth_friction(equations, base[0] + d[0], base[1] + d[1])
+        rigid, J = _derivatives(equations, *state)
+        smooth, slope = _smooth_friction(equations, *state[:2])
         J[1] = J[1] + slope
-        tau = rigid + smooth
-        offset = tau - sum(np.einsum("kij,kj->ki", J[a], d[a]) for a in range(3))
+        offset = rigid + smooth - _linear(J, d)
         program = Program(h, offset, J, effort, rate, dry, np.where(slow, level, 0.0), reserve, d[1], near)
         found = program.solve()
         if found is None or not np.abs(found.d[0]).max() < _FAR:
             raise InputError(f"{_NONE} {limits}; {_REMEDY}")
         moved, before = np.abs(found.d[:2] - d[:2]).max(axis=(1, 2)), moved
-        if moved[1] > before[1]:
-            if near:
-                break
-            near, moved = _NEAR, before
+        if moved[1] > before[1] and near <= _NEAREST:
+            near, moved = near * _NEARER or _NEAR, before
             continue
         d, torques = found.d, found.torque
-        if moved[0] < 1e-4:
-            break
+        # what the program took to be linear in the deviation is not
+        state = [x + y for x, y in zip(base, d, strict=True)]
+        smooth = _torque(equations, *state) + _smooth_friction(equations, *state[:2])[0]
+        needed = torques + smooth - offset - _linear(J, d)
+        excess = float((np.abs(needed) / effort).max()) - 1
+    if excess >= _EXCEEDS:
+        raise InputError(
+            f"{_NONE} {limits}, or none was found: the nearest that was needs {1 + excess:.2g} times as much; {_REMEDY}"
+        )
     return BoundedReference(reference, TableReference(time, *d), torques)
+
+
+def _linear(J: list[Array], d: Array) -> Array:
+    """Return (K, n) what derivatives (K, n, n) by the deviation and its rates (3, K, n) come to."""
+    return np.asarray(sum(np.einsum("kij,kj->ki", each, x) for each, x in zip(J, d, strict=True)))
 
 
 def _torque(equations: ModelEquations, q: Array, v: Array, vdot: Array) -> Array:
