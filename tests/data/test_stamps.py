@@ -39,11 +39,16 @@ def test_a_log_that_changes_its_rate_has_no_such_rows() -> None:
     assert len(coincident(bursts, line(bursts), [slice(0, 200)])) > 0.8 * 200
 
 
-def test_of_an_arm_that_rests_any_row_is_as_near() -> None:
-    time, q = TIME.copy(), np.zeros((40, 2))
-    time[10] = time[11] - 1e-6
-    q[30:, 0] = 1.0  # but for one step
-    assert len(coincident(time, q, WHOLE)) == 1
+def test_three_such_rows_are_said_and_two_are_none() -> None:
+    motion = fourier_motion(5.0, 200.0, 1)
+    time, rows = motion.time.copy(), [100, 300, 500]
+    for many, k in enumerate(rows, 1):
+        time[k] = time[k + 1] - 1e-6
+        said = [
+            x for x in MotionLog(time, motion.q, motion.v, motion.vdot, name="run").doubts() if "nearer" in x
+        ]
+        assert len(said) == int(many == 3)
+    assert "nearer to another than 25% of the usual step, 3 in all, 1e-06 s at the least" in said[0]
 
 
 def test_nearly_is_a_quarter_of_the_mean_step() -> None:

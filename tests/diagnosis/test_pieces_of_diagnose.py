@@ -92,7 +92,7 @@ class Answers:
             return whole
 
         monkeypatch.setattr(module.Evidence, "of", of)
-        monkeypatch.setattr(Diagnosis, "errors", lambda self: {"after": "errors"})
+        monkeypatch.setattr(Diagnosis, "errors", lambda self: {"after": ("errors", self.adopted)})
 
     def note(self, name: str, asked: Any, answer: Any) -> Any:
         self.asked[name] = asked
@@ -164,7 +164,7 @@ def test_a_run_that_rests_is_judged_by_its_events_alone(
     assert found.verdict == verdict and found.unlisted is None and found.contacts == contacts
     # of no joint is it known what it lacks
     model = ("with", *(["push"] if contacts else []))
-    assert answers.asked["standing"] == ("left", model, "errors", [1, 2, 3]) and found.model == model
+    assert answers.asked["standing"] == ("left", model, ("errors", False), [1, 2, 3]) and found.model == model
     assert found.reasons == ["still", "stands", "zeros of ['run']"] and found.zeros.tolist() == [[0.1] * 3]
     assert answers.asked["contacts"] == "residual of whole" and "best" not in answers.asked
     assert found.outcome.before == found.outcome.after and found.evidence.name == "left"
@@ -208,7 +208,12 @@ def test_a_run_that_moves_is_searched(
     assert answers.asked["carried"] == ("whole", "account", 2)
     model = ("with", *found, *(["push"] if contacts else []))
     assert made.model == model
-    assert answers.asked["standing"] == (name, model, "errors", [] if unlisted is None else [unlisted])
+    assert answers.asked["standing"] == (
+        name,
+        model,
+        ("errors", True),
+        [] if unlisted is None else [unlisted],
+    )
     assert made.reasons == ["stands", "zeros of ['run']"] and made.zeros.tolist() == [[0.1] * 3]
 
 

@@ -299,6 +299,9 @@ def test_of_what_no_motion_shows_there_is_no_standard_error() -> None:
     laws: Any = [SimpleNamespace(effect="load", shape=0.0), SimpleNamespace(effect="height", shape=0.0)]
     run, then = stage([1, 0, 0], [0, 0, 0], [0, 0, 1e-12]), stage([2, 0, 0], [0, 0, 0], [0, 0, 5])
     assert next_run._sharper(run, then, laws) == [("load", pytest.approx(0.5))]
+    # nor is there one of what the run has shown and the next one does not
+    run = stage([1, 0, 0], [0, 1, 0], [0, 0, 1e-12])
+    assert next_run._sharper(run, then, laws) == [("load", pytest.approx(0.5))]
 
 
 def test_what_feedforward_changes_along_a_run() -> None:

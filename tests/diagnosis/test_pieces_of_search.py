@@ -107,6 +107,13 @@ class TestSearch:
         many = {" ".join(alike[:k]): 10.0 ** (9 - k) for k in range(7)}
         assert self.found(self.search(monkeypatch, many)) == alike
 
+    def test_two_of_one_kind_that_hide_each_other_are_sought_beside_any_number_of_it(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        alike = [f"a{joint}1" for joint in "abcdef"]
+        many = {" ".join(alike[:k]): 10.0 ** (9 - k) for k in (0, 1, 2, 3, 4, 6)}
+        assert self.found(self.search(monkeypatch, many)) == alike
+
     def test_the_simplest_of_equals_is_named_and_the_others_are_its_alternatives(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:

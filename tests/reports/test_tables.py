@@ -10,10 +10,10 @@ import pytest
 
 from armloop.diagnosis import Diagnosis, close
 from armloop.drake.experiments.metrics import Metrics
-from armloop.laws.effects import effect
+from armloop.laws.effects import Estimate, effect
 from armloop.laws.friction import FrictionLaw, FrictionTerm
 from armloop.model import AddedEffect
-from armloop.reports.diagnosis_tables import diagnosis_table
+from armloop.reports.diagnosis_tables import diagnosis_table, events_table
 from armloop.reports.findings import findings, nothing_to_supply
 from armloop.reports.tables import (
     eta_table,
@@ -56,6 +56,16 @@ def test_a_diagnosis_names_effect_and_errors(loop: SimpleNamespace, clean: objec
     text = diagnosis_table(loop.diagnosis)
     assert "Verdict: effects found" in text and "joint spring, joint 2" in text and "stiffness" in text
     assert "Verdict: no effect" in diagnosis_table(clean)
+
+
+def test_an_events_times_and_link_stand_with_their_errors() -> None:
+    of = {"start": (1.234, 0.052), "end": (2.5, 0.1), "link": (3.0, 0.64)}
+    parameters = {key: Estimate(value, error, "1") for key, (value, error) in of.items()}
+    parameters["force"] = Estimate([3.0, 4.0, 0.0], [0.1, 0.1, 0.1], "N")
+    added = AddedEffect(effect("external_contact", None), parameters)
+    table = str(events_table(SimpleNamespace(contacts=[SimpleNamespace(added=added, share=0.9)])))
+    for cell in ("1.23 ± 0.05", "2.50 ± 0.10", "link 3 ± 0.6", "90 %"):
+        assert cell in table
 
 
 def test_the_largest_residual_is_said_to_be_of_the_joints_that_were_judged(

@@ -105,6 +105,22 @@ def test_the_sign_is_open_where_the_reference_is_slow_or_the_deviation_turns_it_
         slow[5, 0] = True
 
 
+def test_rounds_go_on_where_the_last_has_turned_a_joint_round(rounds: Any) -> None:
+    nearly, turned = moved(0.01, 0.0), moved(0.01, 0.0)
+    for answer, part in ((nearly, -0.9), (turned, -1.5)):
+        answer.d[1, 5, 0] = part * BASE[1][5, 0]
+    _, asked = rounds(nearly, turned, turned)
+    assert [program.level[5, 0] for program in asked] == [0.0, 0.0, pytest.approx(0.5)]
+
+
+def test_rounds_go_on_while_the_motion_needs_more_than_the_limits(rounds: Any) -> None:
+    """Positions stand still already; speeds, and the torques that grow with their square, do not."""
+    first, then = moved(0.2, 0.0), moved(0.2, 0.0)
+    first.d[1, 1:], then.d[1, 1:] = 24.0, 1.0
+    _, asked = rounds(first, then, then)
+    assert len(asked) == 3
+
+
 def test_rounds_end_once_positions_move_no_more(rounds: Any) -> None:
     found, asked = rounds(moved(0.02, 0.4), moved(0.02011, 0.3), moved(0.0202, 0.25))
     assert len(asked) == 3 and taken(found) == pytest.approx(0.0202)

@@ -17,6 +17,7 @@ from armloop.data.log import MotionLog
 from armloop.data.signals import Conditioning, preprocess
 from armloop.diagnosis import diagnose
 from armloop.identification.reconstruction import Reconstruction, reconstruct
+from armloop.identification.reconstruction import torque_lag as torque_lags
 from armloop.identification.reconstruction.torque_lag import TorqueLag, torque_lag
 from armloop.model import load_model
 
@@ -126,6 +127,11 @@ def test_the_recorders_own_lag_is_no_change_and_another_is() -> None:
     (added,) = other.outcome.added()
     seconds = added.parameters["seconds"]
     assert seconds.value == pytest.approx(3 * DEAD - model.conditioning.torque_lag, abs=0.1 * DEAD)
+
+
+@pytest.mark.filterwarnings("error")
+def test_lags_without_error_have_a_mean() -> None:
+    assert torque_lags._mean(np.full(3, 2e-3), np.zeros(3))[0] == pytest.approx(2e-3)
 
 
 def test_torque_is_moved_into_step_with_the_motion() -> None:

@@ -60,6 +60,8 @@ _SURE, _ALIKE = 3.0, 0.5
 _SLOWER = 2.0
 #: No record is out of step by more, s.
 _LONGEST = 0.1
+#: What is known as well, s, is known exactly.
+_EXACT = 1e-9
 #: Laws whose torque, where a joint turns round, would else be a lag: dry friction that falls with the speed leads.
 _FRICTION = (*FRICTION, *(FrictionTerm("stribeck", parameter=speed) for speed in (0.03, 0.1, 0.3)))
 
@@ -235,7 +237,7 @@ def _sizes(x: Array, joint: Index) -> Array:
 
 def _mean(lags: Array, errors: Array) -> tuple[float, float]:
     """Mean of the joints' lags, which differ by more than their errors say, and its standard error."""
-    variance = np.maximum(errors**2, TINY)
+    variance = np.maximum(errors, _EXACT) ** 2
     weight, more = 1 / variance, len(lags) - 1
     excess = float(weight @ (lags - weight @ lags / weight.sum()) ** 2) - more
     between = max(excess, 0.0) / max(float(weight.sum() - weight @ weight / weight.sum()), TINY)
