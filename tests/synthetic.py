@@ -4,6 +4,7 @@ Torques come from the regressor and from laws written out here; nothing is taken
 (features, laws, drake), and no simulator runs.
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -102,3 +103,11 @@ def sines(time: np.ndarray, hz: tuple[float, ...] = (0.7, 2.0)) -> MotionLog:
     w = 2 * np.pi * np.array(hz)
     phase = np.multiply.outer(time, w)
     return MotionLog(time, np.sin(phase), w * np.cos(phase), w * np.cos(phase), name="sines")
+
+
+def noisy_run(seed: int = 1, rate: float = 100.0, noise: float = 0.0, seconds: float = 40.0) -> MotionLog:
+    """A run whose v has white noise of so many rad/s."""
+    motion = fourier_motion(seconds, rate, seed)
+    tau = rigid_torque(three_axis(), motion.q, motion.v, motion.vdot) + friction(motion.v)
+    log = measured(motion, tau, seed)
+    return replace(log, v=log.v + noise * np.random.default_rng(seed).normal(size=log.v.shape))

@@ -161,7 +161,7 @@ def test_the_library_follows_the_number_of_joints():
 @pytest.mark.filterwarnings("error")
 def test_torques_that_nobody_recorded_are_told_before_anything_is_made_of_them():
     run = replace(a_run(1, 10.0), tau=np.zeros((1250, 3)))
-    with pytest.raises(ExcitationError, match="^tau1: zero throughout; give logs that hold the torque"):
+    with pytest.raises(ExcitationError, match=r"^tau1: zero throughout; give logs that hold the torque"):
         reconstruct([run], three_axis())
 
 
