@@ -193,6 +193,7 @@ class TestFinding:
         monkeypatch.setattr(contacts, "_standing_out", standing_out)
         monkeypatch.setattr(contacts, "turning", lambda motion, moving: np.arange(200).reshape(100, 2) < 60)
         monkeypatch.setattr(contacts, "at_rest", lambda samples: np.arange(200).reshape(100, 2) >= 180)
+        monkeypatch.setattr(contacts, "outlying", lambda evidence, residual: [slice(10, 20), slice(60, 70)])
         monkeypatch.setattr(contacts, "push", push)
         scanned = [
             SimpleNamespace(rows=slice(a, b), joint=j, level=innovation) for a, b, j in of.get("beside", ())
@@ -303,6 +304,15 @@ class TestFinding:
         assert [a for a, *_ in self.pushed(monkeypatch, *bursts, (20, 29, 1), judged=once)] == [20, 60]
         # a joint that never moves is judged by all of the run
         assert len(self.pushed(monkeypatch, *bursts, judged=[False, True])) == 2
+
+    def test_where_no_joint_can_be_judged_what_stands_out_counts(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        found = self.pushed(monkeypatch, judged=False)
+        assert found == [(10, 20, [0, 1], [100, 100]), (60, 70, [0, 1], [100, 100])]
+        assert self.pushed(monkeypatch, judged=False, known=11) == found[1:]
+        # one joint that can be judged is enough for the rest
+        assert self.pushed(monkeypatch, (40, 50, 0), judged=[True, False]) == [(40, 50, [0], [60, 100])]
 
 
 def at(time: list[float], starts: tuple[int, ...] = (0,)) -> Motion:

@@ -177,7 +177,7 @@ LOGS: dict[str, tuple[Lay, str, str]] = {
     ),
     "torques beyond the limit": (scaled("tau", 9.0), TAKEN, ""),
     "a torque of a coarse sensor": (signals(rounded), TAKEN, ""),
-    "stamps that nearly coincide": (signals(stamped_late), TAKEN, ""),
+    "stamps that nearly coincide": (signals(stamped_late), WARNED, r"column time has rows nearer to another"),
     "torques in a unit of no arm": (parquet(b"lbf"), REFUSED, "says of itself that tau is in 'lbf'"),
     "torques in no text": (parquet(b"\xff"), REFUSED, "says of itself that tau is in"),
     "lines that end as Windows' do": (text(lambda lines: lines, end="\r\n"), TAKEN, ""),

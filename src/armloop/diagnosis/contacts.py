@@ -18,6 +18,7 @@ from armloop.diagnosis.evidence import Evidence, creep, far_outside
 from armloop.diagnosis.innovations import at_rest, deviations, dry_level, innovations
 from armloop.diagnosis.judgement import MOSTLY, MULTIPLE
 from armloop.diagnosis.novelty import novelty
+from armloop.diagnosis.outliers import STANDS_OUT, outlying
 from armloop.diagnosis.pushes import FREEDOM, PAUSE, SHORTEST, Contact, around, push
 from armloop.laws.effects.events import during, ends
 from armloop.model import AddedEffect, ReconstructedModel
@@ -27,8 +28,6 @@ from armloop.util.arrays import TINY, Array, Index, Mask
 _RISE = 4.2
 #: It lasts while the novelty is above this part of its peak.
 _EDGE = 0.25
-#: It reaches this many times the most that the rest of the run does.
-_STANDS_OUT = 1.5
 #: Positions and speeds of all joints that differ by less than this part of their ranges are the same passage.
 _SAME = 0.05
 #: Events fill at most this part of a joint's motion: what is there longer is none.
@@ -74,7 +73,13 @@ def find_contacts(evidence: Evidence, residual: Array, found: Sequence[AddedEffe
         Events in order of time; none where the residual is what it is in like motion, or is unlike it too long.
     """
     motion = evidence.samples.motion
-    tells, bursts = _unlike(evidence, residual, found, known_contacts(evidence))
+    known = known_contacts(evidence)
+    if evidence.rows.any():
+        tells, bursts = _unlike(evidence, residual, found, known)
+    else:
+        tells = np.ones_like(residual, dtype=bool)
+        every = frozenset(range(motion.joints))
+        bursts = [Burst(b, every) for b in outlying(evidence, residual) if not known[b].any()]
     holds = turning(motion, evidence.samples.moving) | at_rest(evidence)
     bursts = _rare(evidence.rows, bursts)
 
@@ -201,7 +206,7 @@ def _standing_out(motion: Motion, rows: Index, level: Array, bursts: list[Burst]
     kept = []
     for burst in bursts:
         peak = level[_within(rows, burst.rows)].max(axis=0, initial=0.0)
-        if any(peak[j] >= _STANDS_OUT * rest[j] for j in burst.joints):
+        if any(peak[j] >= STANDS_OUT * rest[j] for j in burst.joints):
             kept.append(burst)
     return kept
 

@@ -99,7 +99,8 @@ def test_a_library_that_is_named_is_not_asked_whether_the_logs_suit_it(
     library: str | None, asked: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked["lags"] = [0.0]
-    monkeypatch.setattr(module, "check_torques", lambda *_: None)
+    for check in ("check_torques", "check_recorded"):
+        monkeypatch.setattr(module, check, lambda *_: None)
     monkeypatch.setattr(module, "_refused", lambda arm, wanted, ready: {wanted[0]: "why"})
     monkeypatch.setattr(module, "_compared", lambda wanted, refused, attempt, ready: (refused, "all"))
     monkeypatch.setattr(module, "_finished", lambda refused, *_: refused)
