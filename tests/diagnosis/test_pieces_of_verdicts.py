@@ -165,7 +165,7 @@ class TestReasons:
         assert self.standing(monkeypatch, [0.9, 0.51, 0.9]) == ([], False)
         assert self.standing(monkeypatch, [0.9, 0.5, 0.9], left=True) == ()
         words, unknown = self.standing(monkeypatch, [9.0, 9.0, 9.0], explained=[2, 3])
-        assert words[1:] == ["1 18"] and not unknown
+        assert words[1:] == ["1 18", "2 18", "3 18"] and not unknown
 
     def test_most_joints_far_above_the_baseline_are_another_arm_or_another_record(
         self, monkeypatch: pytest.MonkeyPatch
@@ -178,7 +178,7 @@ class TestReasons:
         assert self.standing(monkeypatch, [1.0, None, 1.0], slides=19)[0][0].startswith("2 of 2 joints")
         # a residual that the verdict names is left all the same, unless its law removes it
         words, _ = self.standing(monkeypatch, [1.0, 1.0, 0.9], explained=[1])
-        assert words[0].startswith("2 of 3 joints leave") and words[1:] == ["2 2"]
+        assert words[0].startswith("2 of 3 joints leave") and words[1:] == ["1 2", "2 2"]
         assert self.standing(monkeypatch, [0.6, 1.0, 0.9], explained=[1])[0] == ["2 2"]
 
     def test_a_joint_that_hardly_slides_or_lies_far_outside_cannot_be_judged(

@@ -78,14 +78,13 @@ def standing(
         judged += 1
         if poor or not ratio > 1:
             continue
-        multiples += int(ratio >= MULTIPLE)
-        if j + 1 in explained:
-            continue
         words, real = _multiple(part, j, ratio)
-        unexplained += [j] if real else []
         if ratio >= MULTIPLE:
+            multiples += 1
             reasons.append(words)
-            unknown |= real is not False
+        if j + 1 not in explained:
+            unexplained += [j] if real else []
+            unknown |= ratio >= MULTIPLE and real is not False
     if multiples > max(MOSTLY * judged, 1):
         reasons.insert(0, _all_over(model, multiples, judged))
     return Standing(reasons, merged(parts, outside), unknown, tuple(unexplained))
