@@ -95,6 +95,11 @@ CASES: dict[Place, tuple[Law, dict[str, object]]] = {
         lambda m: on_joint(m, 3, 0.25 * np.sin(9 * m.q[:, 2] + 0.8)),
         {"amplitude": 0.25, "order": 9, "phase": 0.8},
     ),
+    # behind a gear whose ratio is no whole number
+    ("torque_ripple", 2): (
+        lambda m: on_joint(m, 2, 0.5 * np.sin(10.37 * m.q[:, 1] + 0.8)),
+        {"amplitude": 0.5, "order": 10.37, "phase": 0.8},
+    ),
     ("rotor_inertia", 1): (lambda m: on_joint(m, 1, 0.25 * m.vdot[:, 0]), {"inertia": 0.25}),
     ("torque_offset", 3): (lambda m: on_joint(m, 3, np.full(m.samples, 0.4)), {"offset": 0.4}),
     ("gravity_tilt", None): (tilt, {"roll": 0.06, "pitch": -0.04}),

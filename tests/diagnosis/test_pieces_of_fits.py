@@ -207,9 +207,14 @@ class TestTrials:
             independent=slice(None),
             scale=np.array([1.0, 0.1]),
             fold=fold,
+            context=None,
         )
         known = Known(evidence, np.zeros((80, 2)), current)
-        linear = {"start": lambda beta: beta, "embed": lambda x: (x, np.eye(len(x)))}
+        linear = {
+            "start": lambda beta: beta,
+            "embed": lambda x: (x, np.eye(len(x))),
+            "between": lambda *_: (),
+        }
         effect: Any = SimpleNamespace(indices=(1,), **linear)
         assert trials._best_shape(known, effect, shapes) == Shape(2.0, (3.0, 2.0))
         effect.indices = (0,)
@@ -236,11 +241,13 @@ class TestTrials:
             independent=slice(None),
             scale=np.ones(1),
             fold=fold,
+            context=None,
         )
         effect: Any = SimpleNamespace(
             indices=(0,),
             start=lambda beta: beta[-1:],
             embed=lambda x: (np.array([1.0, x[0]]), np.array([[0.0], [1.0]])),
+            between=lambda *_: (),
         )
         known = Known(evidence, np.zeros((80, 1)), current)
         assert trials._best_shape(known, effect, [1.0, 2.0]) == Shape(2.0, (2.0, 2.0))
@@ -258,9 +265,14 @@ class TestTrials:
             independent=slice(None),
             scale=np.ones(1),
             fold=fold,
+            context=None,
         )
         effect: Any = SimpleNamespace(
-            joint=1, indices=[0], start=lambda beta: beta, embed=lambda x: (x, np.eye(len(x)))
+            joint=1,
+            indices=[0],
+            start=lambda beta: beta,
+            embed=lambda x: (x, np.eye(len(x))),
+            between=lambda *_: (),
         )
         known = Known(evidence, np.zeros((80, 1)), current)
         assert trials._best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))

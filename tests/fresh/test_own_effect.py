@@ -103,6 +103,7 @@ def test_the_command_line_knows_it_where_it_is_installed_and_says_so_where_not(d
     assert line.startswith("armloop: model.json: unknown effect 'eddy_brake'; install the package")
 
 
+@pytest.mark.long
 def test_without_it_the_run_shows_something_else(done):
     folder, printed = done
     answer = python("-c", WITHOUT, cwd=folder, installed=None)

@@ -103,13 +103,16 @@ class Fit:
 
     @cached_property
     def clear(self) -> tuple[float, ...]:
-        """Per effect, how many standard errors the clearest of its coefficients is from zero.
+        """Per effect, how many standard errors its clearest coefficient is from zero, or all of them together are.
 
-        What would be another law by itself does not count.
+        What would be another law by itself does not count. Of columns that are alike none need be clear by itself.
         """
-        each = zip(self.effects, self.solution.free, self._spread, strict=True)
-        errors = ((effect, np.abs(free) / np.sqrt(np.diag(spread) + TINY)) for effect, free, spread in each)
-        return tuple(float(np.max(own[: len(own) - e.nested], initial=0.0)) for e, own in errors)
+        each = []
+        for effect, free, spread in zip(self.effects, self.solution.free, self._spread, strict=True):
+            own = slice(len(free) - effect.nested)
+            clearest = np.max(np.abs(free[own]) / np.sqrt(np.diag(spread)[own] + TINY), initial=0.0)
+            each.append(max(float(clearest), deviate(*_wald(free[own], spread[own, own]))))
+        return tuple(each)
 
     @cached_property
     def wald(self) -> tuple[tuple[float, int], ...]:

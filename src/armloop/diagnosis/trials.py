@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +22,8 @@ from armloop.util.workers import Team
 _REFITS = 8
 #: Parameters that change by less than this part of their standard errors are the same.
 _SAME = 0.1
+#: A value between those of the grid leaves less by such a part of what it explains, and of what is left per block.
+_CLEARLY, _SURELY = 0.01, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,30 +155,74 @@ def _best_shape(known: Known, effect: Effect, shapes: list[float]) -> Shape:
     """The shape whose columns explain most of what the known effects leave on the effect's joints.
 
     Chosen on all blocks for the parameters, and without each fold in turn for judging that fold: on the other
-    blocks, and on what the known effects leave there when they, too, are fitted without that fold.
+    blocks, and on what the known effects leave there when they, too, are fitted without that fold. What lies between
+    (:meth:`Effect.between`) takes the place of the best where it is clearly better.
     """
-    n = known.residual.shape[1]
-    joints = effect.indices if len(effect.indices) == 1 else range(n)
-    columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
-    every = list(range(FOLDS))
-    # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
-    given, free = effect.embed(effect.start(np.zeros(columns.shape[2])))
-    # for columns of nothing, and large ones that are alike, as of presliding on the log of another arm
-    eye = 1e-12 * np.eye(free.shape[1])
-    taken, fitted = columns @ given, columns @ free
-    X, taken_in = ([each[fold == k] for k in every] for each in (fitted, taken))
-    G = [np.einsum("ksp,ksr->spr", x, x) for x in X]
+    grid, folds = _Grid.of(known, effect, shapes), (None, *range(FOLDS))
+    chosen = [shapes[int(np.argmin(grid.remaining(without)))] for without in folds]
+    around = {shape: list(effect.between(known.evidence.context, shape)) for shape in set(chosen)}
+    if any(around.values()):
+        finer = _Grid.of(known, effect, sorted({*around, *chain(*around.values())}))
+        blocks = len(np.unique(known.evidence.blocks))
+        each = zip(folds, chosen, strict=True)
+        chosen = [finer.better(without, shape, around[shape], blocks) for without, shape in each]
+    return Shape(chosen[0], tuple(chosen[1:]))
 
-    def best(folds: list[int], y: Array) -> float:
-        left = [y[fold == k, None] - taken_in[k] for k in every]
-        A = sum(G[k] for k in folds) * (1.0 + eye) + len(columns) * eye
-        c = np.sum([np.einsum("ksp,ks->sp", X[k], left[k]) for k in folds], axis=0)
-        explained = np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0])
-        energy = np.sum([(left[k] ** 2).sum(axis=0) for k in folds], axis=0)
-        return shapes[int(np.argmin(energy - explained))]
 
-    without = (best([other for other in every if other != k], outside[k]) for k in every)
-    return Shape(best(every, held_out), tuple(without))
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Least squares of an effect's columns at each of S values of its nonlinear parameter.
+
+    Attributes:
+        free: (R, S, p) columns whose coefficients are free; ``given`` (R, S): those whose coefficients are given.
+        left: (1 + FOLDS, R) what the known effects leave: on held-out rows, and after a fit outside each fold.
+        fold: (R,) of each row.
+    """
+
+    shapes: list[float]
+    free: Array
+    given: Array
+    left: Array
+    fold: Index
+
+    @staticmethod
+    def of(known: Known, effect: Effect, shapes: list[float]) -> _Grid:
+        n = known.residual.shape[1]
+        joints = effect.indices if len(effect.indices) == 1 else range(n)
+        columns, held_out, outside, fold = _shape_problem(known, effect, shapes, joints)
+        # Columns of which coefficients are given, as a delay's are, are no columns to be fitted.
+        given, free = effect.embed(effect.start(np.zeros(columns.shape[2])))
+        return _Grid(shapes, columns @ free, columns @ given, np.vstack([held_out, outside]), fold)
+
+    @cached_property
+    def _grams(self) -> list[Array]:
+        """(S, p, p) of each fold."""
+        each = (self.free[self.fold == k] for k in range(FOLDS))
+        return [np.einsum("ksp,ksr->spr", X, X) for X in each]
+
+    def remaining(self, without: int | None) -> Array:
+        """(S,) sum of squares that each leaves, of all rows or of those outside a fold."""
+        folds = [k for k in range(FOLDS) if k != without]
+        y = self.left[0 if without is None else 1 + without]
+        # for columns of nothing, and large ones that are alike, as of presliding on the log of another arm
+        eye = 1e-12 * np.eye(self.free.shape[2])
+        A = sum(self._grams[k] for k in folds) * (1.0 + eye) + len(self.free) * eye
+        energy, c = np.zeros(len(self.shapes)), np.zeros(A.shape[:2])
+        for k in folds:
+            rows = self.fold == k
+            left = y[rows, None] - self.given[rows]
+            energy += (left**2).sum(axis=0)
+            c += np.einsum("ksp,ks->sp", self.free[rows], left)
+        return np.asarray(energy - np.einsum("sp,sp->s", c, np.linalg.solve(A, c[:, :, None])[:, :, 0]))
+
+    def better(self, without: int | None, shape: float, around: Sequence[float], blocks: int) -> float:
+        """The one around a shape that leaves least, where that is clearly less of so many blocks; else the shape itself."""
+        remaining = dict(zip(self.shapes, self.remaining(without).tolist(), strict=True))
+        best = min((shape, *around), key=remaining.__getitem__)
+        y = self.left[0 if without is None else 1 + without]
+        explained = float(np.sum(y[self.fold != without] ** 2)) - remaining[best]
+        clearly = max(_CLEARLY * explained, _SURELY * remaining[best] / blocks)
+        return best if remaining[shape] - remaining[best] > clearly else shape
 
 
 def _shape_problem(
@@ -185,7 +233,9 @@ def _shape_problem(
     """
     evidence, current = known.evidence, known.fit
     each = [evidence.smoothed(effect, shape) for shape in shapes]
-    width = each[0].shape[-1]
+    width = max(columns.shape[-1] for columns in each)
+    # some shapes need fewer
+    each = [np.pad(c, [(0, 0)] * (c.ndim - 1) + [(0, width - c.shape[-1])]) for c in each]
     parts, left, outside, fold = [], [], [], []
     for j in joints:
         rows = evidence.rows[evidence.independent, j]

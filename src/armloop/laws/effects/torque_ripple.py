@@ -9,10 +9,11 @@ import numpy as np
 from armloop.laws.effects.base import Array, Context, Estimate, Parameter, number
 from armloop.laws.effects.law import Law
 from armloop.laws.friction import Element
+from armloop.util.arrays import TINY
 
 
 class TorqueRipple(Law):
-    """tau_j += A sin(N q_j + φ), N a whole number of cycles per revolution."""
+    """tau_j += A sin(N q_j + φ), with N cycles per revolution: of teeth a whole number, behind a gear any."""
 
     name = "torque_ripple"
     periodic = True
@@ -31,12 +32,36 @@ class TorqueRipple(Law):
     lowest_order = 4
     #: Above this part of the sample rate a ripple has been filtered away.
     band = 0.2
+    #: Orders that differ by 2π over the travel are one; between whole ones it is sought in such parts of that.
+    part = 0.05
 
     def coefficients(self, p: Mapping[str, float]) -> tuple[float, ...]:
         return p["amplitude"] * float(np.cos(p["phase"])), p["amplitude"] * float(np.sin(p["phase"]))
 
+    def columns(self, context: Context, shape: float) -> Array:
+        """Sine and cosine; of an order that is none of teeth also what a small change of it does to either."""
+        own = super().columns(context, shape)
+        if float(shape).is_integer():
+            return own
+        return np.hstack([own, context.motion.q[:, [self.index]] * own[:, ::-1] * [1.0, -1.0]])
+
+    def start(self, beta: Array) -> Array:
+        if len(beta) == len(self.elements):
+            return beta
+        return np.append(beta[:2], beta[:2] @ beta[2:] / (beta[:2] @ beta[:2] + TINY))
+
+    def embed(self, x: Array) -> tuple[Array, Array]:
+        """Coefficients a, b and, with a change d of the order, a d and b d."""
+        if len(x) == len(self.elements):
+            return super().embed(x)
+        J = np.vstack([np.eye(2, 3), np.column_stack([x[2] * np.eye(2), x[:2]])])
+        return np.append(x[:2], x[2] * x[:2]), J
+
     def named(self, x: Array, shape: float) -> tuple[float, ...]:
-        return float(np.hypot(*x)), shape, float(np.arctan2(x[1], x[0]))
+        return float(np.hypot(*x[:2])), shape + float(x[2:].sum()), float(np.arctan2(x[1], x[0]))
+
+    def refined(self, x: Array, shape: float) -> float:
+        return shape + float(np.clip(x[2:].sum(), -0.5, 0.5))
 
     def shapes(self, context: Context) -> Sequence[float]:
         if context.arm.joints[self.index].kind != "revolute":
@@ -45,9 +70,14 @@ class TorqueRipple(Law):
         top = 2 * np.pi * self.band / context.period / max(speed, 1e-3)
         return [float(order) for order in range(self.lowest_order, int(min(max(top, 24), 240)) + 1)]
 
+    def between(self, context: Context, shape: float) -> Sequence[float]:
+        step = self.part * 2 * np.pi / max(float(np.ptp(context.motion.q[:, self.index])), TINY)
+        beside = np.arange(step, 1.0, max(step, self.part))
+        return [float(order) for order in np.concatenate([shape - beside[::-1], shape + beside])]
+
     def sentence(self, parameters: dict[str, Estimate]) -> str:
         a, order, phase = (parameters[key] for key in ("amplitude", "order", "phase"))
         return (
-            f"the torque of joint {self.joint} ripples {number(order.value):.0f} times per revolution with amplitude "
+            f"the torque of joint {self.joint} ripples {number(order.value):.4g} times per revolution with amplitude "
             f"{a.words()} and phase {number(phase.value):.2f} rad"
         )
