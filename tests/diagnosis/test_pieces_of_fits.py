@@ -277,6 +277,55 @@ class TestTrials:
         known = Known(evidence, np.zeros((80, 1)), current)
         assert trials._best_shape(known, effect, [2.0, 1.0]) == Shape(1.0, (1.0, 1.0))
 
+    @pytest.mark.parametrize(
+        ("order", "noise", "chosen"),
+        [
+            (2.5, 0.0, 2.5),
+            (2.4, 0.0, 2.4),
+            # by a hundredth of what it explains: the whole number stands for it
+            (2.015, 0.0, 2.0),
+            # by less than what so few blocks may show by chance
+            (2.4, 1.6, 2.0),
+            (2.1, 0.05, 2.1),
+        ],
+    )
+    def test_what_lies_between_is_chosen_where_it_leaves_clearly_less(
+        self, order: float, noise: float, chosen: float
+    ) -> None:
+        t = np.linspace(0, 2 * np.pi, 800, endpoint=False)
+        y = np.sin(order * t) + noise * np.random.default_rng(1).normal(size=800)
+        fold = np.tile([0, 1], 400)
+        current: Any = SimpleNamespace(
+            stacked=SimpleNamespace(joint=np.zeros(800, dtype=int)), held_out=y, outside=np.tile(y, (2, 1))
+        )
+        evidence: Any = SimpleNamespace(
+            # the whole orders need a column less
+            smoothed=lambda effect, shape: np.column_stack(
+                [np.sin(shape * t), np.cos(shape * t), *([] if shape % 1 == 0 else [0 * t])]
+            ),
+            rows=np.ones((800, 1), dtype=bool),
+            independent=slice(None),
+            scale=np.ones(1),
+            fold=fold,
+            blocks=np.arange(800) // 40,
+            context=None,
+        )
+        effect: Any = SimpleNamespace(
+            indices=(0,),
+            start=lambda beta: beta,
+            embed=lambda x: (x, np.eye(len(x))),
+            between=lambda context, shape: [
+                shape - 0.1,
+                shape + 0.1,
+                shape + 0.4,
+                shape + 0.5,
+                shape + 0.015,
+            ],
+        )
+        known = Known(evidence, np.zeros((800, 1)), current)
+        found = trials._best_shape(known, effect, [1.0, 2.0, 3.0])
+        assert found.final == pytest.approx(chosen) and found.without == pytest.approx((chosen, chosen))
+
 
 def test_a_shape_is_not_refined_beyond_what_is_tried() -> None:
     effect: Any = SimpleNamespace(shapes=lambda context: [1.0, 3.0, 2.0])
